@@ -38,10 +38,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from bayesplate.board.attached import AttachedItem, DeclaredFluid
+    from bayesplate.board.board import Board
+    from bayesplate.board.prior import PriorCard
+    from bayesplate.board.quantity import Quantity
+    from bayesplate.board.reading import Peak, Reading
+    from bayesplate.board.setup import Setup
     from bayesplate.campaigns.checking import CampaignCheck
     from bayesplate.campaigns.diagnosis import CampaignDiagnosis
     from bayesplate.campaigns.summary import CampaignSummary
-    from bayesplate.cards.prior import PriorCard
     from bayesplate.diagnosis.result import Diagnosis
     from bayesplate.errors import (
         BatchError,
@@ -55,10 +60,6 @@ if TYPE_CHECKING:
     from bayesplate.grading.matching import Grading, GradingRequest
     from bayesplate.labels import Label
     from bayesplate.planning.plan import Plan
-    from bayesplate.plate.board import Board
-    from bayesplate.plate.measured import Peak, Reading
-    from bayesplate.plate.setup import AttachedItem, DeclaredFluid, Setup
-    from bayesplate.quantities import Quantity
     from bayesplate.recordings.contract import PickReport
     from bayesplate.results.checking import CheckReport
     from bayesplate.results.comparison import Comparison
@@ -136,11 +137,11 @@ __all__ = [
 ]
 
 _HOMES = {
-    "AttachedItem": "bayesplate.plate.setup",
+    "AttachedItem": "bayesplate.board.attached",
     "BatchError": "bayesplate.errors",
     "BatchResult": "bayesplate.workflow.batch",
     "BayesplateError": "bayesplate.errors",
-    "Board": "bayesplate.plate.board",
+    "Board": "bayesplate.board.board",
     "Campaign": "bayesplate.workflow.campaign",
     "CampaignCheck": "bayesplate.campaigns.checking",
     "CampaignDiagnoseResult": "bayesplate.workflow.campaign_diagnose",
@@ -152,7 +153,7 @@ _HOMES = {
     "CheckpointError": "bayesplate.errors",
     "CompareResult": "bayesplate.workflow.compare",
     "Comparison": "bayesplate.results.comparison",
-    "DeclaredFluid": "bayesplate.plate.setup",
+    "DeclaredFluid": "bayesplate.board.attached",
     "DiagnoseResult": "bayesplate.workflow.diagnose",
     "Diagnosis": "bayesplate.diagnosis.result",
     "Fault": "bayesplate.errors",
@@ -166,16 +167,16 @@ _HOMES = {
     "ModesResult": "bayesplate.workflow.modes",
     "NotConvergedError": "bayesplate.errors",
     "NotIdentifiableError": "bayesplate.errors",
-    "Peak": "bayesplate.plate.measured",
+    "Peak": "bayesplate.board.reading",
     "PickReport": "bayesplate.recordings.contract",
     "PickResult": "bayesplate.workflow.pick",
     "Plan": "bayesplate.planning.plan",
     "PlanResult": "bayesplate.workflow.plan",
-    "PriorCard": "bayesplate.cards.prior",
+    "PriorCard": "bayesplate.board.prior",
     "Problem": "bayesplate.workflow.problem",
-    "Quantity": "bayesplate.quantities",
-    "Reading": "bayesplate.plate.measured",
-    "Setup": "bayesplate.plate.setup",
+    "Quantity": "bayesplate.board.quantity",
+    "Reading": "bayesplate.board.reading",
+    "Setup": "bayesplate.board.setup",
     "Summary": "bayesplate.results.summary",
     "batch": "bayesplate.workflow.batch",
     "check": "bayesplate.workflow.check",

@@ -18,10 +18,10 @@ import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from bayesplate.cards import card_names
+from bayesplate.board.material import MODULI
+from bayesplate.board.shelf import card_names
 from bayesplate.diagnosis.known import known_fits
 from bayesplate.diagnosis.known_words import KnownModel, known_models, known_titles
-from bayesplate.plate.material import MODULI
 from bayesplate.workflow.problem import Problem
 
 COMPUTED = "paper-"

@@ -23,6 +23,9 @@ from typing import Any
 import numpy as np
 
 import bayesplate
+from bayesplate.board.board import Board
+from bayesplate.board.material import MODULI, moduli, rigidities
+from bayesplate.board.quantity import Quantity
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.paper import PaperSystem, paper_system
 from bayesplate.estimates.percentile import percentile_estimate
@@ -32,12 +35,9 @@ from bayesplate.frequencies.system import system_of
 from bayesplate.modes.naming import find
 from bayesplate.modes.shear import shear_flexible_plate
 from bayesplate.modes.thin import thin_plate
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import MODULI, moduli, rigidities
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.target import Posterior
-from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
 BOARDS = ("finnish-spruce-cantilever", "fiemme-spruce-clamped")

@@ -26,12 +26,12 @@ from typing import Any
 import numpy as np
 
 import bayesplate
-from bayesplate.plate.board import Board
+from bayesplate.board.board import Board
+from bayesplate.board.quantity import Quantity
 from bayesplate.posterior.draws import named_draws
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import pose
 from bayesplate.posterior.sampling import SamplerSettings
-from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
 CARD = "spruce-free-2R"

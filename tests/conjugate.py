@@ -18,15 +18,15 @@ from made_boards import CANTILEVER_LABELS, NARROW, board_of, setup_of
 from scipy import special, stats
 from statistics_checks import QUANTILES, Truth
 
-from bayesplate.cards import StatedPrior, load_prior
-from bayesplate.plate.board import Board
-from bayesplate.plate.setup import Setup
+from bayesplate.board.board import Board
+from bayesplate.board.prior import StatedPrior, load_prior
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import Setup
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.posterior.target import Posterior
-from bayesplate.quantities import Quantity
 
 NOISE = 0.01
 ESS = 2500.0

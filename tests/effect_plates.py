@@ -12,14 +12,15 @@ from generator.effects import TransverseShear as GeneratorShear
 from generator.plate import EDGES, Plate
 from generator.plate import solve as solve_generator
 
+from bayesplate.board.attached import AttachedItem
+from bayesplate.board.parameter import Owner, shown_name
+from bayesplate.board.reading import Reading
+from bayesplate.board.setup import Setup
 from bayesplate.effects import EFFECTS, Effect, declare
 from bayesplate.effects.transverse_shear import TransverseShear
 from bayesplate.frequencies.system import System
 from bayesplate.modes.naming import find
 from bayesplate.modes.solve import Modes, solve
-from bayesplate.plate.measured import Reading
-from bayesplate.plate.parameter import Owner, shown_name
-from bayesplate.plate.setup import AttachedItem, Setup
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.workflow.prepare import prepare
 

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from bayesplate.board.board import Board
+from bayesplate.board.material import RIGIDITIES
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import system_of
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import RIGIDITIES
 
 _STEPS = 8
 

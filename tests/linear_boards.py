@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.campaigns.pulls import Pull
 from bayesplate.campaigns.shared import Shared
 from bayesplate.campaigns.together import Together
-from bayesplate.quantities import Quantity
 
 
 @dataclass(frozen=True)

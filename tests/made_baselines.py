@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from bayesplate.board.board import Board
 from bayesplate.diagnosis.baseline import Baseline, Spectrum, symmetry_of
 from bayesplate.estimates.least_squares import Estimate, log_measured
 from bayesplate.estimates.refit import Predict
-from bayesplate.plate.board import Board
 from bayesplate.posterior.parameters import Parameters
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bayesplate.cards import load_board
+from bayesplate.board.board import Board
 
 EDGES = '{ x0 = "clamped", x1 = "clamped", y0 = "clamped", y1 = "clamped" }'
 HERTZ = {"(0,0)": 57.0, "(0,1)": 100.0, "(1,0)": 130.0, "(1,1)": 162.0, "(0,2)": 170.0, "(1,2)": 224.0}
@@ -12,7 +12,7 @@ HERTZ = {"(0,0)": 57.0, "(0,1)": 100.0, "(1,0)": 130.0, "(1,1)": 162.0, "(0,2)":
 
 def card_text(name: str, factor: float = 1.0) -> str:
     """The card of a board whose frequencies are all higher by a factor."""
-    text = load_board("fiemme-spruce-clamped").text.replace('name = "fiemme-spruce-clamped"', f'name = "{name}"')
+    text = Board.from_toml("fiemme-spruce-clamped").text.replace('name = "fiemme-spruce-clamped"', f'name = "{name}"')
     for label, hertz in HERTZ.items():
         text = text.replace(f'"{label}" = {hertz:.0f}', f'"{label}" = {hertz * factor:.1f}')
     return text

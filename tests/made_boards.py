@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import ritz
 
+from bayesplate.board.board import INPUTS, Board, made_board
+from bayesplate.board.material import RIGIDITIES
+from bayesplate.board.parameter import BOARD
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading import Peak, Reading
+from bayesplate.board.setup import Setup
 from bayesplate.frequencies.model import SetupModel, setup_model
 from bayesplate.frequencies.system import system_of
 from bayesplate.labels import Label
-from bayesplate.plate.board import INPUTS, Board, made_board
-from bayesplate.plate.material import RIGIDITIES
-from bayesplate.plate.measured import Peak, Reading
-from bayesplate.plate.parameter import BOARD
-from bayesplate.plate.setup import Setup
-from bayesplate.quantities import Quantity
 
 NARROW = 1.0001
 """Factor of a noise prior that fixes the noise for all practical purposes: its logarithm has an sd of 1e-4."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ritz
 
 from bayesplate import Board, Quantity, Setup
-from bayesplate.plate.material import isotropic_moduli
+from bayesplate.board.material import isotropic_moduli
 
 STEEL_HZ = {(2, 0): 641, (1, 1): 712, (2, 1): 1577, (3, 0): 1766, (0, 2): 2139}
 """Of a free steel plate in air: J. Sundqvist, Computers & Structures 17 (1983), 793-807, as given in table 1 of L. E.

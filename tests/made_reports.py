@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bayesplate.cards import BoardCard
+from bayesplate.board.board import Board
 from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws
@@ -27,7 +27,7 @@ LOOSE_GATE = Gate(rhat_max=10.0, tau_count_min=1.0, ess_min=1.0)
 class Fit:
     """A fit and its card."""
 
-    card: BoardCard
+    card: Board
     inference: Inference
     draws: Draws
     summary: Summary
@@ -41,7 +41,7 @@ class Fit:
         problem = self.inference.problem
         board = replace(problem.board, title=title, source=source)
         inference = replace(self.inference, problem=replace(problem, board=board))
-        card = self.card.model_copy(update={"title": title, "source": source})
+        card = replace(self.card, title=title, source=source)
         return fit_page(card, inference, self.draws, self.summary, {}, diagnosis)
 
 

@@ -8,6 +8,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from made_boards import setup_of
 
+from bayesplate.board.board import made_board
+from bayesplate.board.parameter import BOARD, Parameter
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading import Reading
+from bayesplate.board.setup import Setup
 from bayesplate.diagnosis.baseline import Baseline, Spectrum
 from bayesplate.diagnosis.forms import Form
 from bayesplate.diagnosis.hypotheses import Hypothesis, Swap
@@ -21,11 +26,6 @@ from bayesplate.diagnosis.verdict import Verdict, decide
 from bayesplate.frequencies.laws import cents
 from bayesplate.labels import Label
 from bayesplate.modes.naming import Place
-from bayesplate.plate.board import made_board
-from bayesplate.plate.measured import Reading
-from bayesplate.plate.parameter import BOARD, Parameter
-from bayesplate.plate.setup import Setup
-from bayesplate.quantities import Quantity
 
 FREE = {"x0": "free", "x1": "free", "y0": "free", "y1": "free"}
 NOISE = 0.005

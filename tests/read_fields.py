@@ -10,17 +10,17 @@ from generator.known_boards import FREE
 from generator.naming import frequencies
 from made_boards import FREE_LABELS, NARROW
 
+from bayesplate.board.board import Board
+from bayesplate.board.material import MODULI, moduli
+from bayesplate.board.quantity import Quantity
 from bayesplate.effects import declare, effects_of
 from bayesplate.estimates.least_squares import log_measured, starting_rigidities
 from bayesplate.estimates.refit import design, refit
 from bayesplate.frequencies.model import setup_model
+from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.frequencies.system import system_of
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import MODULI, moduli
-from bayesplate.plate.readings import reading_sd
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.parameters import Parameters
-from bayesplate.quantities import Quantity
 
 NOISE = 0.002
 RESOLUTION = 1e-4

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayesplate.cards.setup import edge_letters
+from bayesplate.board.board import Board
+from bayesplate.board.setup_keys import edge_letters
 from bayesplate.frequencies.laws import cents
 from bayesplate.labels import Label
-from bayesplate.plate.board import Board
 from bayesplate.results.modes import ModeRow
 from bayesplate.results.summary import Summary
 

@@ -23,14 +23,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.material import MODULI
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.quantity import Quantity
 from bayesplate.errors import Fault, InputError
-from bayesplate.plate.material import MODULI
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Chains, SamplerSettings, sample
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.campaigns.likelihood import moments
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 

@@ -23,11 +23,11 @@ import numpy as np
 from numpy.polynomial.hermite_e import hermegauss
 from numpy.typing import NDArray
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.campaigns.likelihood import Likelihood
 from bayesplate.campaigns.pulls import Pull
 from bayesplate.campaigns.shared import Shared
 from bayesplate.diagnosis.terms import log_sum
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import CampaignCard, SharedSection
+from bayesplate.board.board import Board, Values
+from bayesplate.board.campaign import CampaignCard, SharedSection
+from bayesplate.board.material import MODULI, moduli
+from bayesplate.board.parameter import Parameter
+from bayesplate.board.quantity import Quantity
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.base import Ratio
 from bayesplate.errors import Fault, InputError
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.material import MODULI, moduli
-from bayesplate.plate.parameter import Parameter
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 

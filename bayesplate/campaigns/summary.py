@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayesplate.board.material import MODULI
 from bayesplate.campaigns.agreement import left_out, refusing
 from bayesplate.campaigns.boards import Member
 from bayesplate.campaigns.common import CommonResidual
@@ -15,7 +16,6 @@ from bayesplate.campaigns.population import Population
 from bayesplate.campaigns.scatter import scatters_of
 from bayesplate.campaigns.together import FEWEST_POINTS, values_of
 from bayesplate.effects.words import joined
-from bayesplate.plate.material import MODULI
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.results.contract import Elastic, Spread
 from bayesplate.results.summary import SamplerHealth, Summary

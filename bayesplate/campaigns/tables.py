@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from bayesplate.board.parameter import unit_of_people
 from bayesplate.campaigns.checking import CampaignCheck
 from bayesplate.campaigns.common import CommonResidual
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis, words_of
 from bayesplate.campaigns.summary import CampaignSummary, PopulationSummary, SharedNumber
-from bayesplate.plate.parameter import unit_of_people
 from bayesplate.results.tables import Row, Table, by_constant
 from bayesplate.results.words import GPA, interval, number, percent, plus_minus
 

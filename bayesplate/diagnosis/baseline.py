@@ -19,15 +19,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
+from bayesplate.board.sessions import same_modes, under_prior_scales
 from bayesplate.estimates.least_squares import log_measured, reading_scales
 from bayesplate.estimates.refit import Predict, refit, sensitivities
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.frequencies.predictor import Predictor
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.modes.naming import Place
-from bayesplate.plate.board import Board
-from bayesplate.plate.readings import ReadingErrors
-from bayesplate.plate.sessions import same_modes, under_prior_scales
 from bayesplate.posterior.laplace import every_predictor
 from bayesplate.posterior.posing import PosedProblem
 
@@ -58,7 +58,7 @@ class Spectrum:
     predict : callable
         ln f (Hz) of all of them as a function of x, without an effect.
     discrepancy : (n_every,) array or 0
-        ln f of the board less that of its plate, at the estimate: `bayesplate.plate.sessions`.
+        ln f of the board less that of its plate, at the estimate: `bayesplate.board.sessions`.
     """
 
     log_frequency: Floats

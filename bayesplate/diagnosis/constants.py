@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.material import MODULI, moduli
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.draws import sizes_of
 from bayesplate.diagnosis.search import Found
 from bayesplate.diagnosis.sensitivity import draw_exact, under_exact_law
-from bayesplate.plate.material import MODULI, moduli
 
 Floats = NDArray[np.float64]
 Constants = Mapping[str, Floats]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.diagnosis.claim import Claim
 from bayesplate.diagnosis.constants import draw_constants
 from bayesplate.diagnosis.entries import effect_entry, exchange_entries, p_value_of, ratio_words
@@ -34,7 +35,6 @@ from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import joined
 from bayesplate.estimates.leave_one_out import CarryingMode, indices_of
 from bayesplate.frequencies.laws import cents
-from bayesplate.plate.material import MODULI, RIGIDITIES
 from bayesplate.posterior.draws import Draws
 from bayesplate.results.contract import Spread, finite, rms
 from bayesplate.results.modes import foretold

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from bayesplate.board.board import Board
+from bayesplate.board.parameter import Parameter
 from bayesplate.effects import EFFECTS, declare
 from bayesplate.effects.base import EffectForm
-from bayesplate.plate.board import Board
-from bayesplate.plate.parameter import Parameter
 
 
 @dataclass(frozen=True, eq=False)

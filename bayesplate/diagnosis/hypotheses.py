@@ -10,12 +10,12 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.noise_grid import NoiseGrid, noise_grid, reach_of
 from bayesplate.diagnosis.shifts import JointLaws, Table, nothing, together
 from bayesplate.diagnosis.terms import Terms, log_sum, normalised
 from bayesplate.effects import EFFECTS
-from bayesplate.plate.board import Board
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]

@@ -16,6 +16,10 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board, Values
+from bayesplate.board.material import RIGIDITIES, moduli
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.sessions import same_modes
 from bayesplate.diagnosis.baseline import Baseline, Spectrum, baseline_of, labelled_rows, symmetry_of
 from bayesplate.diagnosis.peaks import likely_labels
 from bayesplate.effects import EFFECTS, Effect
@@ -25,13 +29,9 @@ from bayesplate.estimates.refit import normal_misfit, refit, sensitivities
 from bayesplate.frequencies.model import SetupModel, setup_model
 from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.system import system_of
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.material import RIGIDITIES, moduli
-from bayesplate.plate.sessions import same_modes
 from bayesplate.posterior.laplace import exact_models
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.posing import PosedProblem
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 Models = Sequence[SetupModel]

@@ -8,10 +8,10 @@ from itertools import combinations
 
 import numpy as np
 
+from bayesplate.board.material import MODULI
 from bayesplate.diagnosis.known import KnownFit
 from bayesplate.effects.words import effect_name, effect_names
 from bayesplate.frequencies.laws import cents
-from bayesplate.plate.material import MODULI
 from bayesplate.results.contract import rms
 from bayesplate.results.tables import Row, Table
 from bayesplate.results.words import number

@@ -15,6 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Values
+from bayesplate.board.material import RIGIDITIES
 from bayesplate.diagnosis.baseline import Baseline, symmetry_of
 from bayesplate.diagnosis.forms import Form
 from bayesplate.frequencies.laws import ExactLaw
@@ -23,8 +25,6 @@ from bayesplate.frequencies.system import system_of
 from bayesplate.modes.naming import Place
 from bayesplate.modes.reduced import ReducedClass, ReducedOrderModel
 from bayesplate.modes.terms import Parity, Weights
-from bayesplate.plate.board import Values
-from bayesplate.plate.material import RIGIDITIES
 from bayesplate.posterior.laplace import exact_models
 from bayesplate.posterior.parameters import Parameters
 

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.plate.board import Board
+from bayesplate.board.board import Board
 
 Floats = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from bayesplate.diagnosis.draws import TermDraws, draw_hypothesis
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.search import Ground
 from bayesplate.estimates.labelling import LIKELY
-from bayesplate.plate.readings import ReadingErrors
+from bayesplate.frequencies.reading_errors import ReadingErrors
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]

@@ -18,12 +18,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.draws import TermDraws, draw_terms, joint_sizes_of, sizes_of
 from bayesplate.diagnosis.hypotheses import Hypothesis, probabilities
 from bayesplate.diagnosis.peaks import log_mean, log_of_terms, log_summed
 from bayesplate.diagnosis.search import Found, search
 from bayesplate.diagnosis.shifts import Table
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 

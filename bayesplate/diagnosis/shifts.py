@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.forms import Form, with_forms
 from bayesplate.diagnosis.laws import FormLaw, form_law
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]

@@ -13,16 +13,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
+from bayesplate.board.material import MODULI, moduli
+from bayesplate.board.parameter import Parameter
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.baseline import Baseline, baseline_of
 from bayesplate.effects import EFFECTS, declare, effects_of
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import system_of
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import MODULI, moduli
-from bayesplate.plate.parameter import Parameter
 from bayesplate.posterior.posing import PosedProblem
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 

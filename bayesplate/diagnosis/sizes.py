@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
+from bayesplate.board.parameter import unit_of_people
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.draws import draw_terms, standard_sizes_of
 from bayesplate.diagnosis.forms import with_forms, with_labels_exchanged
 from bayesplate.diagnosis.search import Found
-from bayesplate.plate.board import Board
-from bayesplate.plate.parameter import unit_of_people
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 

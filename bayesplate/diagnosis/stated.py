@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
+from bayesplate.board.sessions import same_modes
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.claim import STANDARD_ERRORS, score_gain
 from bayesplate.diagnosis.known import KnownFit, acting_at_known_size, fit_with, stated_effects
@@ -20,8 +22,6 @@ from bayesplate.diagnosis.noise_grid import noise_grid, reach_of
 from bayesplate.diagnosis.shifts import nothing
 from bayesplate.diagnosis.terms import Terms
 from bayesplate.frequencies.laws import cents
-from bayesplate.plate.board import Board
-from bayesplate.plate.sessions import same_modes
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.results.contract import rms
 

@@ -6,17 +6,25 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from bayesplate.board.parameter import unit_of_people
 from bayesplate.diagnosis.candidates import Amplitude, CandidateEntry
 from bayesplate.diagnosis.known_words import known_table
 from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.diagnosis.told import known_sentences, verdict_sentences, warnings
 from bayesplate.diagnosis.words import CONDITIONS, MERITS, VERDICTS, names_of, worth_showing
 from bayesplate.effects.words import effect_name
-from bayesplate.plate.parameter import unit_of_people
 from bayesplate.results.fit_tables import write_tables
 from bayesplate.results.folder import BEFORE_AFTER, KNOWN_EFFECTS
 from bayesplate.results.tables import Cell, Row, Table, by_constant, constants_table, notebook
-from bayesplate.results.words import GPA, Value, decimals, interval, is_isotropic, number, plus_minus
+from bayesplate.results.words import (
+    GPA,
+    Value,
+    decimals,
+    interval,
+    is_isotropic,
+    number,
+    plus_minus,
+)
 
 _WORTH_A_ROW = 0.01
 _NARROW = ("effect", "shift", "visible", "size (90 %)", "fate")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from bayesplate.board.board import Board
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.candidates import EffectEntry
 from bayesplate.diagnosis.known_words import known_sentence
 from bayesplate.diagnosis.result import Diagnosis
@@ -13,8 +15,6 @@ from bayesplate.diagnosis.words import claim_sentence, meaning
 from bayesplate.effects.words import effect_names, joined
 from bayesplate.estimates.leave_one_out import carrying_sentence
 from bayesplate.labels import Label
-from bayesplate.plate.board import Board
-from bayesplate.quantities import Quantity
 
 
 def carrying_words(diagnosis: Diagnosis) -> str:

@@ -1,6 +1,6 @@
 """What an ideal plate lacks: one protocol (`base.py`), one file per effect, and the library of them here.
 
-The list of effects is that of the words a card may use (`bayesplate.cards.words.EFFECT_NAMES`); the file of an effect
+The list of effects is that of the words a card may use (`bayesplate.board.words.EFFECT_NAMES`); the file of an effect
 bears its name.
 """
 
@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from bayesplate.cards import EFFECT_NAMES
+from bayesplate.board.board import Board
+from bayesplate.board.setup import Setup
+from bayesplate.board.words import EFFECT_NAMES
 from bayesplate.effects.base import Effect
 from bayesplate.errors import Fault
-from bayesplate.plate.board import Board
-from bayesplate.plate.setup import Setup
 
 
 def _effect_of(name: str) -> type[Effect]:

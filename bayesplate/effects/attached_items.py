@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bayesplate.board.attached import AttachedItem
+from bayesplate.board.board import Board, density, vibrating_lengths
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Floats
-from bayesplate.plate.board import Board, density, vibrating_lengths
-from bayesplate.plate.setup import AttachedItem, Setup
-from bayesplate.quantities import Quantity
 
 Fractions = tuple[tuple[float, float], ...]
 """Places as fractions of the vibrating sides."""

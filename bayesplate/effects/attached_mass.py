@@ -10,6 +10,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from bayesplate.board.attached import AttachedItem
+from bayesplate.board.board import Board, Values, density, vibrating_lengths
+from bayesplate.board.parameter import Parameter
+from bayesplate.board.setup import Setup
 from bayesplate.effects.attached_items import (
     Fractions,
     Item,
@@ -25,9 +29,6 @@ from bayesplate.effects.attached_items import (
 )
 from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, Mass, Scope
 from bayesplate.modes.terms import Amount, AtPlaces
-from bayesplate.plate.board import Board, Values, density, vibrating_lengths
-from bayesplate.plate.parameter import Parameter
-from bayesplate.plate.setup import AttachedItem, Setup
 
 HEAVIEST_ROVING = 0.02
 """Share of the board's mass up to which a roving item is computed; see `AttachedMass`."""

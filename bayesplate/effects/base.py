@@ -18,12 +18,12 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board, Values
+from bayesplate.board.parameter import BOARD, Owner, Parameter, shown_name
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import Setup
 from bayesplate.modes.fields import EdgeStrip, Field, Group, Outline
 from bayesplate.modes.terms import Term, Weights
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.parameter import BOARD, Owner, Parameter, shown_name
-from bayesplate.plate.setup import Setup
-from bayesplate.quantities import Quantity
 
 Scope = Literal["board", "setup"]
 Theory = Literal["thin", "shear-flexible"]

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from bayesplate.board.parameter import Parameter
+from bayesplate.board.quantity import Quantity
 from bayesplate.effects.base import Contribution, Release
 from bayesplate.effects.clamps import CompliantClamp
-from bayesplate.plate.parameter import Parameter
-from bayesplate.quantities import Quantity
 
 STIFFEST = 1e-5
 """Compliance that is left where the parameter is 0: such a clamp is ideal to a twentieth of a cent."""

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.effects.base import Variation
 from bayesplate.effects.gradients import GradientAlongX
 from bayesplate.effects.part import growing_along_x
 from bayesplate.modes.fields import Group
-from bayesplate.quantities import Quantity
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bayesplate.board.attached import AttachedItem
+from bayesplate.board.board import Board
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import Ends, Setup
 from bayesplate.effects.attached_items import Fractions, fractions_on
 from bayesplate.effects.base import Floats
-from bayesplate.plate.board import Board
-from bayesplate.plate.setup import AttachedItem, Ends, Setup
-from bayesplate.quantities import Quantity
 
 _MASS = Quantity.from_median(50e-3, 1.6), "log-normal: voice-coil exciters weigh 20-120 g"
 _COIL = Quantity.from_median(1.6e-3, 1.3), "log-normal: the coils of exciters of 25 mm weigh 1.5-1.8 g"

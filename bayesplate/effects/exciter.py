@@ -9,6 +9,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from bayesplate.board.board import Board, Values, density, vibrating_lengths
+from bayesplate.board.parameter import Parameter
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import Ends, Setup
 from bayesplate.effects.attached_items import fractions_on, places_on
 from bayesplate.effects.base import Contribution, Effect, Floats, Mass, Scope, Stiffness
 from bayesplate.effects.drives import (
@@ -22,10 +26,6 @@ from bayesplate.effects.drives import (
     with_known_coil,
 )
 from bayesplate.modes.terms import Amount, AtPlaces
-from bayesplate.plate.board import Board, Values, density, vibrating_lengths
-from bayesplate.plate.parameter import Parameter
-from bayesplate.plate.setup import Ends, Setup
-from bayesplate.quantities import Quantity
 
 _ANYWHERE = "nearly uniform over the board, mirror places once"
 _LEAST_MAGNET = 0.05

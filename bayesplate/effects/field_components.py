@@ -14,15 +14,15 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
+from bayesplate.board.parameter import Parameter
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.random_field import ConditionedField, Degrees, Surface, legendre
+from bayesplate.board.setup import Ends
 from bayesplate.effects.base import Effect
 from bayesplate.effects.field_looks import look
 from bayesplate.effects.part import Part, vibrating_part
 from bayesplate.modes.beams import beam_functions
-from bayesplate.plate.board import Board
-from bayesplate.plate.parameter import Parameter
-from bayesplate.plate.random_field import ConditionedField, Degrees, Surface, legendre
-from bayesplate.plate.setup import Ends
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bayesplate.plate.random_field import Surface
+from bayesplate.board.random_field import Surface
 
 _TOLD = 0.2
 """Share of a surface's mean square from which on one of its polynomials is told."""

@@ -8,14 +8,14 @@ from typing import ClassVar
 
 import numpy as np
 
+from bayesplate.board.board import Board, Values, density, vibrating_lengths
+from bayesplate.board.parameter import Parameter
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Contribution, Effect, Floats, Mass, Scope
 from bayesplate.modes.air import air_mass
 from bayesplate.modes.fields import Outline
 from bayesplate.modes.terms import OnDeflections
-from bayesplate.plate.board import Board, Values, density, vibrating_lengths
-from bayesplate.plate.parameter import Parameter
-from bayesplate.plate.setup import Setup
-from bayesplate.quantities import Quantity
 
 DEFAULT_DENSITY = Quantity.exact(1.2)
 UNKNOWN_BAFFLE = Quantity.from_mean(0.5, 1.0, "normal", lower=0.0, upper=1.0)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
+from bayesplate.board.board import Board
+from bayesplate.board.parameter import Parameter
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Effect, Scope
 from bayesplate.effects.part import WHOLE, Part, vibrating_part
-from bayesplate.plate.board import Board
-from bayesplate.plate.parameter import Parameter
-from bayesplate.plate.setup import Setup
-from bayesplate.quantities import Quantity
 
 
 @dataclass(frozen=True)

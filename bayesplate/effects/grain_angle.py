@@ -7,14 +7,14 @@ from typing import ClassVar
 
 import numpy as np
 
+from bayesplate.board.board import Board, Values, vibrating_lengths
+from bayesplate.board.parameter import Parameter
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import Setup
 from bayesplate.effects.attached_mass import AttachedMass
 from bayesplate.effects.base import Effect, Scope
 from bayesplate.modes.terms import Weights
 from bayesplate.modes.thin import THIN_TERMS
-from bayesplate.plate.board import Board, Values, vibrating_lengths
-from bayesplate.plate.parameter import Parameter
-from bayesplate.plate.setup import Setup
-from bayesplate.quantities import Quantity
 
 DEGREE = np.pi / 180.0
 DEFAULT_ANGLE = Quantity.from_mean(0.0, 3.0 * DEGREE, "normal", lower=0.0, upper=6.0 * DEGREE)

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import ClassVar, Literal, get_args
 
+from bayesplate.board.board import Board, Values, density, vibrating_lengths
+from bayesplate.board.parameter import Parameter
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import Ends, Setup
 from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, Scope, Stiffness
 from bayesplate.modes.fields import Outline
 from bayesplate.modes.terms import OverPlate
-from bayesplate.plate.board import Board, Values, density, vibrating_lengths
-from bayesplate.plate.parameter import Parameter
-from bayesplate.plate.setup import Ends, Setup
-from bayesplate.quantities import Quantity
 
 Axis = Literal["both", "x", "y"]
 

@@ -9,14 +9,14 @@ from typing import ClassVar
 
 import numpy as np
 
+from bayesplate.board.board import Board, Values, density
+from bayesplate.board.parameter import BOARD, Parameter
+from bayesplate.board.random_field import conditioned, width_readings
+from bayesplate.board.setup import Ends, Setup
 from bayesplate.effects.base import Effect, Floats, Scope, Variation
 from bayesplate.effects.field_components import FieldProfile, field_parameters, field_profile, held_in
 from bayesplate.effects.part import WHOLE, Part, vibrating_part
 from bayesplate.modes.fields import EdgeStrip, Group, Outline
-from bayesplate.plate.board import Board, Values, density
-from bayesplate.plate.parameter import BOARD, Parameter
-from bayesplate.plate.random_field import conditioned, width_readings
-from bayesplate.plate.setup import Ends, Setup
 
 _SOURCE = "normal: what the readings leave open of a smooth width, in standard deviations"
 _GROUPS: tuple[Group, ...] = ("bending", "shear", "mass", "rotary")

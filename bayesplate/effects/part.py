@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board, Values
+from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Variation
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.setup import Setup
 
 Floats = NDArray[np.float64]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+from bayesplate.board.board import Board
+from bayesplate.board.parameter import Parameter
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Effect, Scope
-from bayesplate.plate.board import Board
-from bayesplate.plate.parameter import Parameter
-from bayesplate.plate.setup import Setup
-from bayesplate.quantities import Quantity
 
 FREE_POISSON = Quantity.from_mean(0.4, 0.15, "normal", lower=0.0, upper=0.9)
 FREE_ISOTROPIC = Quantity.from_mean(0.3, 0.1, "normal", lower=0.0, upper=0.5)

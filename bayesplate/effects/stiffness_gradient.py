@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+from bayesplate.board.board import Board
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Variation
 from bayesplate.effects.gradients import GradientAlongX
 from bayesplate.effects.part import growing_along_x
 from bayesplate.modes.fields import Group
-from bayesplate.plate.board import Board
-from bayesplate.plate.setup import Setup
-from bayesplate.quantities import Quantity
 
 
 @dataclass(frozen=True)

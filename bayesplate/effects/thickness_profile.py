@@ -11,15 +11,15 @@ from typing import ClassVar
 
 import numpy as np
 
+from bayesplate.board.board import Board, Values
+from bayesplate.board.parameter import BOARD, Parameter
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.random_field import conditioned, thickness_readings
+from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Effect, Floats, Scope, Variation
 from bayesplate.effects.field_components import FieldProfile, coordinates, field_parameters, field_profile, held_in
 from bayesplate.effects.part import WHOLE, Part, vibrating_part
 from bayesplate.modes.fields import Field, Group
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.parameter import BOARD, Parameter
-from bayesplate.plate.random_field import conditioned, thickness_readings
-from bayesplate.plate.setup import Setup
-from bayesplate.quantities import Quantity
 
 DEFAULT_TAPER = Quantity.from_mean(0.0, 0.05, "normal")
 _SOURCE = "normal: hand-planed and belt-sanded boards of 3-5 mm differ by 0.1-0.2 mm from end to end, either way"

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+from bayesplate.board.board import Board, Values
+from bayesplate.board.parameter import Parameter
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Effect, Ratio, Scope, Theory
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.parameter import Parameter
-from bayesplate.plate.setup import Setup
-from bayesplate.quantities import Quantity
 
 _SOURCE = "spruce, log-normal around published values of G_xz 0.5-0.75 GPa and G_yz 20-40 MPa, widened for other woods"
 _RIGID = 1e13

@@ -9,14 +9,14 @@ from typing import ClassVar
 
 import numpy as np
 
+from bayesplate.board.board import Board, Values, density, vibrating_lengths
+from bayesplate.board.parameter import BOARD, Parameter
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, Scope, Stiffness
 from bayesplate.modes.fields import Field
 from bayesplate.modes.membrane import MODULI, Curvature, curvature_pairs, membrane_terms
 from bayesplate.modes.terms import OnDeflections, Term
-from bayesplate.plate.board import Board, Values, density, vibrating_lengths
-from bayesplate.plate.parameter import BOARD, Parameter
-from bayesplate.plate.setup import Setup
-from bayesplate.quantities import Quantity
 
 RISES: tuple[Curvature, ...] = ("cup", "bow", "twist")
 """The rises that a maker reads: across the width, along the length, of the fourth corner."""

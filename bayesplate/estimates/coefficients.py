@@ -9,8 +9,11 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import CoefficientCard
-from bayesplate.cards.words import setup_places
+from bayesplate.board.board import Board, Values, vibrating_lengths
+from bayesplate.board.coefficients import CoefficientCard
+from bayesplate.board.material import RIGIDITIES, moduli
+from bayesplate.board.setup import Setup
+from bayesplate.board.words import setup_places
 from bayesplate.effects.words import effect_names
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.frequencies.columns import columns
@@ -20,9 +23,6 @@ from bayesplate.labels import Label
 from bayesplate.modes.beams import Beams
 from bayesplate.modes.naming import find
 from bayesplate.modes.training import FACTORS, Theory, TrainingConstants, train, training_matrices, training_weights
-from bayesplate.plate.board import Board, Values, vibrating_lengths
-from bayesplate.plate.material import RIGIDITIES, moduli
-from bayesplate.plate.setup import Setup
 
 CoefficientSource = Literal["sensitivity", "training", "published"]
 SAME_ASPECT = 0.01

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
+from bayesplate.board.material import ORTHOTROPIC, Symmetry
 from bayesplate.effects.words import joined
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.leave_one_out import HIGH_LEVERAGE
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import ORTHOTROPIC, Symmetry
 
 WITHIN_A_FACTOR = 2.0
 """A constant is identifiable if its 95 % interval at the expected noise stays within this factor of the estimate."""

@@ -12,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.reading import Peak, Reading
+from bayesplate.board.setup import Setup
 from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.labels import Label
-from bayesplate.plate.measured import Peak, Reading
-from bayesplate.plate.setup import Setup
 
 LIKELY = 0.5
 """Probability above which a label is proposed: no two peaks can each be the same mode with more."""

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board, Values
+from bayesplate.board.material import RIGIDITIES
+from bayesplate.board.setup import Setup
 from bayesplate.frequencies.model import SetupModel, setup_model
+from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.frequencies.system import system_of
 from bayesplate.frequencies.terms import rayleigh_coefficients, rigidity_columns
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.material import RIGIDITIES
-from bayesplate.plate.readings import reading_sd
-from bayesplate.plate.setup import Setup
 
 MOST_STEPS = 40
 _LONGEST_STEP = 0.7

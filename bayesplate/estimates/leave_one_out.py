@@ -14,6 +14,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import effect_name, joined
 from bayesplate.estimates.refit import (
@@ -25,7 +26,6 @@ from bayesplate.estimates.refit import (
     n_constants,
     sensitivities,
 )
-from bayesplate.plate.board import Board
 
 HIGH_LEVERAGE = 0.9
 """Share of a mode in its own prediction above which it alone carries a constant or a size."""

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board, Values
+from bayesplate.board.material import Moduli, moduli
 from bayesplate.estimates.coefficients import CoefficientRows, CoefficientSource, coefficient_rows
 from bayesplate.estimates.least_squares import Estimate
 from bayesplate.frequencies.columns import inverse_lambda
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.material import Moduli, moduli
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,8 +15,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.material import MODULI
 from bayesplate.estimates.paper import PaperSystem
-from bayesplate.plate.material import MODULI
 
 LOW, HIGH = 20.0, 80.0
 MOST_MODES = 16

@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.board import Board, density
+from bayesplate.board.material import RIGIDITIES
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.reading import NO_OFFSET, Reading
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.estimates.least_squares import log_measured, starting_rigidities
 from bayesplate.frequencies.prior_bands import prior_draws, with_rigidities
 from bayesplate.frequencies.terms import rayleigh_coefficients, term_weights
 from bayesplate.labels import Label
 from bayesplate.modes.beams import N_BEAMS
-from bayesplate.plate.board import Board, density
-from bayesplate.plate.material import RIGIDITIES
-from bayesplate.plate.measured import NO_OFFSET, Reading
 
 Floats = NDArray[np.float64]
 

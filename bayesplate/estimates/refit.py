@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.material import RIGIDITIES
 from bayesplate.frequencies.predictor import Predictor
-from bayesplate.plate.material import RIGIDITIES
-from bayesplate.plate.readings import ReadingErrors
+from bayesplate.frequencies.reading_errors import ReadingErrors
 
 Floats = NDArray[np.float64]
 Predict = Callable[[Floats], Floats]

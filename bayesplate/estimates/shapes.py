@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Values
 from bayesplate.estimates.sheet import points, sampled
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.modes.solve import collect, solve_classes
 from bayesplate.modes.terms import Parity
-from bayesplate.plate.board import Values
 
 N_POINTS = 61
 """Along each side: half a sheet's, for panels of half its size."""

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board, Values, vibrating_lengths
+from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.estimates.combined import COMBINED, combination, combined_shapes, corner_signs
 from bayesplate.frequencies.columns import columns
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.spectrum import NamedMode, spectrum
 from bayesplate.frequencies.system import Limits, System
 from bayesplate.modes.solve import Modes
-from bayesplate.plate.board import Board, Values, vibrating_lengths
-from bayesplate.plate.material import MODULI, RIGIDITIES
 
 NUMBERS_OF_MODES = (12, 16, 20)
 """The first that holds every measured label; beyond the last the highest are not shown."""

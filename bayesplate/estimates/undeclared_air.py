@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
+from bayesplate.board.material import MODULI, moduli
 from bayesplate.effects import effects_of
 from bayesplate.effects.fluid_loading import BAFFLES, DEFAULT_DENSITY, FluidLoading
 from bayesplate.estimates.least_squares import Estimate
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import System
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import MODULI, moduli
 
 SMALLEST = 0.005
 """Relative rise of a constant below which nothing is said."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import PriorCard
-from bayesplate.plate.board import Board, density
-from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
+from bayesplate.board.board import Board, density
+from bayesplate.board.material import MODULI, RIGIDITIES, moduli
+from bayesplate.board.prior import PriorCard
 
 Floats = NDArray[np.float64]
 

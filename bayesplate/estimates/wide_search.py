@@ -22,7 +22,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.board import Board, Values
+from bayesplate.board.material import RIGIDITIES, moduli
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.reading import Peak
+from bayesplate.board.setup import DEFAULT_NOISE, Setup
 from bayesplate.frequencies.laws import log_frequency
 from bayesplate.frequencies.model import OtherMode, SetupModel, setup_model
 from bayesplate.frequencies.peaks import PeakLikelihood
@@ -32,10 +36,6 @@ from bayesplate.modes.naming import Place
 from bayesplate.modes.reduced import ReducedOrderModel
 from bayesplate.modes.reduction import reduced_order_model
 from bayesplate.modes.terms import Parity
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.material import RIGIDITIES, moduli
-from bayesplate.plate.measured import Peak
-from bayesplate.plate.setup import DEFAULT_NOISE, Setup
 
 if TYPE_CHECKING:
     from scipy.interpolate import RegularGridInterpolator

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Values, density, vibrating_lengths
+from bayesplate.board.material import RIGIDITIES
+from bayesplate.board.setup import Setup
 from bayesplate.frequencies.system import System
-from bayesplate.plate.board import Values, density, vibrating_lengths
-from bayesplate.plate.material import RIGIDITIES
-from bayesplate.plate.setup import Setup
 
 
 class Columns(NamedTuple):

@@ -10,14 +10,14 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Values
+from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Effect, Theory, Variation
 from bayesplate.frequencies.terms import along_grain
 from bayesplate.modes.fields import EdgeStrip, Fabric, Field, Group, layout
 from bayesplate.modes.shear import SHEAR_FLEXIBLE
 from bayesplate.modes.terms import Weights
 from bayesplate.modes.thin import THIN
-from bayesplate.plate.board import Values
-from bayesplate.plate.setup import Setup
 
 Floats = NDArray[np.float64]
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from bayesplate.board.board import Board
+from bayesplate.board.reading import NO_OFFSET
+from bayesplate.board.setup import Ends, Setup
 from bayesplate.errors import Fault
 from bayesplate.labels import HIGHEST_ORDER, Label
 from bayesplate.modes.beams import is_rigid
-from bayesplate.plate.board import Board
-from bayesplate.plate.measured import NO_OFFSET
-from bayesplate.plate.setup import Ends, Setup
 
 
 def label_faults(board: Board) -> list[Fault]:

@@ -9,6 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Values
+from bayesplate.board.sessions import discrepancy_names
+from bayesplate.board.setup import Setup
 from bayesplate.frequencies.laws import ExactLaw, Law, LawName, LinearLaw, log_frequency, mean_log_frequency
 from bayesplate.frequencies.residues import residues_of
 from bayesplate.frequencies.system import System
@@ -19,9 +22,6 @@ from bayesplate.modes.plate import Plate
 from bayesplate.modes.reduction import reduced_order_model
 from bayesplate.modes.solve import Modes, solve_classes, solve_up_to
 from bayesplate.modes.terms import Parity
-from bayesplate.plate.board import Values
-from bayesplate.plate.sessions import discrepancy_names
-from bayesplate.plate.setup import Setup
 
 _ABOVE = 1.15
 """Frequency up to which modes are looked for, over the highest peak: what lies higher will not come down to it."""

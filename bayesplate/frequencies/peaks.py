@@ -9,12 +9,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.setup import Setup
 from bayesplate.frequencies.assignment import LOG_NOTHING, Assignments, Near
 from bayesplate.frequencies.model import SetupModel, every_label
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.frequencies.residues import share_seen, sign_probabilities
 from bayesplate.labels import Label
-from bayesplate.plate.readings import ReadingErrors
-from bayesplate.plate.setup import Setup
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Values
 from bayesplate.frequencies.laws import LawName
 from bayesplate.frequencies.model import SetupModel, log_frequencies_of_board
-from bayesplate.plate.board import Values
 
 Floats = NDArray[np.float64]
 

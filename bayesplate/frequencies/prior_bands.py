@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.board import Board, Values
+from bayesplate.board.material import MODULI, RIGIDITIES, isotropic_moduli, rigidities
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.setup import Setup
 from bayesplate.frequencies.terms import rayleigh_coefficients, term_weights
 from bayesplate.labels import Label
 from bayesplate.modes.beams import N_BEAMS
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.material import MODULI, RIGIDITIES, isotropic_moduli, rigidities
-from bayesplate.plate.setup import Setup
 
 WITHIN = (1 / 6, 5 / 6)
 """Two times in three."""

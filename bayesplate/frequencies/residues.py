@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Values, vibrating_lengths
+from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Effect
 from bayesplate.modes.solve import Modes
-from bayesplate.plate.board import Values, vibrating_lengths
-from bayesplate.plate.setup import Setup
 
 NODAL_LINE = 0.05
 """Residue over the largest that a shape could give, below which a place counts as lying on a nodal line.

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayesplate.board.board import Values
+from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Effect
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.frequencies.residues import NODAL_LINE, residues_of
@@ -15,8 +17,6 @@ from bayesplate.labels import Label
 from bayesplate.modes.naming import CERTAIN, name_modes
 from bayesplate.modes.plate import Plate
 from bayesplate.modes.solve import Modes, solve
-from bayesplate.plate.board import Values
-from bayesplate.plate.setup import Setup
 
 _FEWEST_MODES = 12
 

@@ -9,6 +9,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board, Values
+from bayesplate.board.setup import Ends, Setup
 from bayesplate.effects import effects_of
 from bayesplate.effects.base import Contribution, Effect, Mass, Stiffness, Theory
 from bayesplate.frequencies.fabric import fabric_of, in_plane, over_fields
@@ -19,8 +21,6 @@ from bayesplate.modes.plate import Plate, plate_of
 from bayesplate.modes.shear import SHEAR_ELEMENTS_PER_SIDE, SHEAR_FLEXIBLE
 from bayesplate.modes.terms import Weights
 from bayesplate.modes.thin import THIN
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.setup import Ends, Setup
 
 Limits = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Where a plate begins and ends along y at some points of its length, (n,) arrays, as fractions of its widest width."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Values, density, vibrating_lengths
+from bayesplate.board.setup import Setup
 from bayesplate.modes.beams import product_coefficients
 from bayesplate.modes.shear import SHEAR_CORRECTION
 from bayesplate.modes.terms import Weights
-from bayesplate.plate.board import Values, density, vibrating_lengths
-from bayesplate.plate.setup import Setup
 
 
 def term_weights(values: Values, setup: Setup) -> Weights:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from bayesplate.plate.material import MODULI, RIGIDITIES
+from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.results.contract import JOINT, Joint, Spread, as_json
 from bayesplate.results.summary import Summary
 

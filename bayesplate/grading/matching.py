@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.material import MODULI
 from bayesplate.grading.boards import BoardRow
 from bayesplate.grading.figures import FIGURES, LogFigure, box_probability, covariance_along, target_thickness, triangle
-from bayesplate.plate.material import MODULI
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.signedinteger]

@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
+from bayesplate.board.material import MODULI
 from bayesplate.files import whole_file, writing
 from bayesplate.grading.figures import FIGURES, LogFigure, limit_told
 from bayesplate.grading.matching import Grading
 from bayesplate.grading.storage import write_rows
-from bayesplate.plate.material import MODULI
 from bayesplate.results.tables import Cell, Row, Table
 from bayesplate.results.words import Value, percent
 

@@ -8,8 +8,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.setup import Ends
 from bayesplate.modes.line import Line, line, rigid_degrees
-from bayesplate.plate.setup import Ends
 
 Floats = NDArray[np.float64]
 Beams = tuple[int, int]

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.plate.setup import Ends
+from bayesplate.board.setup import Ends
 
 Floats = NDArray[np.float64]
 

@@ -21,9 +21,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.setup import Ends
 from bayesplate.modes.fields import Field
 from bayesplate.modes.terms import Deflections
-from bayesplate.plate.setup import Ends
 
 Floats = NDArray[np.float64]
 Curvature = Literal["bow", "cup", "twist"]

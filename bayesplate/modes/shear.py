@@ -18,12 +18,12 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+from bayesplate.board.setup import Ends
 from bayesplate.modes.fields import Group
 from bayesplate.modes.line import line
 from bayesplate.modes.plate import Plate, plate_of
 from bayesplate.modes.terms import Derivative, Kinematics
 from bayesplate.modes.thin import THIN, THIN_TERMS, thin_groups
-from bayesplate.plate.setup import Ends
 
 SHEAR_TERMS = (*THIN_TERMS, "shear_x", "shear_y")
 SHEAR_MASSES = ("board", "rotary_x", "rotary_y")

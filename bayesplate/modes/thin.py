@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+from bayesplate.board.setup import Ends
 from bayesplate.modes.fields import Group
 from bayesplate.modes.line import line
 from bayesplate.modes.plate import Plate, plate_of
 from bayesplate.modes.terms import Derivative, Kinematics
-from bayesplate.plate.setup import Ends
 
 THIN_TERMS = ("xx", "yy", "mix", "xy")
 

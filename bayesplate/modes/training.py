@@ -14,6 +14,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.material import rigidities
+from bayesplate.board.setup import Ends
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.modes.beams import Beams
 from bayesplate.modes.naming import find
@@ -22,8 +24,6 @@ from bayesplate.modes.shear import SHEAR_CORRECTION, SHEAR_ELEMENTS_PER_SIDE, sh
 from bayesplate.modes.solve import Modes, solve
 from bayesplate.modes.terms import Weights
 from bayesplate.modes.thin import thin_plate
-from bayesplate.plate.material import rigidities
-from bayesplate.plate.setup import Ends
 
 Theory = Literal["thin", "shear-flexible"]
 

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.board import Board, Values
+from bayesplate.board.material import MODULI, RIGIDITIES, moduli
+from bayesplate.board.parameter import Parameter
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.quantity import Quantity
 from bayesplate.planning.laws import BareLaw, bare_law
 from bayesplate.planning.stations import new_stations, old_stations
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
-from bayesplate.plate.parameter import Parameter
 from bayesplate.posterior.parameters import Parameters
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
 from bayesplate.effects import Effect
 from bayesplate.effects.attached_items import fractions_on, places_on
 from bayesplate.estimates.sheet import NUMBERS_OF_MODES, Sheet, points, sheet
@@ -19,7 +20,6 @@ from bayesplate.planning.places import Placing, placing
 from bayesplate.planning.plan import BenchEntry, ModeToFind
 from bayesplate.planning.proposals import Proposal
 from bayesplate.planning.stations import SEARCHED, Station
-from bayesplate.plate.board import Board
 
 Floats = NDArray[np.float64]
 

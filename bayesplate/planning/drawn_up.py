@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict
 
+from bayesplate.board.prior import PriorCard
 from bayesplate.campaigns.shared import Shared
-from bayesplate.cards import PriorCard
 from bayesplate.planning.beliefs import Beliefs
 from bayesplate.planning.bench import Bench, benches
 from bayesplate.planning.plan import FORMAT, ExplanationEntry, Plan

@@ -17,7 +17,7 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.prior import PriorCard
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.forms import with_forms
 from bayesplate.diagnosis.readings import wrong_reading

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.material import MODULI
 from bayesplate.diagnosis.terms import log_sum, normalised
 from bayesplate.planning.beliefs import Beliefs, Explanation, entropy
 from bayesplate.planning.plan import Gain
-from bayesplate.plate.material import MODULI
 
 Floats = NDArray[np.float64]
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board, Values, density, vibrating_lengths
+from bayesplate.board.sessions import under_prior_scales
 from bayesplate.effects.attached_items import board_mass
 from bayesplate.errors import BayesplateError
 from bayesplate.estimates.refit import sensitivities
@@ -16,8 +18,6 @@ from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.modes.solve import Modes
 from bayesplate.planning.stations import SEARCHED, Station
-from bayesplate.plate.board import Board, Values, density, vibrating_lengths
-from bayesplate.plate.sessions import under_prior_scales
 from bayesplate.posterior.parameters import Parameters
 
 Floats = NDArray[np.float64]

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.sessions import shared_share, unknown_discrepancies
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.planning.beliefs import Beliefs, Explanation, KnownBoard, levels
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.laws import BareLaw
 from bayesplate.planning.shifts import add_effects
 from bayesplate.planning.stations import Station
-from bayesplate.plate.readings import ReadingErrors
-from bayesplate.plate.sessions import shared_share, unknown_discrepancies
 
 Floats = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 
+from bayesplate.board.prior import PriorCard
 from bayesplate.campaigns.shared import Shared
-from bayesplate.cards import PriorCard
 from bayesplate.planning.beliefs import Beliefs, KnownBoard
 from bayesplate.planning.gains import N_DRAWS, Readings, expected_gain, together
 from bayesplate.planning.laws import known_mass

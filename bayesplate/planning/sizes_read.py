@@ -14,11 +14,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
+from bayesplate.board.parameter import Parameter
+from bayesplate.board.random_field import conditioned, sd_after, thickness_readings, width_readings
 from bayesplate.planning.beliefs import Beliefs, KnownBoard
 from bayesplate.planning.gains import Readings
-from bayesplate.plate.board import Board
-from bayesplate.plate.parameter import Parameter
-from bayesplate.plate.random_field import conditioned, sd_after, thickness_readings, width_readings
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.board import Board, Values
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading import Reading
+from bayesplate.board.setup import Ends, Setup, assumed_noise
 from bayesplate.effects import effects_of
 from bayesplate.effects.attached_items import places_on
 from bayesplate.effects.base import Effect
@@ -16,10 +20,6 @@ from bayesplate.frequencies.residues import NODAL_LINE, deflections
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.measured import Reading
-from bayesplate.plate.setup import Ends, Setup, assumed_noise
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from bayesplate.board.material import MODULI
 from bayesplate.planning.plan import Gain, Plan
 from bayesplate.planning.words import shared_words
-from bayesplate.plate.material import MODULI
 from bayesplate.results.tables import Table
 from bayesplate.results.words import MISSING
 

@@ -9,19 +9,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.attached import AttachedItem
+from bayesplate.board.board import Board, Values
+from bayesplate.board.material import MODULI, RIGIDITIES
+from bayesplate.board.prior import PriorCard
 from bayesplate.campaigns.given import GivenShared
 from bayesplate.campaigns.scatter import expected_width
 from bayesplate.campaigns.shared import Shared
-from bayesplate.cards import PriorCard
 from bayesplate.estimates.least_squares import weighted_least_squares
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.planning.beliefs import NOTHING_LACKS, Beliefs, Explanation, KnownBoard, laws_of, log_moduli
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.laws import BareLaw, bare_law
 from bayesplate.planning.stations import new_stations
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.material import MODULI, RIGIDITIES
-from bayesplate.plate.readings import ReadingErrors
-from bayesplate.plate.setup import AttachedItem
 from bayesplate.posterior.laplace import noise_widenings
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.target import Posterior

@@ -7,7 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.board import Board, Values
+from bayesplate.board.material import MODULI, RIGIDITIES
+from bayesplate.board.prior import PriorCard
 from bayesplate.frequencies.prior_bands import prior_medians, with_rigidities
 from bayesplate.planning.beliefs import (
     N_TERMS,
@@ -19,8 +21,6 @@ from bayesplate.planning.beliefs import (
     levels,
     log_moduli,
 )
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.material import MODULI, RIGIDITIES
 from bayesplate.posterior.parameters import Parameters
 
 Floats = NDArray[np.float64]

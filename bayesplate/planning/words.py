@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from bayesplate.board.material import MODULI
 from bayesplate.effects.words import joined
 from bayesplate.planning.gains import CONSTANTS, EXPLANATIONS
 from bayesplate.planning.plan import ExplanationEntry, Gain, ProposalEntry
-from bayesplate.plate.material import MODULI
 
 WORTH = 0.05
 """A gain below this, nats, is no reason to measure: an interval would shrink by less than a twentieth."""

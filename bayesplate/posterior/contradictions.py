@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.material import MODULI, moduli
 from bayesplate.errors import NotIdentifiableError
-from bayesplate.plate.material import MODULI, moduli
 from bayesplate.posterior.target import Posterior
 
 Floats = NDArray[np.float64]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.plate.board import density
-from bayesplate.plate.material import MODULI, RIGIDITIES, Derived, derived_quantities, moduli
+from bayesplate.board.board import density
+from bayesplate.board.material import MODULI, RIGIDITIES, Derived, derived_quantities, moduli
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.streams import stream

@@ -14,7 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.board import Board
+from bayesplate.board.material import MODULI, RIGIDITIES, Moduli, moduli
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.setup import Setup
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.identifiability import identifiability
 from bayesplate.estimates.labelling import LIKELY, with_labels
@@ -24,9 +27,6 @@ from bayesplate.estimates.wide_search import Guess, search_widely
 from bayesplate.frequencies.model import setup_model, with_others
 from bayesplate.frequencies.peaks import PeakLikelihood, takes_part
 from bayesplate.frequencies.system import system_of
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import MODULI, RIGIDITIES, Moduli, moduli
-from bayesplate.plate.setup import Setup
 from bayesplate.posterior.target import Posterior
 
 _N_DRAWS = 64

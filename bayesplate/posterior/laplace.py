@@ -10,6 +10,8 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board, Values
+from bayesplate.board.material import RIGIDITIES
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.least_squares import Estimate, log_measured
 from bayesplate.estimates.refit import design, most_likely, normal_misfit
@@ -17,9 +19,7 @@ from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.model import SetupModel, setup_model, with_exact, with_others
 from bayesplate.frequencies.peaks import takes_part
 from bayesplate.frequencies.predictor import Predictor
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.material import RIGIDITIES
-from bayesplate.plate.readings import reading_sd
+from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.robust import highest_student, student_weights
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Values
+from bayesplate.board.material import MODULI, RIGIDITIES, moduli, rigidities
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.paper import PaperSystem
 from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.frequencies.full import full_log_frequencies
-from bayesplate.plate.board import Values
-from bayesplate.plate.material import MODULI, RIGIDITIES, moduli, rigidities
 from bayesplate.posterior.draws import Draws, posterior_mean_values
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.reweighting import weighted_mean

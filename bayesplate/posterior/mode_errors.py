@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.sessions import same_modes
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.leave_one_out import CarryingMode, Errors, carrying_modes, prediction_errors
 from bayesplate.estimates.refit import deviance_misfit
-from bayesplate.plate.readings import reading_sd
-from bayesplate.plate.sessions import same_modes
+from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.laplace import predictor

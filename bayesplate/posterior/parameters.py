@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board, Values
+from bayesplate.board.parameter import Parameter
 from bayesplate.estimates.refit import Bounds
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.parameter import Parameter
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class Parameters:
     """Names, order and meaning of the columns that are sampled.
 
     Columns: ln D_x, ln D_y, ln D_s (N m), of an isotropic board ln D alone; ln of the relative noise, one per setup;
-    the standard coordinate z of each uncertain parameter of the board (`bayesplate.quantities`).
+    the standard coordinate z of each uncertain parameter of the board (`bayesplate.board.quantity`).
 
     Attributes
     ----------

@@ -8,7 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.board import Board
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.sessions import with_discrepancies
 from bayesplate.errors import InputError, NotIdentifiableError
 from bayesplate.estimates.coefficients import coefficient_faults
 from bayesplate.estimates.identifiability import (
@@ -20,8 +22,6 @@ from bayesplate.estimates.identifiability import (
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.unusual import unusual
 from bayesplate.frequencies.laws import LawName
-from bayesplate.plate.board import Board
-from bayesplate.plate.sessions import with_discrepancies
 from bayesplate.posterior.contradictions import require_possible_noise, require_reachable
 from bayesplate.posterior.first_labels import Proposed, propose_labels
 from bayesplate.posterior.laplace import LaplaceApproximation, laplace_approximation, linearisation_errors

@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
 from bayesplate.estimates.least_squares import Estimate
-from bayesplate.plate.board import Board
-from bayesplate.plate.densities import STUDENT
-from bayesplate.plate.readings import reading_sd
+from bayesplate.frequencies.densities import STUDENT
+from bayesplate.frequencies.reading_errors import reading_sd
 
 Floats = NDArray[np.float64]
 

@@ -20,14 +20,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.estimates.refit import most_likely, normal_misfit, sensitivities
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.predictor import Predictor
+from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.frequencies.system import system_of
-from bayesplate.plate.board import Board
-from bayesplate.plate.readings import reading_sd
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.target import Posterior
 

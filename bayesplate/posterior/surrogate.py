@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.plate.board import Values
+from bayesplate.board.board import Values
 from bayesplate.posterior.ensembles import pilot
 from bayesplate.posterior.mixture import Mixture
 from bayesplate.posterior.starts import cholesky_factor

@@ -8,15 +8,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.board import Board, Values
+from bayesplate.board.material import MODULI, RIGIDITIES, isotropic_moduli, moduli, rigidities
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.quantity import Quantity
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.model import SetupModel, log_frequencies_of_board
 from bayesplate.frequencies.peaks import PeakLikelihood
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.material import MODULI, RIGIDITIES, isotropic_moduli, moduli, rigidities
-from bayesplate.plate.readings import ReadingErrors
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.posterior.parameters import Parameters
-from bayesplate.quantities import Quantity
 
 LINEAR_SHARE = 0.25
 """The linear law serves while its error over the posterior stays below this share of the noise."""

@@ -19,12 +19,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board, Values
+from bayesplate.board.setup import Setup
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.labels import Label
 from bayesplate.modes.beams import Beams
 from bayesplate.modes.naming import CERTAIN
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.setup import Setup
 
 _CONTRADICTED = 0.95
 """Share of a fit's plates on which a label's mode certainly has another name, from which on it contradicts that."""

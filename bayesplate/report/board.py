@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board, Values, vibrating_lengths
+from bayesplate.board.setup import Setup
+from bayesplate.board.words import EDGES
 from bayesplate.frequencies.system import System, system_of
-from bayesplate.plate.board import Board, Values, vibrating_lengths
-from bayesplate.plate.setup import EDGES, Setup
 from bayesplate.report.style import DARK, GREY, LIGHT, SMALL, VERMILLION, WIDTH, WORDS, Picture, placed, short
 
 if TYPE_CHECKING:

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from bayesplate.board.material import MODULI
+from bayesplate.board.parameter import unit_of_people
 from bayesplate.campaigns.common import CommonResidual, clear_of_zero
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis, claim_sentence
 from bayesplate.campaigns.summary import CampaignSummary
@@ -20,8 +22,6 @@ from bayesplate.campaigns.tables import (
     shared_table,
     taught_table,
 )
-from bayesplate.plate.material import MODULI
-from bayesplate.plate.parameter import unit_of_people
 from bayesplate.report.constants import modulus_title
 from bayesplate.report.page import from_template, save_page
 from bayesplate.report.saving import drawing

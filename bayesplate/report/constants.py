@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.material import MODULI
 from bayesplate.estimates.paper import paper_system
 from bayesplate.estimates.percentile import PercentileEstimate, percentile_estimate
-from bayesplate.plate.material import MODULI
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.report.style import (

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.board import Board
+from bayesplate.board.parameter import Parameter, unit_of_people
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.quantity import Quantity
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import effect_name, joined
-from bayesplate.plate.board import Board
-from bayesplate.plate.parameter import Parameter, unit_of_people
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
-from bayesplate.quantities import Quantity
 from bayesplate.report.posterior import input_words
 from bayesplate.results.budget import budget, row_words
 from bayesplate.results.contract import Spread

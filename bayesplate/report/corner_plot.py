@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
+from bayesplate.board.material import MODULI
 from bayesplate.libraries import load_arviz
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import MODULI
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.report.posterior import input_words

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.material import MODULI
 from bayesplate.grading.boards import BatchSummary
 from bayesplate.grading.figures import FIGURES, limit_told
 from bayesplate.grading.matching import LEAST_PROBABILITY, NINETY, TARGET, Grading
 from bayesplate.grading.tables import MOST_LISTED, best_first, doubts_sentence, grading_tables, marked
-from bayesplate.plate.material import MODULI
 from bayesplate.report.constants import modulus_title
 from bayesplate.report.page import from_template, save_page
 from bayesplate.report.saving import drawing

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Values, vibrating_lengths
 from bayesplate.estimates.identifiability import Identifiability
 from bayesplate.estimates.shapes import N_POINTS, labelled_shapes
 from bayesplate.estimates.sheet import points
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import SetupModel
-from bayesplate.plate.board import Values, vibrating_lengths
 from bayesplate.posterior.draws import Draws, posterior_mean_values
 from bayesplate.posterior.inference import Inference
 from bayesplate.report.chladni import board_panel, caption, draw_sand

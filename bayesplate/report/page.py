@@ -10,7 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from bayesplate.cards import BoardCard
+from bayesplate.board.board import Board
 from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.diagnosis.tables import write_diagnosis_tables
 from bayesplate.files import make_folder, write_text
@@ -57,7 +57,7 @@ class PagePicture:
 @drawing()
 def write_report(
     folder: Path,
-    card: BoardCard,
+    card: Board,
     inference: Inference,
     draws: Draws,
     summary: Summary,
@@ -69,7 +69,7 @@ def write_report(
     ----------
     folder : Path
         Made if it is not there; what it holds of an earlier report is replaced.
-    card : BoardCard
+    card : Board
     inference : Inference
         Of a run that has converged.
     draws : Draws
@@ -160,7 +160,7 @@ def _shown(picture: Picture, svg: bytes) -> PagePicture:
 
 
 def fit_page(
-    card: BoardCard,
+    card: Board,
     inference: Inference,
     draws: Draws,
     summary: Summary,

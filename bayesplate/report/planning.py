@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bayesplate.board.material import MODULI
 from bayesplate.planning.bench import Bench
 from bayesplate.planning.plan import Plan, ProposalEntry
 from bayesplate.planning.words import shared_words
-from bayesplate.plate.material import MODULI
 from bayesplate.report.chladni import Marks, chladni_sheet
 from bayesplate.report.style import (
     BLUE,

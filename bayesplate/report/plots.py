@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from bayesplate.board.material import MODULI
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis
 from bayesplate.campaigns.summary import CampaignSummary
 from bayesplate.diagnosis.result import Diagnosis
@@ -13,7 +14,6 @@ from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.sheet import Sheet
 from bayesplate.planning.bench import Bench
 from bayesplate.planning.plan import Plan
-from bayesplate.plate.material import MODULI
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.posing import PosedProblem

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import MODULI, RIGIDITIES
-from bayesplate.plate.parameter import Parameter, unit_of_people
-from bayesplate.plate.sessions import DISCREPANCY
+from bayesplate.board.board import Board
+from bayesplate.board.material import MODULI, RIGIDITIES
+from bayesplate.board.parameter import Parameter, unit_of_people
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.sessions import DISCREPANCY
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.posing import PosedProblem
-from bayesplate.quantities import Quantity
 from bayesplate.report.style import (
     BLACK,
     BLUE,

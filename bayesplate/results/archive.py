@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import StatedPrior
+from bayesplate.board.prior import StatedPrior
 from bayesplate.files import write_bytes
 from bayesplate.libraries import load_arviz
 from bayesplate.posterior.draws import Draws

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayesplate.cards import PriorCard
-from bayesplate.plate.board import Board
-from bayesplate.plate.sessions import OF_MODES
+from bayesplate.board.board import Board
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.sessions import OF_MODES
 from bayesplate.posterior.draws import Draws
 
 LARGE_SHARE = 0.5

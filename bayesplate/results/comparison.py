@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bayesplate.board.material import MODULI
 from bayesplate.estimates.coefficients import CoefficientRows
 from bayesplate.estimates.leave_one_out import CarryingMode, Errors
 from bayesplate.estimates.paper import PaperSystem
 from bayesplate.frequencies.laws import cents
-from bayesplate.plate.material import MODULI
 from bayesplate.posterior.methods import Method
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.results.contract import Elastic, finite, rms

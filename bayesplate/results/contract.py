@@ -10,7 +10,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.plate.material import MODULI, RIGIDITIES
+from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.posterior.draws import Draws
 
 Held = TypeVar("Held")

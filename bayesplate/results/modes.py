@@ -9,11 +9,11 @@ from typing import Literal, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.setup import Setup
 from bayesplate.estimates.leave_one_out import CarryingMode
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.labels import Label
-from bayesplate.plate.setup import Setup
 from bayesplate.posterior.assessment import Assessment
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.likely_labels import MOST_DRAWS_OF_LABELS

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bayesplate.cards import BoardCard, PriorCard
+from bayesplate.board.board import Board
+from bayesplate.board.prior import PriorCard
 from bayesplate.effects import effects_of
 from bayesplate.frequencies.system import system_of
-from bayesplate.plate.board import Board
 
 PAPER = (
     "M. Ducceschi, S. Duran, H. Tahvanainen, L. Ausiello: A method to estimate the rectangular "
@@ -49,12 +49,12 @@ class Section:
     entries: tuple[str, ...]
 
 
-def references(card: BoardCard, prior: PriorCard, board: Board) -> tuple[Section, ...]:
+def references(card: Board, prior: PriorCard, board: Board) -> tuple[Section, ...]:
     """What to cite for a fit of a card.
 
     Parameters
     ----------
-    card : BoardCard
+    card : Board
     prior : PriorCard
     board : Board
         With the effects that the fit declares.
@@ -75,7 +75,7 @@ def references(card: BoardCard, prior: PriorCard, board: Board) -> tuple[Section
     )
 
 
-def _data(card: BoardCard, board: Board) -> tuple[str, ...]:
+def _data(card: Board, board: Board) -> tuple[str, ...]:
     entries = [f"board {card.name}: {_one_line(card.source) or 'the card states no source'}"]
     tables = [setup.published_coefficients for setup in board.setups if setup.published_coefficients is not None]
     entries += [f"coefficients {table.name}: {_one_line(table.source)}" for table in tables]

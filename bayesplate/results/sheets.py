@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from bayesplate.board.board import Board
 from bayesplate.estimates.sheet import Sheet, SheetMode
-from bayesplate.plate.board import Board
 from bayesplate.posterior.first_labels import Way
 
 

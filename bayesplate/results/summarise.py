@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.material import MODULI, RIGIDITIES, moduli
 from bayesplate.estimates.identifiability import remarks
 from bayesplate.estimates.leave_one_out import carrying_sentence
 from bayesplate.estimates.paper import PaperSystem, paper_system
 from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.estimates.undeclared_air import air_sentence
-from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
 from bayesplate.posterior.assessment import Assessment
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws

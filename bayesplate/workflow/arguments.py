@@ -11,8 +11,10 @@ from typing import TypeGuard, get_args
 
 import numpy as np
 
-from bayesplate.cards import BoardCard, CampaignCard, PriorCard
-from bayesplate.cards.words import EFFECT_NAMES, OTHER_EFFECT_NAMES, did_you_mean, effect_named, quoted, shown
+from bayesplate.board.board import Board
+from bayesplate.board.campaign import CampaignCard
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.words import EFFECT_NAMES, OTHER_EFFECT_NAMES, did_you_mean, effect_named, quoted, shown
 from bayesplate.diagnosis.null_control import BY_CHANCE, FALSE_ALARMS
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.coefficients import CoefficientSource
@@ -20,7 +22,6 @@ from bayesplate.frequencies.laws import LawName
 from bayesplate.grading.storage import TableKind
 from bayesplate.planning.gains import GOALS
 from bayesplate.planning.proposals import Costs
-from bayesplate.plate.board import Board
 from bayesplate.recordings.reading import CHANNELS
 from bayesplate.recordings.signals import MOTIONS
 from bayesplate.workflow.batch_grading import grading_faults
@@ -70,8 +71,8 @@ def _prior(name: str, value: object) -> Iterator[Fault]:
 
 
 def _board(name: str, value: object) -> Iterator[Fault]:
-    if not isinstance(value, Board | BoardCard):
-        yield Fault(name, "a Board or a BoardCard", _shown(value))
+    if not isinstance(value, Board):
+        yield Fault(name, "a Board", _shown(value))
 
 
 def _prior_card(name: str, value: object) -> Iterator[Fault]:

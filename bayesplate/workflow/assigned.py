@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board, Values, vibrating_lengths
+from bayesplate.board.material import ORTHOTROPIC, Symmetry
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading import Peak
 from bayesplate.estimates.identifiability import identifiability
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.model import setup_model, with_others
 from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.frequencies.system import system_of
 from bayesplate.modes.solve import Modes, solve_up_to
-from bayesplate.plate.board import Board, Values, vibrating_lengths
-from bayesplate.plate.material import ORTHOTROPIC, Symmetry
-from bayesplate.plate.measured import Peak
-from bayesplate.quantities import Quantity
 from bayesplate.recordings.contract import sign_of, spurious_share
 
 if TYPE_CHECKING:

@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from bayesplate.cards import BoardCard, Columns, Template, load_board_in, plain
-from bayesplate.cards.cells import Cell, is_empty
-from bayesplate.cards.csv_table import csv_table
-from bayesplate.cards.reading import read_file, read_table
-from bayesplate.errors import Fault, InputError
+from bayesplate.board.board import Board
+from bayesplate.board.card_file import CardFile
+from bayesplate.board.csv_table import csv_table
+from bayesplate.board.rows import Cell, Columns, is_empty
+from bayesplate.board.toml import read_file, read_table
+from bayesplate.errors import Fault, InputError, plain
 from bayesplate.grading.storage import parquet_library
 
 LARGEST_TABLE = 100_000_000
@@ -33,7 +34,7 @@ class Source(Protocol):
     aside: Sequence[str]
     """Files that were left aside, because they are cards of another kind."""
 
-    def card(self, at: int) -> BoardCard:
+    def card(self, at: int) -> Board:
         """The card of the board at a place among the names; raises InputError with all its faults."""
 
     def place(self, at: int) -> str:
@@ -78,13 +79,14 @@ class Folder:
         self.alike: Sequence[tuple[str, ...]] = alike
         self.aside: Sequence[str] = aside
 
-    def card(self, at: int) -> BoardCard:
+    def card(self, at: int) -> Board:
         """The card of a board; raises InputError with all its faults, or if it is a link that leads elsewhere."""
         file = self._strange.get(at, f"{self.names[at]}.toml")
         if not self._is_inside(file):
             wanted, remedy = "a card in the folder of the batch", "copy the card"
             raise InputError(Fault(plain(file), wanted, "a link that leads out of it", remedy))
-        return load_board_in(self._path, file)
+        data = read_file(os.path.join(self._path, file))  # no Path: Python keeps every name that stood in one
+        return Board.from_card(CardFile.of(data, file, self._path))
 
     def place(self, at: int) -> str:
         """Nothing: the faults of a card name its file."""
@@ -119,7 +121,7 @@ class Table:
     def __init__(self, path: Path, template: str | Path) -> None:
         self._file = plain(path.name)
         header, self._rows = _read_parquet(path) if _ending(path) == ".parquet" else _read_csv(path)
-        self._columns = Columns(Template(template), header, self._file)
+        self._columns = Columns(template, header, self._file)
         filled = [i for i, row in enumerate(self._rows, start=1) if not all(map(is_empty, row))]
         if not filled:
             raise InputError(Fault(self._file, "a row for each board", "no row"))
@@ -129,9 +131,9 @@ class Table:
         self.aside: Sequence[str] = ()
         self._numbers = [number for _, number in named]
 
-    def card(self, at: int) -> BoardCard:
+    def card(self, at: int) -> Board:
         """The card of a row; raises InputError with all its faults."""
-        return self._columns.card(self._rows[self._numbers[at] - 1])
+        return self._columns.board(self._rows[self._numbers[at] - 1])
 
     def place(self, at: int) -> str:
         """The table and the number of the row, the first below the header being 1."""

@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from bayesplate.cards.words import did_you_mean, quoted
+from bayesplate.board.material import MODULI
+from bayesplate.board.words import did_you_mean, quoted
 from bayesplate.errors import Fault, InputError, plain
 from bayesplate.grading.figures import FIGURES, MOST
 from bayesplate.grading.matching import GradingRequest
-from bayesplate.plate.material import MODULI
 
 _RANGE = "positive numbers, the least before the greatest, at least one of them"
 _MATCHED = tuple(name for name in FIGURES if name[0] in "EG" or name == "density")

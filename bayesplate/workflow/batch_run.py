@@ -13,7 +13,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from bayesplate.cards import load_named, readings_sha256
+from bayesplate.board.checks import readings_sha256
+from bayesplate.board.named import load_named
 from bayesplate.errors import (
     BayesplateError,
     InputError,
@@ -114,7 +115,7 @@ class Run:
         request = replace(self.request, seed=seed, tables=dict(named.tables))
         tables = {table: repr(one) for table, one in sorted(named.tables.items())}
         asked = {**asdict(replace(request, tables={})), "tables": tables}
-        key = _hash(FORMAT, WORDS, self.versions, card.name, card.sha256, named.prior.to_card(), asked)
+        key = _hash(FORMAT, WORDS, self.versions, card.name, card.sha256, named.prior.to_toml(), asked)
         arguments = (card, named.prior, request)
         call = Call(fit_board, arguments)
         if self.folders:

@@ -7,9 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from bayesplate.board.campaign import CampaignCard, is_campaign, load_campaign
+from bayesplate.board.checks import readings_sha256
+from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.campaigns.population import require_moduli
 from bayesplate.campaigns.shared import Shared, shared_by
-from bayesplate.cards import CampaignCard, PriorCard, is_campaign, load_campaign, load_prior, readings_sha256
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.frequencies.laws import LawName
 from bayesplate.workflow.arguments import require_arguments

@@ -10,6 +10,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
+from bayesplate.board.campaign import SharedSection
 from bayesplate.campaigns.boards import Member
 from bayesplate.campaigns.claim import SharedClaim, TaughtBoard, judge, taught_boards
 from bayesplate.campaigns.common import common_residuals
@@ -25,7 +26,6 @@ from bayesplate.campaigns.diagnosis import (
 from bayesplate.campaigns.search import Explanation, explanations, search_board, shown
 from bayesplate.campaigns.shared import shared_by
 from bayesplate.campaigns.summary import CampaignSummary
-from bayesplate.cards import SharedSection
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.forms import forms
 from bayesplate.effects import EFFECTS

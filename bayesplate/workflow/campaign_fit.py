@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bayesplate.board.board import Board
 from bayesplate.campaigns.boards import Member
 from bayesplate.campaigns.common import common_residuals
 from bayesplate.campaigns.learning import Learnt, learn
@@ -25,7 +26,6 @@ from bayesplate.campaigns.summary import (
 )
 from bayesplate.errors import CheckpointError, NotConvergedError
 from bayesplate.files import write_text
-from bayesplate.plate.board import Board
 from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress, SamplerSettings

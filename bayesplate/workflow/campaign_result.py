@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesplate.board.prior import PriorCard
 from bayesplate.campaigns.archive import shared_tree
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis
 from bayesplate.campaigns.learning import Learnt
@@ -18,7 +19,6 @@ from bayesplate.campaigns.population import Population, prior_of
 from bayesplate.campaigns.summary import (
     CampaignSummary,
 )
-from bayesplate.cards import PriorCard
 from bayesplate.errors import Fault, InputError
 from bayesplate.files import make_folder, write_text, writing
 from bayesplate.report.plots import CampaignPlots
@@ -103,7 +103,7 @@ class CampaignFitResult:
             make_folder(folder / BOARDS / name)
             write_fit(folder / BOARDS / name, one)
         if self.prior is not None:
-            write_text(folder / f"{self.prior.name}.toml", self.prior.to_card())
+            write_text(folder / f"{self.prior.name}.toml", self.prior.to_toml())
         if self.learnt is not None:
             write_tree(folder / ARCHIVE, shared_tree(self.learnt, self._attributes))
         write_text(folder / SUMMARY, json_text(self.summary))

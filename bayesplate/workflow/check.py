@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from bayesplate.board.material import MODULI, moduli
 from bayesplate.campaigns.checking import CampaignCheck
 from bayesplate.diagnosis.signatures import INVISIBLE, Signature, look_alikes, signatures
 from bayesplate.estimates.identifiability import remarks
 from bayesplate.frequencies.laws import cents
-from bayesplate.plate.material import MODULI, moduli
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.report.plots import CheckPlots
 from bayesplate.results.checking import CheckedEffect, CheckedMode, CheckedSetup, CheckReport

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.material import MODULI
+from bayesplate.board.prior import PriorCard
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.claim import Claim, judge_claim, named_in_part, nested_of
 from bayesplate.diagnosis.findings import Case, Side, diagnosis_of
@@ -33,7 +34,6 @@ from bayesplate.files import make_folder, write_text
 from bayesplate.planning.drawn_up import first_of
 from bayesplate.planning.explained import believed, survivors
 from bayesplate.planning.proposals import BELIEFS, Planner
-from bayesplate.plate.material import MODULI
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import DiagnosePlots

@@ -6,10 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bayesplate.cards import BoardCard, CoefficientCard, NamedCards, PriorCard
+from bayesplate.board.board import Board
+from bayesplate.board.coefficients import CoefficientCard
+from bayesplate.board.named import NamedCards
+from bayesplate.board.prior import PriorCard
 from bayesplate.errors import Fault, NotConvergedError
 from bayesplate.frequencies.laws import LawName
-from bayesplate.plate.board import Board
 from bayesplate.posterior.inference import Inference
 from bayesplate.results.summary import Summary
 from bayesplate.workflow.arguments import require_arguments
@@ -46,13 +48,13 @@ class FitRequest:
 
 
 @one_thread_each()
-def fit_board(board: Board | BoardCard, prior: PriorCard, request: FitRequest | None = None) -> Summary:
+def fit_board(board: Board, prior: PriorCard, request: FitRequest | None = None) -> Summary:
     """Fit one board; nothing is read, written or remembered, and the same arguments give the same bytes anywhere.
 
     Parameters
     ----------
-    board : Board or BoardCard
-        Made in Python, or a card that was read.
+    board : Board
+        Made in Python, or read from a card.
     prior : PriorCard
         Of its constants.
     request : FitRequest, optional
@@ -72,20 +74,18 @@ def fit_board(board: Board | BoardCard, prior: PriorCard, request: FitRequest | 
     return fitted(_problem(board, prior, request), request.seed, None, _refuse).summary
 
 
-def fit_board_into(
-    folder: Path, report: bool, board: Board | BoardCard, prior: PriorCard, request: FitRequest
-) -> Summary:
+def fit_board_into(folder: Path, report: bool, board: Board, prior: PriorCard, request: FitRequest) -> Summary:
     """The same with the files of a fit in a folder, in place of what is there; raises as `fit`."""
     done = fit(_problem(board, prior, request), out=folder, report=report, seed=request.seed, force=True)
     return done.summary  # type: ignore[return-value]  # a problem is no campaign
 
 
-def _problem(board: Board | BoardCard, prior: PriorCard, request: FitRequest) -> Problem:
+def _problem(board: Board, prior: PriorCard, request: FitRequest) -> Problem:
     return Problem(_prepared(board, prior, request), request.law, request.robust)
 
 
-def _prepared(board: Board | BoardCard, prior: PriorCard, request: FitRequest) -> Prepared:
-    if isinstance(board, Board):
+def _prepared(board: Board, prior: PriorCard, request: FitRequest) -> Prepared:
+    if board.card is None or board != Board.from_card(board.card):
         return prepare(board, request.effects, prior=prior)
     lacking = tuple(
         Fault(
@@ -95,7 +95,7 @@ def _prepared(board: Board | BoardCard, prior: PriorCard, request: FitRequest) -
             f'tables={{"{setup.name}": ...}} of the FitRequest',
         )
         for setup in board.setups
-        if setup.published_coefficients is not None and setup.name not in request.tables
+        if setup.table_name and setup.name not in request.tables
     )
     return prepared_card(board, NamedCards(prior, request.tables, lacking), request.effects)
 

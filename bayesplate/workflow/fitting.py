@@ -11,8 +11,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from bayesplate.board.board import Board
 from bayesplate.errors import CheckpointError, NotConvergedError
-from bayesplate.plate.board import Board
 from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.convergence import Convergence

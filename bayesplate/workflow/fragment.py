@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from bayesplate.cards.writing import array, number, table, text
+from bayesplate.board.units import SI, in_unit
+from bayesplate.board.writing import toml_value
 from bayesplate.recordings.contract import PickedRow, spurious_share
 
 if TYPE_CHECKING:
     from bayesplate.recordings.signals import Place
     from bayesplate.recordings.spectra import Spectra
 
-_MILLI = 1e-3
 _LEAST_SD = 1e-5
 """Of a frequency, relative: no laboratory's clock is better."""
 _MOST_SURE = 0.999
@@ -53,30 +53,30 @@ def fragment_text(
     )
     lines = [f"# Picked from {told}. Use it with: bayesplate fit CARD --setup THIS_FILE", "[setup]"]
     if name:
-        lines.append(f"name = {text(name)}")
+        lines.append(f"name = {toml_value(name)}")
     bare = [(i, peak) for i, peak in likely if i not in labelled]
     doubt = spurious_share([peak.spurious_probability for _, peak in likely])
     if bare:
-        lines.append(f"spurious_probability = {number(round(doubt, 4))}")
+        lines.append(f"spurious_probability = {round(doubt, 4)}")
     named = [(peak, *labelled[i]) for i, peak in likely if i in labelled]
     if named:
         lines += ["", "[setup.frequencies_hz]"]
-        lines += [f"{text(label)} = {_hertz(peak)}" for peak, label, _ in named]
+        lines += [f"{toml_value(label)} = {_hertz(peak)}" for peak, label, _ in named]
         lines += ["", "[setup.label_confidence]"]
-        lines += [f"{text(label)} = {number(round(min(sure, _MOST_SURE), 3))}" for _, label, sure in named]
+        lines += [f"{toml_value(label)} = {round(min(sure, _MOST_SURE), 3)}" for _, label, sure in named]
         signed = [(label, peak.sign) for peak, label, _ in named if peak.sign]
         if signed:
-            lines += ["", "[setup.signs]", *(f"{text(label)} = {text(sign)}" for label, sign in signed)]
+            lines += ["", "[setup.signs]", *(f"{toml_value(label)} = {toml_value(sign)}" for label, sign in signed)]
     for _, peak in bare:
         lines += ["", f"[[setup.peaks]]{_remark(peak)}", f"hz = {_hertz(peak)}"]
-        lines += [f"sign = {text(peak.sign)}"] if peak.sign else []
+        lines += [f"sign = {toml_value(peak.sign)}"] if peak.sign else []
         lines += [f"amplitude = {peak.amplitude:.3g}", f"damping_percent = {peak.damping_percent:.3g}"]
     return "\n".join([*lines, *_places(spectra, sensor_mass)]) + "\n"
 
 
 def _hertz(peak: PickedRow) -> str:
     sd = max(peak.sd_hz, _LEAST_SD * peak.hz)
-    return table({"mean": f"{peak.hz:.7g}", "sd": f"{sd:.2g}"})
+    return toml_value({"mean": float(f"{peak.hz:.7g}"), "sd": float(f"{sd:.2g}")})
 
 
 def _remark(peak: PickedRow) -> str:
@@ -92,17 +92,17 @@ def _places(spectra: Spectra, sensor_mass: tuple[float, float] | None) -> list[s
     sensors = list(dict.fromkeys(sensor for _, sensor in spectra.between if sensor is not None))
     lines = []
     if len(hammers) == 1 and len(spectra.between) == 1:
-        lines += ["", "[setup.hammer]", f"at_mm = {_place(hammers[0])}"]
+        lines += ["", "[setup.hammer]", f"at_mm = {toml_value(_place(hammers[0]))}"]
     if sensors and spectra.motion != "pressure":
         places = [_place(sensor) for sensor in sensors]
         lines += ["", "[[setup.attached]]", 'kind = "accelerometer"']
-        lines += [f"at_mm = {places[0] if len(places) == 1 else array(places)}"]
+        lines += [f"at_mm = {toml_value(places[0] if len(places) == 1 else places)}"]
         if sensor_mass is not None:
             mass, sd = sensor_mass
-            grams = number(mass, _MILLI)
-            lines += [f"mass_g = {table({'mean': grams, 'sd': number(sd, _MILLI)}) if sd else grams}"]
+            grams = in_unit(mass, SI["g"])
+            lines += [f"mass_g = {toml_value({'mean': grams, 'sd': in_unit(sd, SI['g'])} if sd else grams)}"]
     return lines
 
 
-def _place(place: Place) -> str:
-    return array(f"{1e3 * value:.6g}" for value in place)
+def _place(place: Place) -> list[float]:
+    return [float(f"{1e3 * value:.6g}") for value in place]

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bayesplate.board.board import Board, Values
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.identifiability import identifiability, require_identifiable, require_labels
 from bayesplate.estimates.least_squares import weighted_least_squares
@@ -17,7 +18,6 @@ from bayesplate.files import make_folder, require_new
 from bayesplate.frequencies.prior_bands import prior_bands, prior_medians
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
-from bayesplate.plate.board import Board, Values
 from bayesplate.posterior.first_labels import probable_ways
 from bayesplate.posterior.laplace import noise_widenings
 from bayesplate.report.plots import ModesPlots

@@ -6,16 +6,17 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from bayesplate.cards import EDGE_NAMES, load_prior, physical_faults, read_board_text
-from bayesplate.cards.setup import EdgeWord, edge_words
-from bayesplate.cards.starter import HALF_TOP, Starter, starter_text
-from bayesplate.cards.values import Number, Refusal
-from bayesplate.cards.words import did_you_mean, name_complaint, shown
+from bayesplate.board.board import Board
+from bayesplate.board.checks import physical_faults
+from bayesplate.board.prior import load_prior
+from bayesplate.board.setup_keys import End, edge_words
+from bayesplate.board.starter import HALF_TOP, Starter, starter_text
+from bayesplate.board.values import Number, Refusal
+from bayesplate.board.words import EDGES, did_you_mean, name_complaint, shown
 from bayesplate.errors import Fault, InputError, plain
 from bayesplate.files import write_text, writing
 from bayesplate.frequencies.labels import label_faults, lowest_labels
 from bayesplate.labels import Label
-from bayesplate.plate.from_card import board_from_card
 
 _EDGES_WANTED = (
     '"free", "cantilever", "clamped", "supported", or four letters of C, S and F for x0, y0, x1, y1, like "CFFF"'
@@ -77,7 +78,7 @@ def new(
     ]
     if words is None:
         faults.append(Fault("edges", _EDGES_WANTED, shown(edges)))
-        words = dict.fromkeys(EDGE_NAMES, "free")
+        words = dict.fromkeys(EDGES, "free")
     starter = Starter(
         name=card.stem,
         title=title,
@@ -121,10 +122,10 @@ def require_edges(edges: str) -> None:
 def example_labels(edges: str) -> list[str]:
     """Labels of modes that a board held this way has; those of a free one where the arrangement is not known."""
     words = edge_words(_ARRANGEMENTS.get(edges, edges))
-    return [str(label) for label in _examples(words or dict.fromkeys(EDGE_NAMES, "free"))]
+    return [str(label) for label in _examples(words or dict.fromkeys(EDGES, "free"))]
 
 
-def _examples(words: Mapping[str, EdgeWord]) -> list[Label]:
+def _examples(words: Mapping[str, End]) -> list[Label]:
     return lowest_labels((words["x0"], words["x1"]), (words["y0"], words["y1"]))[:_N_EXAMPLES]
 
 
@@ -149,7 +150,7 @@ def _number(value: float | str) -> float | str:
 def _faults(text: str, name: str) -> list[Fault]:
     """Everything that a card is held to."""
     try:
-        read = read_board_text(text, name, may_lack_frequencies=True)
+        read = Board.from_text(text, name, may_lack_frequencies=True)
     except InputError as error:
         return list(error.faults)
-    return physical_faults(read) or label_faults(board_from_card(read, load_prior(read.material.prior)))
+    return physical_faults(read) or label_faults(read.assuming(load_prior(read.prior)))

@@ -20,8 +20,8 @@ from bayesplate.recordings.sand import sand_evidence
 from bayesplate.workflow.assigned import MostlyKnown, bare_board, mostly_known
 
 if TYPE_CHECKING:
-    from bayesplate.cards import PriorCard
-    from bayesplate.plate.board import Board
+    from bayesplate.board.board import Board
+    from bayesplate.board.prior import PriorCard
     from bayesplate.recordings.picking import Picked, PickedMode
 
 Floats = NDArray[np.float64]

@@ -7,7 +7,7 @@ from math import log
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from bayesplate.plate.board import Board
+    from bayesplate.board.board import Board
     from bayesplate.recordings.picking import Picked
     from bayesplate.recordings.sand import Floats
 

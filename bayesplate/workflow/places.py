@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bayesplate.cards import BoardCard, off_the_board, plate_mass_g, too_heavy
+from bayesplate.board.board import Board
+from bayesplate.board.checks import board_mass, faults_of, lighter_than_the_board, on_the_board
 from bayesplate.effects.attached_mass import HEAVIEST_ROVING
-from bayesplate.errors import Fault, InputError
+from bayesplate.errors import InputError
 
 Place = tuple[float, float]
 
@@ -30,31 +31,32 @@ def given_places(
 
 
 def require_on_board(
-    card: BoardCard,
+    board: Board,
     hammer: Sequence[Place],
     sensor: Sequence[Place],
     sensor_mass: tuple[float, float] | None,
 ) -> None:
-    """Hold places, m, and the mass of the sensor, kg, against a card with one setup.
+    """Hold places, m, and the mass of the sensor, kg, against a board with one setup.
 
     Raises
     ------
     InputError
         With everything that the card would be refused for if it stated it.
     """
-    (setup,) = card.setups
-    millimetres = {
-        which if len(given) == 1 else f"{which} {number}": (round(1e3 * x, 6), round(1e3 * y, 6))
+    (setup,) = board.setups
+    places = {
+        which if len(given) == 1 else f"{which} {number}": place
         for which, given in (("hammer", hammer), ("sensor", sensor))
-        for number, (x, y) in enumerate(given, start=1)
+        for number, place in enumerate(given, start=1)
     }
-    faults = [*off_the_board(card, setup, millimetres)]
+    rows = [*on_the_board(board, setup, places)]
     if sensor_mass is not None:
-        grams, board = 1e3 * sensor_mass[0], plate_mass_g(card)
-        heavy = [*too_heavy(card, "sensor_mass", grams)]
-        if not heavy and len({*sensor}) > 1 and grams > HEAVIEST_ROVING * board:
-            wanted = f"at most {HEAVIEST_ROVING:.0%} of the board's {board:.4g} g for a sensor that roved"
-            heavy = [Fault("sensor_mass", wanted, f"{grams:g} g", "pick the places apart")]
-        faults += heavy
+        own, mass = board_mass(board), sensor_mass[0]
+        rows.append(lighter_than_the_board(board, "sensor_mass", mass))
+        roves = len({*sensor}) > 1
+        wanted = f"at most {HEAVIEST_ROVING:.0%} of the board's {1e3 * own:.4g} g for a sensor that roved"
+        is_light = not roves or not HEAVIEST_ROVING * own < mass < own
+        rows.append(("sensor_mass", is_light, wanted, f"{1e3 * mass:g} g", "pick the places apart"))
+    faults = faults_of(rows)
     if faults:
         raise InputError(faults)

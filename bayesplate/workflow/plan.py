@@ -9,9 +9,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from bayesplate.board.board import Board
+from bayesplate.board.campaign import is_campaign
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.words import EFFECT_NAMES, effect_named
 from bayesplate.campaigns.shared import Shared
-from bayesplate.cards import PriorCard, is_campaign
-from bayesplate.cards.words import EFFECT_NAMES, effect_named
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.hypotheses import RELABELLING
 from bayesplate.diagnosis.joint import full_search
@@ -29,7 +31,6 @@ from bayesplate.planning.plan import Plan
 from bayesplate.planning.proposals import BELIEFS, Costs, Planner
 from bayesplate.planning.together import beliefs_together
 from bayesplate.planning.unmeasured import prior_beliefs
-from bayesplate.plate.board import Board
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import PlanPlots
 from bayesplate.results.contract import json_text

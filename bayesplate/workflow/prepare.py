@@ -9,29 +9,20 @@ from pathlib import Path
 
 import numpy as np
 
-from bayesplate.cards import (
-    BoardCard,
-    NamedCards,
-    PriorCard,
-    is_campaign,
-    load_board,
-    load_named,
-    load_prior,
-    physical_faults,
-    read_board_text,
-    remarks,
-)
-from bayesplate.cards.shelf import find
-from bayesplate.cards.words import effect_named
+from bayesplate.board.board import Board, assumed_notes
+from bayesplate.board.campaign import is_campaign
+from bayesplate.board.card_file import CardFile
+from bayesplate.board.checks import physical_faults, remarks
+from bayesplate.board.named import NamedCards, load_named
+from bayesplate.board.prior import PriorCard, load_prior
+from bayesplate.board.sessions import notes as session_notes
+from bayesplate.board.shelf import find
+from bayesplate.board.words import effect_named
 from bayesplate.effects import declare, effect_faults, implied_effects, notes
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.coefficients import coefficient_faults, require_sides
 from bayesplate.estimates.plausibility import require_plausible
 from bayesplate.frequencies.labels import label_faults
-from bayesplate.plate.board import Board
-from bayesplate.plate.from_card import board_from_card
-from bayesplate.plate.sessions import notes as session_notes
-from bayesplate.plate.writing import card_text
 
 Card = str | os.PathLike[str] | Board
 """Name of a shipped card, the path of a card, or a board made in Python."""
@@ -39,23 +30,26 @@ Card = str | os.PathLike[str] | Board
 
 @dataclass(frozen=True)
 class Prepared:
-    """A card, the cards that it names, and the board they describe.
+    """A board, the cards that it names, and what its declared effects add to it.
 
     Attributes
     ----------
-    card : BoardCard
-        That of a board made in Python is read from its own text.
     named : NamedCards
     stated : Board
-        The board as the card states it: what to vary by `dataclasses.replace`.
+        As its card states it, and the prior what the card does not: what to vary by `dataclasses.replace`. A board made
+        in Python is read from its own table.
     board : Board
         With the parameters of its declared effects, those that its sensors and its air imply included.
     """
 
-    card: BoardCard
     named: NamedCards
     stated: Board
     board: Board
+
+    @property
+    def card(self) -> Board:
+        """The board with its card."""
+        return self.stated
 
     @property
     def prior(self) -> PriorCard:
@@ -66,11 +60,11 @@ class Prepared:
     @property
     def card_text(self) -> str:
         """The card as it was read."""
-        return self.card.text
+        return self.stated.text
 
     def with_effects(self, effects: Sequence[str]) -> Prepared:
         """The same cards, not read again, with other declared effects; raises InputError as `prepare`."""
-        return prepared_card(self.card, self.named, effects)
+        return prepared_card(self.stated, self.named, effects)
 
 
 def default_folder(card: str | os.PathLike[str]) -> Path:
@@ -123,12 +117,11 @@ def prepare(
     _require_card(card)
     given = prior if prior is None or isinstance(prior, PriorCard) else load_prior(prior)
     if not isinstance(card, Board):
-        read = load_board(card, may_lack_frequencies=may_lack_frequencies, setup=setup)
+        read = Board.from_toml(card, may_lack_frequencies=may_lack_frequencies, setup=setup)
         return prepared_card(read, load_named(read, given), effects)
-    read = read_board_text(card_text(card), card.name, may_lack_frequencies=may_lack_frequencies, setup=setup)
-    found = ((setup.name, setup.published_coefficients) for setup in card.setups)
-    named = load_named(read, given, {name: one for name, one in found if one is not None})
-    prepared = prepared_card(read, named, effects)
+    read = Board.from_card(CardFile(card.table(), f"{card.name}.toml", card.folder), may_lack_frequencies, setup)
+    found = {one.name: one.published_coefficients for one in card.setups if one.published_coefficients is not None}
+    prepared = prepared_card(read, load_named(read, given, found), effects)
     lost = list(_lost(card, prepared.board)) if setup is None else []
     if lost:
         raise InputError(lost)
@@ -143,22 +136,22 @@ def _require_card(card: object) -> None:
         raise InputError(Fault("card", "a board: a name, a path or a Board", f"a {kind}", remedy.get(kind, "")))
 
 
-def prepared_card(read: BoardCard, named: NamedCards, effects: Sequence[str] | None = None) -> Prepared:
+def prepared_card(read: Board, named: NamedCards, effects: Sequence[str] | None = None) -> Prepared:
     """The same of cards that were read already: no file is looked at; raises as `prepare`."""
-    stated = board_from_card(read, named.prior, named.tables)
+    stated = read.assuming(named.prior, named.tables)
     implied = implied_effects(stated)
     listed = (*stated.effects, *implied) if effects is None else map(effect_named, effects)
     declared = tuple(dict.fromkeys(listed))
     board = replace(stated, effects=declared, implies=bool(declared) or (stated.implies and not implied))
-    faults = [*physical_faults(read), *named.faults, *label_faults(board), *effect_faults(board)]
+    faults = [*physical_faults(stated), *named.faults, *label_faults(board), *effect_faults(board)]
     if not faults:
         require_sides(board)
     faults += coefficient_faults(board)
     if faults or named.prior is None:
         raise InputError(faults)
     require_plausible(board, named.prior, np.random.default_rng(0))
-    told = (*board.notes, *remarks(read, board.effects), *notes(board), *session_notes(board))
-    return Prepared(read, named, stated, declare(replace(board, notes=told)))
+    told = (*assumed_notes(board), *remarks(board, board.effects), *notes(board), *session_notes(board))
+    return Prepared(named, stated, declare(replace(board, notes=told)))
 
 
 def _lost(given: Board, prepared: Board) -> Iterator[Fault]:

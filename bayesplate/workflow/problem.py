@@ -10,11 +10,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.board import Board
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.sessions import sessions
 from bayesplate.errors import Fault, InputError
 from bayesplate.frequencies.laws import LawName
-from bayesplate.plate.board import Board
-from bayesplate.plate.sessions import sessions
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.target import Posterior

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.io import wavfile
 
+from bayesplate.board.material import rigidities
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
 from bayesplate.modes.solve import Modes
-from bayesplate.plate.material import rigidities
 from bayesplate.workflow.prepare import prepare
 
 Floats = NDArray[np.float64]

@@ -16,7 +16,9 @@ import ritz
 from made_campaigns import MASS, write_campaign
 from numpy.typing import NDArray
 
-from bayesplate.cards import load_named, read_board_text
+from bayesplate.board.board import Board
+from bayesplate.board.named import load_named
+from bayesplate.board.setup import Ends
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.joint import full_search
 from bayesplate.frequencies.laws import LawName
@@ -27,7 +29,6 @@ from bayesplate.modes.mesh import mesh
 from bayesplate.modes.solve import solve, solve_classes
 from bayesplate.modes.terms import Weights
 from bayesplate.modes.thin import thin_plate
-from bayesplate.plate.setup import Ends
 from bayesplate.posterior.convergence import autocorrelation_times, burn_in_steps
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import PosedProblem, pose
@@ -186,7 +187,7 @@ def search(n_modes: int, tried: Sequence[str] | None = None) -> tuple[int, float
     from generator.designs import DESIGNS
 
     text = plant(np.random.default_rng(1), DESIGNS["free-12"], [], 1.0, 5.0, name="free").card_text()
-    card = read_board_text(text, "free")
+    card = Board.from_text(text, "free")
     prepared = prepared_card(card, load_named(card), [])
     (setup,) = prepared.board.setups
     board = replace(prepared.board, setups=(replace(setup, readings=setup.readings[:n_modes]),))

@@ -25,14 +25,14 @@ from calibration.table import family_p_value, family_words, is_calibrated, rows,
 from calibration.truths import Design
 from numpy.typing import NDArray
 
+from bayesplate.board.material import RIGIDITIES, moduli
+from bayesplate.board.quantity import Quantity
 from bayesplate.errors import BayesplateError
-from bayesplate.plate.material import RIGIDITIES, moduli
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.posterior.target import Posterior
-from bayesplate.quantities import Quantity
 from bayesplate.workflow.problem import Problem
 
 BOARDS = ("finnish-spruce-cantilever", "fiemme-spruce-clamped")

@@ -20,12 +20,12 @@ from calibration.truths import Design, Truth, noises_of, prior_values, reference
 from made_boards import NARROW, peaks_of
 from numpy.typing import NDArray
 
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import Setup
 from bayesplate.errors import BayesplateError
 from bayesplate.frequencies.model import SetupModel, with_others
-from bayesplate.plate.setup import Setup
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.target import Posterior
-from bayesplate.quantities import Quantity
 
 DESIGN = Design(law="fixed-linear", resolution=0.0)
 SURE = ((1, 1), (2, 0), (0, 2), (4, 1))

@@ -15,12 +15,12 @@ from calibration.records import Record
 from calibration.sbc import MOST_STEPS, held_out, random_lines, ranked, ranked_draws, ranks_among
 from calibration.truths import Design, Truth, draw_truth, make_problem, reference
 
+from bayesplate.board.parameter import Parameter
 from bayesplate.campaigns.boards import Member
 from bayesplate.campaigns.learning import Learnt, learn
 from bayesplate.campaigns.shared import Shared
 from bayesplate.campaigns.together import Together, walk
 from bayesplate.errors import BayesplateError
-from bayesplate.plate.parameter import Parameter
 from bayesplate.posterior.convergence import Convergence, Gate
 from bayesplate.posterior.draws import named_draws
 from bayesplate.posterior.inference import infer

@@ -28,7 +28,7 @@ from generator.card import NOISE_FACTOR
 from generator.designs import DESIGNS, SHEAR_MEANS
 from scipy import stats
 
-from bayesplate.quantities import Quantity
+from bayesplate.board.quantity import Quantity
 
 NOMINAL = 0.90
 KINDS = {"all": "sensor and shear on all boards", "some": "sensor on some boards", "none": "sensor on no board"}

@@ -25,11 +25,11 @@ from calibration.truths import Design, reference
 from numpy.typing import NDArray
 from scipy import stats
 
-from bayesplate.plate.readings import ReadingErrors
+from bayesplate.board.quantity import Quantity
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.posterior.mixture import Mixture
 from bayesplate.posterior.moves import IndependentMove
 from bayesplate.posterior.target import Posterior
-from bayesplate.quantities import Quantity
 
 N_CHAINS, N_STEPS = 20, 2000
 N_INDEPENDENT = 100_000

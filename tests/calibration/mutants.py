@@ -9,11 +9,11 @@ import numpy as np
 from calibration.layouts import LABELS, TWICE
 from numpy.typing import NDArray
 
-from bayesplate.plate.board import Board
-from bayesplate.plate.setup import DEFAULT_NOISE
+from bayesplate.board.board import Board
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import DEFAULT_NOISE
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.target import Posterior
-from bayesplate.quantities import Quantity
 
 HALF_NOISE = Quantity.from_median(0.5 * DEFAULT_NOISE.median, 1.02)
 NARROWER = {"spread 0.7 of itself": 0.7, "spread 0.8 of itself": 0.8}

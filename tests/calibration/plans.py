@@ -30,7 +30,9 @@ from generator.recipes import RECIPES
 from trial.cells import KINDS, SENSORS, UNKNOWN
 from trial.shared import baseline_of_card, median_baseline, shared_law
 
-from bayesplate.cards import load_prior
+from bayesplate.board.board import Board
+from bayesplate.board.prior import load_prior
+from bayesplate.board.sessions import shared_share
 from bayesplate.diagnosis.forms import forms
 from bayesplate.diagnosis.hypotheses import NONE, ONE, Hypothesis
 from bayesplate.diagnosis.search import Found, Ground, prepare_search, search
@@ -43,8 +45,6 @@ from bayesplate.planning.laws import known_mass
 from bayesplate.planning.modes_read import REPEATED
 from bayesplate.planning.proposals import BELIEFS, FAINT, Planner, Proposal
 from bayesplate.planning.sizes_read import LOOKS
-from bayesplate.plate.board import Board
-from bayesplate.plate.sessions import shared_share
 from bayesplate.streams import stream
 
 Record = dict[str, Any]

@@ -21,16 +21,16 @@ from generator.designs import DESIGNS, MEDIANS, Design, Setup
 from generator.naming import LEAST_CORRELATION, Label, frequencies
 from generator.recipes import RECIPES
 
+from bayesplate.board.board import Board
+from bayesplate.board.material import MODULI
+from bayesplate.board.quantity import Quantity
 from bayesplate.errors import BayesplateError
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import MODULI
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws, named_draws
 from bayesplate.posterior.inference import Inference, infer
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.reweighting import linear_is_enough
 from bayesplate.posterior.sampling import SamplerSettings
-from bayesplate.quantities import Quantity
 from bayesplate.results.contract import Spread
 from bayesplate.workflow.prepare import Prepared, prepare
 

@@ -34,8 +34,8 @@ from calibration.truths import (
 from made_boards import models_at
 from numpy.typing import NDArray
 
+from bayesplate.board.material import RIGIDITIES, moduli
 from bayesplate.errors import BayesplateError
-from bayesplate.plate.material import RIGIDITIES, moduli
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import PosedProblem

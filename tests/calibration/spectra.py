@@ -27,10 +27,10 @@ from generator.designs import DESIGNS
 from generator.naming import LEAST_CORRELATION, Label, named
 from generator.plate import solve
 
+from bayesplate.board.board import Board
+from bayesplate.board.material import MODULI
 from bayesplate.errors import BayesplateError
 from bayesplate.estimates.labelling import with_labels
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import MODULI
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.results.modes import assigned_peaks

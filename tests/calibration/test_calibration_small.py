@@ -15,7 +15,7 @@ from calibration.sbc import N_DRAWS, held_out, identity, quantities, simulate_on
 from calibration.table import MUTANTS, family_p_value, is_calibrated, is_caught, rows
 from calibration.truths import Design, draw_truth, make_problem
 
-from bayesplate.plate.material import RIGIDITIES
+from bayesplate.board.material import RIGIDITIES
 
 SMALL = Design(law="fixed-linear", resolution=0.0, thickness_sd=0.0, n_walkers=12)
 N_SMALL, N_HALF, N_FLIPPED = 96, 32, 10

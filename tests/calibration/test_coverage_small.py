@@ -24,9 +24,9 @@ from calibration.records import read_done
 from generator.designs import DESIGNS, MEDIANS
 from scipy import stats
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.effects import EFFECTS
 from bayesplate.posterior.posing import pose
-from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
 SHORT = Settings(n_ensembles=2, n_walkers=12, gate_taus=10.0, ess_min=100.0)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from calibration.plans import WAYS, bars, calibration, is_calibrated, settled, wrongly
 
+from bayesplate.board.material import ORTHOTROPIC
 from bayesplate.planning.beliefs import Beliefs, Explanation, entropy
 from bayesplate.planning.gains import Readings, expected_gain, probabilities_after
-from bayesplate.plate.material import ORTHOTROPIC
 
 N_BOARDS, N_TERMS = 120, 24
 NOISE = 0.5

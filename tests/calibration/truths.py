@@ -13,20 +13,20 @@ from calibration.layouts import EDGES, LABELS, LENGTHS, SETUPS
 from made_boards import models_at, setup_of, with_noise
 from numpy.typing import NDArray
 
-from bayesplate.cards import PriorCard, load_prior
+from bayesplate.board.board import Board, made_board
+from bayesplate.board.material import MODULI, RIGIDITIES, rigidities
+from bayesplate.board.prior import PriorCard, load_prior
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.sessions import with_discrepancies
+from bayesplate.board.setup import DEFAULT_NOISE
 from bayesplate.effects import declare
 from bayesplate.estimates.least_squares import log_measured, reading_scales
 from bayesplate.estimates.refit import design as sensitivities
 from bayesplate.estimates.refit import refit
 from bayesplate.frequencies.model import SetupModel, log_frequencies_of_board
-from bayesplate.plate.board import Board, made_board
-from bayesplate.plate.material import MODULI, RIGIDITIES, rigidities
-from bayesplate.plate.sessions import with_discrepancies
-from bayesplate.plate.setup import DEFAULT_NOISE
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.target import Posterior
-from bayesplate.quantities import Quantity
 
 Edges = Literal["free", "cantilever", "both", "days"]
 Generator = Literal["package", "ritz"]

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from linear_boards import exactly_together, linear_boards, log_evidence
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.campaigns.agreement import left_out, p_value, refusing
 from bayesplate.campaigns.pulls import Pull
-from bayesplate.quantities import Quantity
 
 
 def test_p_values_of_boards_that_share_are_uniform():

@@ -7,12 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bayesplate.board.material import ORTHOTROPIC, RIGIDITIES
+from bayesplate.board.setup import Setup
 from bayesplate.campaigns.claim import SharedClaim
 from bayesplate.campaigns.common import CLEAR, _pooled, clear_of_zero, common_residuals
 from bayesplate.campaigns.diagnosis import next_step, pooled_rms
 from bayesplate.campaigns.search import Explanation
-from bayesplate.plate.material import ORTHOTROPIC, RIGIDITIES
-from bayesplate.plate.setup import Setup
 
 N_MODES, N_CAMPAIGNS = 12, 400
 

@@ -10,13 +10,13 @@ import pytest
 from made_campaigns import write_campaign
 
 import bayesplate
+from bayesplate.board.prior import load_prior
+from bayesplate.board.quantity import Quantity
 from bayesplate.campaigns.boards import Member
 from bayesplate.campaigns.pulls import Pull
 from bayesplate.campaigns.shared import Shared
-from bayesplate.cards import load_prior
 from bayesplate.errors import InputError
 from bayesplate.posterior.sampling import SamplerSettings
-from bayesplate.quantities import Quantity
 from bayesplate.results.folder import OutputFolder
 from bayesplate.workflow.campaign_check import expected_sds
 

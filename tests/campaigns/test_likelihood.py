@@ -10,11 +10,11 @@ import pytest
 from linear_boards import linear_boards
 from scipy import stats
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.campaigns.boards import Member, Sample
 from bayesplate.campaigns.evidence import bridge_sampling
 from bayesplate.campaigns.likelihood import _REACH, SharedLikelihood, _near
 from bayesplate.diagnosis.terms import log_sum
-from bayesplate.quantities import Quantity
 
 N = 6000
 Z_TRUE = [1.2, -0.7, 0.4]

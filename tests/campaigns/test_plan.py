@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import bayesplate
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading import Peak
 from bayesplate.campaigns.scatter import expected_width
 from bayesplate.planning.bench import bands, benches
 from bayesplate.planning.proposals import Costs, Planner
 from bayesplate.planning.together import _linear, beliefs_together
-from bayesplate.plate.measured import Peak
-from bayesplate.quantities import Quantity
 
 SHARED = "attached_mass.mass"
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from bayesplate.board.prior import PriorCard, load_prior
+from bayesplate.board.quantity import Quantity
 from bayesplate.campaigns.population import BoardConstants, Population, find_population, prior_of, require_moduli
-from bayesplate.cards import PriorCard, load_prior
 from bayesplate.errors import InputError
 from bayesplate.posterior.sampling import Chains, SamplerSettings
-from bayesplate.quantities import Quantity
 
 MEAN = np.log([11e9, 0.95e9, 0.67e9])
 SD = np.array([0.12, 0.25, 0.15])

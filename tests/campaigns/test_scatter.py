@@ -10,13 +10,13 @@ from linear_boards import LinearBoard, pull_of, standard_shared
 from scipy.integrate import quad
 from scipy.stats import norm
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.campaigns import scatter, together
 from bayesplate.campaigns.agreement import left_out, p_value
 from bayesplate.campaigns.pulls import Pull
 from bayesplate.campaigns.scatter import ScatteredLikelihood
 from bayesplate.campaigns.shared import Shared
 from bayesplate.campaigns.together import Together, values_of
-from bayesplate.quantities import Quantity
 
 SCALE = 0.5
 LOG_SD = 0.4

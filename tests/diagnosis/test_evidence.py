@@ -11,13 +11,13 @@ from made_boards import setup_of
 from made_searches import FREE, NOISE, bare, baseline, ground_of, left_out, one_level, table, with_modes
 from scipy.stats import multivariate_normal
 
+from bayesplate.board.board import made_board
+from bayesplate.board.parameter import Owner
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.folds import log_score, log_score_gains, nested
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.noise_grid import NoiseGrid, noise_grid
 from bayesplate.diagnosis.terms import Terms
-from bayesplate.plate.board import made_board
-from bayesplate.plate.parameter import Owner
-from bayesplate.quantities import Quantity
 
 _REACH, _STEP = 6.0, 1.0
 """Of the grid, in standard deviations.  The trapezoidal sum of a normal density errs by 2 exp(-2 (pi / step)^2) a

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from made_searches import bare, baseline, candidate, ground_of, one_level, with_modes
 
+from bayesplate.board.material import RIGIDITIES
 from bayesplate.diagnosis import constants
 from bayesplate.diagnosis.constants import draw_constants
 from bayesplate.diagnosis.draws import draw_terms
@@ -16,7 +17,6 @@ from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.search import search
 from bayesplate.diagnosis.sensitivity import draw_exact, exact_log_frequencies, log_weights_of, under_exact_law
 from bayesplate.diagnosis.shifts import together
-from bayesplate.plate.material import RIGIDITIES
 
 NOISE = 0.01
 BEND = 4.0

@@ -11,6 +11,9 @@ from diagnoses import spread
 from made_searches import HALF_NORMAL, NOISE, bare, baseline, candidate, decided, exchanged, ground_of, visible_of
 from made_summaries import SUMMARY, mode
 
+from bayesplate.board.material import RIGIDITIES, moduli
+from bayesplate.board.parameter import BOARD, Parameter
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis import constants
 from bayesplate.diagnosis.candidates import EffectEntry
 from bayesplate.diagnosis.claim import Claim, Condition
@@ -29,9 +32,6 @@ from bayesplate.diagnosis.told import verdict_sentence, verdict_sentences, warni
 from bayesplate.diagnosis.verdict import NOTHING_LEFT, Answer, answers
 from bayesplate.effects import EFFECTS
 from bayesplate.estimates.leave_one_out import CarryingMode, indices_of
-from bayesplate.plate.material import RIGIDITIES, moduli
-from bayesplate.plate.parameter import BOARD, Parameter
-from bayesplate.quantities import Quantity
 from bayesplate.report.verdict import diagnosis_section, quoted
 from bayesplate.results.contract import Elastic, json_text
 from bayesplate.workflow.shown import show_diagnosis

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bayesplate.board.attached import AttachedItem
+from bayesplate.board.board import made_board
+from bayesplate.board.parameter import BOARD
 from bayesplate.diagnosis.forms import forms, with_forms
 from bayesplate.diagnosis.shifts import COARSE, FINE, cells_along
 from bayesplate.effects import EFFECTS, effects_of
-from bayesplate.plate.board import made_board
-from bayesplate.plate.parameter import BOARD
-from bayesplate.plate.setup import AttachedItem
 from bayesplate.workflow.prepare import prepare
 
 

@@ -19,6 +19,8 @@ from made_searches import (
     with_residual,
 )
 
+from bayesplate.board.attached import AttachedItem
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.folds import nested
 from bayesplate.diagnosis.forms import with_labels_exchanged
 from bayesplate.diagnosis.hypotheses import (
@@ -33,8 +35,6 @@ from bayesplate.diagnosis.hypotheses import (
 )
 from bayesplate.diagnosis.noise_grid import noise_grid
 from bayesplate.diagnosis.shifts import nothing, together
-from bayesplate.plate.setup import AttachedItem
-from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
 CLOSE_PAIR = [(0, 0), (1, 1), (0, 0), (0, 0), (1, 1), (0, 0)]

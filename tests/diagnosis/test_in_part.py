@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from made_searches import CERTAIN, bare, baseline, candidate, decided, ground_of
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis import claim
 from bayesplate.diagnosis.claim import named_in_part, nested_of
 from bayesplate.diagnosis.folds import Nested
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.noise_grid import noise_grid
 from bayesplate.diagnosis.search import PASSES, Found
-from bayesplate.quantities import Quantity
 
 N_MODES = 8
 SIZE = Quantity.from_median(1.0, 1.5)

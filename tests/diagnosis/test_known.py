@@ -10,6 +10,9 @@ from generator.boards import plant
 from generator.card import SHEAR_MEANS
 from scipy.stats import chi2
 
+from bayesplate.board.material import MODULI, RIGIDITIES, moduli
+from bayesplate.board.parameter import BOARD, Owner
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis import known
 from bayesplate.diagnosis.known import (
     every_combination,
@@ -24,9 +27,6 @@ from bayesplate.estimates.least_squares import log_measured, weighted_least_squa
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import system_of
-from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
-from bayesplate.plate.parameter import BOARD, Owner
-from bayesplate.quantities import Quantity
 from bayesplate.workflow.check import check
 from bayesplate.workflow.problem import Problem
 

@@ -10,6 +10,7 @@ from made_searches import HALF_NORMAL, bare, baseline, candidate, decided, groun
 from scipy.optimize import brentq
 from scipy.special import ndtr
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.entries import effect_entry
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.noise_grid import noise_grid
@@ -19,7 +20,6 @@ from bayesplate.diagnosis.sizes import at_limit
 from bayesplate.diagnosis.verdict import answers
 from bayesplate.effects import declare, effects_of
 from bayesplate.posterior.posing import pose
-from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
 NOISE = 0.005

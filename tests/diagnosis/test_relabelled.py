@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from made_boards import setup_of
 
+from bayesplate.board.board import made_board
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.told import relabelled_sentence
-from bayesplate.plate.board import made_board
-from bayesplate.quantities import Quantity
 
 FREE = {"x0": "free", "x1": "free", "y0": "free", "y1": "free"}
 INPUTS = {"thickness": Quantity.exact(3e-3)}

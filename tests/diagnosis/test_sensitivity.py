@@ -9,6 +9,7 @@ import pytest
 from made_searches import bare, baseline, candidate, ground_of, one_level, visible_of
 from scipy.stats import binom
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.constants import draw_constants
 from bayesplate.diagnosis.folds import ALWAYS, nested
 from bayesplate.diagnosis.hypotheses import Hypothesis
@@ -23,7 +24,6 @@ from bayesplate.diagnosis.null_control import (
 from bayesplate.diagnosis.search import Found, noise_of_board, search
 from bayesplate.diagnosis.sensitivity import under_exact_law, variants, varied
 from bayesplate.diagnosis.terms import Terms
-from bayesplate.quantities import Quantity
 
 
 @pytest.fixture

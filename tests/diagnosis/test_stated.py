@@ -11,15 +11,15 @@ from generator.boards import plant
 from scipy import stats
 
 from bayesplate import Board, Setup
-from bayesplate.cards import load_prior
+from bayesplate.board.attached import DeclaredFluid
+from bayesplate.board.prior import load_prior
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.baseline import Baseline, Spectrum
 from bayesplate.diagnosis.known import known_fit, stated_effects
 from bayesplate.diagnosis.stated import judge_stated, scores_given, stated_claims
 from bayesplate.diagnosis.told import stated_sentences
 from bayesplate.estimates.least_squares import log_measured
-from bayesplate.plate.setup import DeclaredFluid
 from bayesplate.posterior.posing import pose
-from bayesplate.quantities import Quantity
 from bayesplate.workflow.problem import Problem
 
 CENTS = np.log(2.0) / 1200.0

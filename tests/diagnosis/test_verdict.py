@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from made_searches import bare, baseline, candidate, decided, exchanged, ground_of, visible_of
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.hypotheses import RELABELLING, Hypothesis, Swap
 from bayesplate.diagnosis.noise_grid import noise_grid
 from bayesplate.diagnosis.null_control import NullControl
@@ -15,7 +16,6 @@ from bayesplate.diagnosis.search import PASSES, Found
 from bayesplate.diagnosis.shifts import nothing, together
 from bayesplate.diagnosis.sizes import at_limit, size_posterior
 from bayesplate.diagnosis.verdict import NOTHING_LEFT, alternatives, answers
-from bayesplate.quantities import Quantity
 
 WORDS = {"none needed", "named", "indistinguishable group", "unexplained", "undetectable"}
 NAMES = ("a", "b", "c")

@@ -17,13 +17,13 @@ from generator.known_boards import BEAMS, FIEMME, FINNISH, FREE
 from generator.plate import Plate
 from generator.plate import solve as solve_generator
 
+from bayesplate.board.attached import AttachedItem
+from bayesplate.board.quantity import Quantity
 from bayesplate.effects.attached_items import Item, base_diameter
 from bayesplate.effects.attached_mass import HEAVIEST_ROVING, AttachedMass
 from bayesplate.modes.line import line
 from bayesplate.modes.plate import plate_of
 from bayesplate.modes.thin import THIN
-from bayesplate.plate.setup import AttachedItem
-from bayesplate.quantities import Quantity
 
 MASS = "attached_mass.mass"
 AS_FREE = replace(ritz.FINNISH, edges=ALL_FREE)

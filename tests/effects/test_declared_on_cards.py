@@ -16,10 +16,10 @@ from generator.naming import Label, frequencies
 from generator.plate import FINE_SHEAR, Plate
 from generator.recipes import LIBRARY, RECIPES
 
+from bayesplate.board.board import Board
 from bayesplate.effects import EFFECTS
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import system_of
-from bayesplate.plate.board import Board
 from bayesplate.workflow.prepare import prepare
 
 Parameters = Mapping[str, Any]

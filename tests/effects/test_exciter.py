@@ -12,6 +12,8 @@ from generator.exciter import Exciter as GeneratorExciter
 from generator.known_boards import BEAMS, DRIVEN, FINNISH
 from generator.naming import frequencies
 
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading import Reading
 from bayesplate.effects.drives import Drive, Spot
 from bayesplate.effects.exciter import Exciter
 from bayesplate.effects.transverse_shear import TransverseShear
@@ -20,8 +22,6 @@ from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
 from bayesplate.modes.naming import find
-from bayesplate.plate.measured import Reading
-from bayesplate.quantities import Quantity
 
 COIL, MASS = 1.6e-3, 48e-3
 QUARTER, THIRD = (0.25, 0.25), (1.0 / 3.0, 1.0 / 3.0)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bayesplate.board.random_field import Surface
 from bayesplate.effects.field_looks import look
-from bayesplate.plate.random_field import Surface
 from bayesplate.workflow.prepare import prepare
 
 PLACES = {

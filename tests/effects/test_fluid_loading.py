@@ -13,12 +13,12 @@ from effect_plates import MADE, hertz_apart, modes_of, posed, setup_of, shifts
 from generator.known_boards import BEAMS, FIEMME, FINNISH, FREE
 from made_boards import board_of
 
+from bayesplate.board.attached import DeclaredFluid
+from bayesplate.board.quantity import Quantity
 from bayesplate.effects.fluid_loading import BAFFLES, DEFAULT_DENSITY, UNKNOWN_BAFFLE, FluidLoading
 from bayesplate.modes.air import air_mass
 from bayesplate.modes.line import line
-from bayesplate.plate.setup import DeclaredFluid
 from bayesplate.posterior.laplace import law_tolerance, worst_cents
-from bayesplate.quantities import Quantity
 
 OPEN = {"fluid_loading.density": 1.2, "fluid_loading.baffle": 0.0}
 WALL = {"fluid_loading.density": 1.2, "fluid_loading.baffle": 1.0}

@@ -11,15 +11,15 @@ from effect_plates import MADE, SHEAR, hertz, hertz_apart, modes_of, posed, setu
 from generator.known_boards import BEAMS, FINNISH, FREE
 from made_boards import board_of
 
+from bayesplate.board.attached import AttachedItem
+from bayesplate.board.quantity import Quantity
 from bayesplate.effects.attached_items import Item
 from bayesplate.effects.attached_mass import AttachedMass
 from bayesplate.effects.grain_angle import GrainAngle
 from bayesplate.effects.transverse_shear import TransverseShear
 from bayesplate.frequencies.system import System
 from bayesplate.modes.naming import find
-from bayesplate.plate.setup import AttachedItem
 from bayesplate.posterior.laplace import law_tolerance, worst_cents
-from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
 ANGLE = "grain_angle.angle"

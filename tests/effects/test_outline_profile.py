@@ -15,6 +15,11 @@ from generator.plate import FINE_SHEAR
 from generator.plate import solve as solve_generator
 from made_boards import board_of
 
+from bayesplate.board.attached import AttachedItem
+from bayesplate.board.board import density, vibrating_lengths
+from bayesplate.board.parameter import BOARD
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.random_field import Surface
 from bayesplate.effects.attached_items import Item
 from bayesplate.effects.attached_mass import AttachedMass
 from bayesplate.effects.field_components import FieldProfile
@@ -25,12 +30,7 @@ from bayesplate.effects.support_mass import SupportMass
 from bayesplate.effects.support_stiffness import SupportStiffness
 from bayesplate.effects.thickness_profile import ThicknessProfile
 from bayesplate.frequencies.residues import residues_of
-from bayesplate.plate.board import density, vibrating_lengths
-from bayesplate.plate.parameter import BOARD
-from bayesplate.plate.random_field import Surface
-from bayesplate.plate.setup import AttachedItem
 from bayesplate.posterior.laplace import worst_cents
-from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
 BENT = ((0.0, 0.3, 0.6, 1.0), (0.97, 1.02, 1.01, 1.0))

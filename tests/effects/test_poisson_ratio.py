@@ -11,13 +11,13 @@ from effect_plates import posed, setup_of, shifts, values_of
 from generator.known_boards import BEAMS, FIEMME, FINNISH
 from made_boards import board_of
 
+from bayesplate.board.material import moduli
+from bayesplate.board.quantity import Quantity
 from bayesplate.effects import declare
 from bayesplate.effects.poisson_ratio import FREE_POISSON, PoissonRatio
 from bayesplate.frequencies.system import System
 from bayesplate.modes.naming import find
-from bayesplate.plate.material import moduli
 from bayesplate.posterior.laplace import worst_cents
-from bayesplate.quantities import Quantity
 
 
 @pytest.mark.parametrize(

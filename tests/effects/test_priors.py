@@ -18,13 +18,12 @@ from effect_plates import SETUP, setup_of
 from generator.known_boards import FIEMME, FREE
 from made_boards import board_of
 
-from bayesplate.cards import read_board_text
+from bayesplate.board.attached import AttachedItem
+from bayesplate.board.board import Board
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.forms import forms
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.attached_items import item_on_board
-from bayesplate.plate.from_card import board_from_card
-from bayesplate.plate.setup import AttachedItem
-from bayesplate.quantities import Quantity
 
 HALF = (0.0, inf)
 ANY = (-inf, inf)
@@ -198,7 +197,7 @@ edges = {{ x0 = "{}", x1 = "free", y0 = "free", y1 = "free" }}
 
 @pytest.mark.parametrize(("edge", "median"), [("free", 0.003), ("supported", 0.003), ("clamped", 0.008)])
 def test_noise_and_poisson_ratio_of_a_card_that_states_neither(edge, median):
-    board = board_from_card(read_board_text(CARD.format(edge), "b"))
+    board = Board.from_text(CARD.format(edge), "b")
 
     assert same(board.setups[0].noise, "log-normal", median, 0.5, ANY)
     assert same(board.inputs["poisson_xy"], "normal", 0.4, 0.08, ANY)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from effect_plates import posed
 
+from bayesplate.board.attached import AttachedItem
 from bayesplate.frequencies.full import full_log_frequencies
 from bayesplate.frequencies.laws import cents
-from bayesplate.plate.setup import AttachedItem
 from bayesplate.posterior.laplace import law_tolerance, worst_cents
 
 N_FRESH = 6

@@ -11,10 +11,10 @@ from effect_plates import MADE, hertz_apart, modes_of
 from generator.known_boards import FIEMME, FINNISH, FREE
 from made_boards import board_of
 
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import DEFAULT_NOISE, Setup
 from bayesplate.effects import effect_faults, implied_effects
 from bayesplate.effects.support_stiffness import SupportStiffness
-from bayesplate.plate.setup import DEFAULT_NOISE, Setup
-from bayesplate.quantities import Quantity
 
 STIFFNESS = "support_stiffness.stiffness"
 EFFECT = SupportStiffness(MADE)

@@ -13,17 +13,17 @@ from generator.known_boards import BEAMS, FIEMME, FINNISH, FREE
 from generator.plate import solve as solve_generator
 from made_boards import board_of
 
+from bayesplate.board.board import density
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.random_field import Surface
 from bayesplate.effects.field_components import FieldProfile
 from bayesplate.effects.part import Part
 from bayesplate.effects.thickness_profile import ThicknessProfile
 from bayesplate.frequencies.full import full_log_frequencies
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.system import System
-from bayesplate.plate.board import density
-from bayesplate.plate.random_field import Surface
 from bayesplate.posterior.laplace import law_tolerance, worst_cents
 from bayesplate.posterior.posing import pose
-from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
 

@@ -17,12 +17,12 @@ from generator.plate import EDGES, Plate
 from generator.plate import solve as solve_generator
 
 import bayesplate.frequencies.system
+from bayesplate.board.attached import AttachedItem, DeclaredFluid
+from bayesplate.board.board import Board
+from bayesplate.board.quantity import Quantity
 from bayesplate.effects import EFFECTS, declare
 from bayesplate.frequencies.system import system_of
 from bayesplate.modes.solve import solve
-from bayesplate.plate.board import Board
-from bayesplate.plate.setup import AttachedItem, DeclaredFluid
-from bayesplate.quantities import Quantity
 
 PLATES = {
     "CFFF": FINNISH,

@@ -13,11 +13,11 @@ from generator.designs import CANTILEVER
 from generator.known_boards import BEAMS, DRIVEN, HALF_TOP, STEEL
 from generator.warp import Warp as GeneratorWarp
 
+from bayesplate.board.parameter import BOARD
+from bayesplate.board.quantity import Quantity
 from bayesplate.effects.thickness_profile import ThicknessProfile
 from bayesplate.effects.warp import Warp
 from bayesplate.modes.membrane import CURVATURES
-from bayesplate.plate.parameter import BOARD
-from bayesplate.quantities import Quantity
 
 SIZES = {
     (1e-3, 0.0, 0.0): [0.1, 30.3, 1.2, 0.0, 0.8, 10.8, 1.5, 0.9, 4.7],

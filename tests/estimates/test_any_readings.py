@@ -23,8 +23,8 @@ from bayesplate.estimates.refit import (
     normal_misfit,
     refit,
 )
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.modes.terms import Weights
-from bayesplate.plate.readings import ReadingErrors
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.posing import pose
 from bayesplate.workflow.prepare import prepare

@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bayesplate.cards import load_prior
-from bayesplate.cards.shelf import shelf_folder
+from bayesplate.board.attached import AttachedItem
+from bayesplate.board.prior import load_prior
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading import Peak
+from bayesplate.board.shelf import shelf_folder
 from bayesplate.errors import InputError
 from bayesplate.estimates.coefficients import coefficient_faults
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.estimates.paper import paper_system
 from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.labels import Label
-from bayesplate.plate.measured import Peak
-from bayesplate.plate.setup import AttachedItem
 from bayesplate.posterior.posing import pose
-from bayesplate.quantities import Quantity
 from bayesplate.results.references import references
 from bayesplate.workflow.prepare import prepare
 
@@ -78,7 +78,7 @@ def test_sensitivity_inverts_its_own_plate(estimates, effects):
 def test_a_table_beside_the_card_is_read_once_from_there(estimates, tmp_path, monkeypatch):
     """Wherever the program was started, and whatever becomes of the file; its numbers are those of the shipped one."""
     (shipped,) = prepare(FINNISH).card.setups
-    text = (shelf_folder("coefficients") / f"{shipped.published_coefficients}.toml").read_text(encoding="utf-8")
+    text = (shelf_folder("coefficients") / f"{shipped.published_coefficients.name}.toml").read_text(encoding="utf-8")
     table = tmp_path / "cards" / "mine.toml"
     table.parent.mkdir()
     table.write_text(text.replace('"paper-cantilever"', '"mine"'), encoding="utf-8")

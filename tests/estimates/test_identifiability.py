@@ -9,15 +9,15 @@ import pytest
 import ritz
 from made_boards import CANTILEVER_LABELS, board_of, peaks_of, setup_of
 
-from bayesplate.cards import load_prior
+from bayesplate.board.board import Board
+from bayesplate.board.material import RIGIDITIES
+from bayesplate.board.prior import load_prior
+from bayesplate.board.setup import Setup
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.identifiability import identifiability, remarks, require_identifiable, require_labels
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import RIGIDITIES
-from bayesplate.plate.setup import Setup
 from bayesplate.posterior.posing import pose
 from bayesplate.workflow.prepare import prepare
 

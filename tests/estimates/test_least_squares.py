@@ -13,12 +13,12 @@ from bars import meets
 from made_boards import CANTILEVER_LABELS, FREE_LABELS, board_of, models_at, setup_of, with_noise
 from scipy.optimize import least_squares
 
+from bayesplate.board.material import RIGIDITIES, moduli
+from bayesplate.board.quantity import Quantity
 from bayesplate.estimates import least_squares as estimates
 from bayesplate.estimates.least_squares import has_settled, log_measured, reading_scales, weighted_least_squares
 from bayesplate.modes.naming import Place
 from bayesplate.modes.terms import Parity
-from bayesplate.plate.material import RIGIDITIES, moduli
-from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
 

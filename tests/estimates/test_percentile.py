@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bayesplate.board.material import MODULI
+from bayesplate.board.quantity import Quantity
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.estimates.paper import PaperSystem, paper_system
 from bayesplate.estimates.percentile import MOST_MODES, percentile_estimate
 from bayesplate.labels import Label
-from bayesplate.plate.material import MODULI
-from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
 TABULATED_NU_YX = 0.51 * 0.716 / 10.7

@@ -10,7 +10,11 @@ import numpy as np
 import pytest
 import ritz
 
-from bayesplate.cards import PriorCard, card_names, load_board, load_prior
+from bayesplate.board.board import Board, density, made_board
+from bayesplate.board.parameter import BOARD
+from bayesplate.board.prior import PriorCard, load_prior
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.shelf import card_names
 from bayesplate.errors import InputError, NotIdentifiableError
 from bayesplate.estimates.plausibility import (
     _SLACK,
@@ -23,10 +27,6 @@ from bayesplate.estimates.plausibility import (
 )
 from bayesplate.estimates.unusual import HEAVIEST_FIBRES, LIGHTEST_WOOD, MOST_ORTHOTROPIC, unusual
 from bayesplate.labels import Label
-from bayesplate.plate.board import Board, density, made_board
-from bayesplate.plate.from_card import board_from_card
-from bayesplate.plate.parameter import BOARD
-from bayesplate.quantities import Quantity
 
 PRIORS = ("spruce", "weakly-informative")
 LABELS = made_boards.FREE_LABELS[:6]
@@ -37,7 +37,7 @@ SIDES = ("length_x", "length_y")
 
 def board_of(name: str, prior: str) -> Board:
     """A shipped board with its density stated: of a mass, wrong lengths would already give an impossible density."""
-    board = board_from_card(load_board(name), load_prior(prior))
+    board = Board.from_toml(name).assuming(load_prior(prior))
     if "mass" not in board.inputs:
         return board
     stated = Quantity.exact(float(density(board.nominal())))
@@ -76,7 +76,8 @@ def foretold(board: Board, prior: PriorCard, rng: np.random.Generator) -> PriorP
 
 
 @pytest.mark.parametrize(
-    "name", [name for name in card_names("boards") if name not in OTHERS and load_board(name).setups[0].frequencies_hz]
+    "name",
+    [name for name in card_names("boards") if name not in OTHERS and Board.from_toml(name).setups[0].readings],
 )
 @pytest.mark.parametrize("prior", PRIORS)
 def test_shipped_boards_are_asked_nothing_and_units_are_asked_about(name, prior):

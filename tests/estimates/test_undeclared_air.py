@@ -12,11 +12,11 @@ from generator.effects import FluidLoading
 from generator.known_boards import BEAMS, DRIVEN, HALF_TOP, STEEL
 from generator.naming import frequencies
 
+from bayesplate.board.attached import DeclaredFluid
+from bayesplate.board.material import moduli
 from bayesplate.effects import declare
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.estimates.undeclared_air import SMALLEST, air_sentence, rise_with_air
-from bayesplate.plate.material import moduli
-from bayesplate.plate.setup import DeclaredFluid
 
 PLATES = {"clamped": DRIVEN, "half-top": HALF_TOP}
 

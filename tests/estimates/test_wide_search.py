@@ -9,12 +9,12 @@ import pytest
 import ritz
 from made_boards import CANTILEVER_LABELS, board_of, peaks_of, setup_of
 
-from bayesplate.cards import load_prior
+from bayesplate.board.material import RIGIDITIES
+from bayesplate.board.prior import load_prior
 from bayesplate.estimates import wide_search
 from bayesplate.estimates.wide_search import NOISES, search_widely
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import system_of
-from bayesplate.plate.material import RIGIDITIES
 
 PLATE = ritz.FINNISH
 HERTZ = [*ritz.simulate(PLATE, CANTILEVER_LABELS).values()]

@@ -9,6 +9,7 @@ import pytest
 from made_campaigns import write_campaign
 
 import bayesplate
+from bayesplate.board.shelf import card_names
 
 ROOT = Path(__file__).parents[2]
 
@@ -34,7 +35,7 @@ def test_the_page_of_boards_with_one_sensor(example, tmp_path):
 
 
 def test_the_example_runs_the_shipped_campaign(example):
-    assert example.CAMPAIGN in bayesplate.cards.card_names("campaigns")
+    assert example.CAMPAIGN in card_names("campaigns")
 
 
 def test_other_commands_say_that_it_is_a_campaign():

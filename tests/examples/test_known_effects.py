@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from diagnoses import KNOWN
 
-from bayesplate.cards import card_names
+from bayesplate.board.shelf import card_names
 
 ROOT = Path(__file__).parents[2]
 

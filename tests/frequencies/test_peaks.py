@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading import Peak, Reading
+from bayesplate.board.setup import Setup
 from bayesplate.frequencies.model import OtherMode
 from bayesplate.frequencies.peaks import PeakLikelihood, takes_part
 from bayesplate.frequencies.residues import NODAL_LINE, share_seen, sign_probabilities
 from bayesplate.modes.naming import Place
 from bayesplate.modes.terms import Parity
-from bayesplate.plate.measured import Peak, Reading
-from bayesplate.plate.setup import Setup
-from bayesplate.quantities import Quantity
 
 NOISE = np.array([0.01, 0.03, 0.002])
 PLACE = Place(Parity(0, 0), 0, 1.0)

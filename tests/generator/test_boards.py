@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bayesplate.cards import physical_faults, read_board_text
+from bayesplate.board.board import Board
+from bayesplate.board.checks import physical_faults
 from generator.__main__ import main
 from generator.boards import plant
 from generator.card import told
@@ -35,7 +36,7 @@ def test_every_effect_of_a_design_moves_its_labelled_modes(design, rng: np.rando
     for effect in (*design.drawn, *design.drawn_outside):
         board = plant(rng, design, [effect])
         shifts = np.array([cents for setup in board.shifts().values() for cents in setup.values()])
-        card = read_board_text(board.card_text(), "planted.toml")
+        card = Board.from_text(board.card_text(), "planted.toml")
 
         assert list(board.truth.effects) == [effect]
         assert board.truth.is_in_library == (effect not in OUTSIDE)
@@ -108,7 +109,7 @@ def test_rounded_readings_are_stated_and_can_be_told_apart(rng: np.random.Genera
         assert tomllib.loads(card)["setup"][0]["resolution_hz"] == 8
         assert all(hz % 8.0 == 0.0 for hz in read.values())
         assert all(abs(hz - exact[label]) < 4.0 + 0.02 * exact[label] for label, hz in read.items())
-        assert not list(physical_faults(read_board_text(card, "planted.toml")))
+        assert not list(physical_faults(Board.from_text(card, "planted.toml")))
     assert max(draws) > 1
 
 
@@ -209,7 +210,7 @@ def test_warp_and_exciter_of_every_design(design, effect: str) -> None:
     if effect == "exciter":
         (x, y), attached = boards[0].truth.effects["exciter"]["places"][0], card["setup"][0]["attached"]
         assert attached == [{"kind": "exciter", "at_mm": pytest.approx([1e3 * x, 1e3 * y], rel=1e-5)}]
-    assert not list(physical_faults(read_board_text(boards[0].card_text(), "planted.toml")))
+    assert not list(physical_faults(Board.from_text(boards[0].card_text(), "planted.toml")))
 
 
 def test_card_states_what_scales_and_a_straightedge_say(rng: np.random.Generator) -> None:
@@ -236,7 +237,7 @@ def test_card_states_what_scales_and_a_straightedge_say(rng: np.random.Generator
     }
     assert len(exciter["at_mm"]) == len(sensor["at_mm"]) == 2
     assert card["setup"][0]["fluid"] == {"density_kg_m3": 1.2, "baffle": "none"}
-    assert not list(physical_faults(read_board_text(text, "planted.toml")))
+    assert not list(physical_faults(Board.from_text(text, "planted.toml")))
     somewhere = plant(rng, "clamped-9", ["exciter"], places_known=False)
     (only,) = tomllib.loads(somewhere.card_text(told(somewhere.truth.effects)))["setup"][0]["attached"]
     assert "at_mm" not in only

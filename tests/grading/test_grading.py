@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bayesplate.board.material import derived_quantities, moduli
 from bayesplate.grading.boards import BoardRow
 from bayesplate.grading.figures import FIGURES, box_probability, target_thickness, triangle
 from bayesplate.grading.matching import GradingRequest, grade, proposed_pairs
 from bayesplate.grading.tables import MOST_ON_TERMINAL, doubts_sentence, grading_tables, write_grading
-from bayesplate.plate.material import derived_quantities, moduli
 from bayesplate.results.contract import JOINT, Joint
 
 INF = np.inf

@@ -17,6 +17,7 @@ from generator.naming import correlations, named
 from generator.plate import Plate
 from generator.plate import solve as generated
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.effects.drives import Drive
 from bayesplate.effects.exciter import Exciter
 from bayesplate.effects.fluid_loading import FluidLoading
@@ -27,7 +28,6 @@ from bayesplate.modes.naming import CERTAIN, beam_parts, find, fits, name_modes
 from bayesplate.modes.solve import solve
 from bayesplate.modes.terms import Weights
 from bayesplate.modes.thin import thin_plate
-from bayesplate.quantities import Quantity
 
 # Beam products in the order of the frequencies, (0, 0) the lowest beam function of each side.
 ORDER = {

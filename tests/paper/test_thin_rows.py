@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import ritz
 
+from bayesplate.board.material import rigidities
+from bayesplate.board.setup import CLAMPED_NOISE, Setup
 from bayesplate.frequencies.terms import paper_coefficients, term_weights
 from bayesplate.modes.mesh import mesh
 from bayesplate.modes.naming import find
 from bayesplate.modes.thin import thin_plate
-from bayesplate.plate.material import rigidities
-from bayesplate.plate.setup import CLAMPED_NOISE, Setup
 
 NU = 0.51
 CANTILEVER = Setup("cantilever", ("clamped", "free"), ("free", "free"), (), CLAMPED_NOISE, first_label=(1, 0))

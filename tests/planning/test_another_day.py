@@ -10,16 +10,16 @@ import pytest
 import ritz
 from made_boards import CANTILEVER_LABELS, setup_of
 
+from bayesplate.board.parameter import Owner
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.sessions import shared_share
+from bayesplate.board.setup import DEFAULT_NOISE
 from bayesplate.diagnosis.hypotheses import Swap
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.planning.beliefs import AtHand, Explanation
 from bayesplate.planning.explained import _at_hand
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.modes_read import REPEATED, _expected, given_first
-from bayesplate.plate.parameter import Owner
-from bayesplate.plate.readings import ReadingErrors
-from bayesplate.plate.sessions import shared_share
-from bayesplate.plate.setup import DEFAULT_NOISE
-from bayesplate.quantities import Quantity
 
 HERTZ = dict(zip(CANTILEVER_LABELS, (50.0, 98.0, 310.0, 340.0, 480.0, 700.0), strict=True))
 SETUP = setup_of(ritz.CANTILEVER, HERTZ, resolution=1.0, noise=Quantity.from_median(0.004, 1.6))

@@ -9,13 +9,13 @@ import made_searches as made
 import numpy as np
 import pytest
 
+from bayesplate.board.material import RIGIDITIES
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.noise_grid import noise_grid
 from bayesplate.diagnosis.search import search
 from bayesplate.planning.beliefs import Beliefs
 from bayesplate.planning.explained import asked, explanations_of, survivors
 from bayesplate.planning.gains import Readings, probabilities_after
-from bayesplate.plate.material import RIGIDITIES
 
 N_READ, N_MODES = 6, 9
 NAMES = ("first", "second")

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bayesplate.board.material import MODULI, ORTHOTROPIC
 from bayesplate.planning.beliefs import Beliefs, Explanation
 from bayesplate.planning.gains import GOALS, Readings, expected_gain, probabilities_after, together
-from bayesplate.plate.material import MODULI, ORTHOTROPIC
 
 SIGMA = 0.3
 

@@ -7,11 +7,11 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from bayesplate.board.material import ORTHOTROPIC
 from bayesplate.planning.beliefs import Beliefs, Explanation
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.plan import ProposalEntry
 from bayesplate.planning.proposals import Planner, Proposal
-from bayesplate.plate.material import ORTHOTROPIC
 
 NOW = Explanation(
     members=(), words="made", probability=1.0, mean=np.zeros((1, 3)), covariance=np.eye(3)[None],

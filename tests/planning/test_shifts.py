@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.planning import shifts as home
 from bayesplate.planning.beliefs import Explanation, FormTerms
-from bayesplate.quantities import Quantity
 
 N_TERMS = 12
 LINEAR, SQUARE = np.array([[0.02, -0.01], [0.003, 0.004]]), np.array([[0.001, 0.002], [-0.001, 0.0]])

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from made_boards import setup_of
 
+from bayesplate.board.board import made_board
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.random_field import THICKNESS, PlacedReadings, Surface, conditioned, sd_after
 from bayesplate.planning.sizes_read import GRID, MORE, measurements
-from bayesplate.plate.board import made_board
-from bayesplate.plate.random_field import THICKNESS, PlacedReadings, Surface, conditioned, sd_after
-from bayesplate.quantities import Quantity
 
 FREE = dict.fromkeys(("x0", "x1", "y0", "y1"), "free")
 

@@ -11,18 +11,18 @@ from generator.naming import frequencies
 from generator.plate import Plate
 from made_boards import setup_of
 
-from bayesplate.cards import load_prior
+from bayesplate.board.attached import AttachedItem
+from bayesplate.board.board import made_board
+from bayesplate.board.material import rigidities
+from bayesplate.board.prior import load_prior
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.sessions import unknown_discrepancies, with_discrepancies
 from bayesplate.planning.beliefs import KnownBoard
 from bayesplate.planning.bench import bench_of
 from bayesplate.planning.laws import PLACED, SolvedStation, bare_law, known_mass
 from bayesplate.planning.modes_read import station_readings
 from bayesplate.planning.stations import new_stations, old_stations
 from bayesplate.planning.unmeasured import prior_beliefs
-from bayesplate.plate.board import made_board
-from bayesplate.plate.material import rigidities
-from bayesplate.plate.sessions import unknown_discrepancies, with_discrepancies
-from bayesplate.plate.setup import AttachedItem
-from bayesplate.quantities import Quantity
 
 FREE, CLAMPED = (dict.fromkeys(("x0", "x1", "y0", "y1"), word) for word in ("free", "clamped"))
 READ = ((1, 1), (2, 0), (2, 1), (0, 2))

@@ -7,11 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bayesplate.board.material import ORTHOTROPIC
 from bayesplate.planning import together as home
 from bayesplate.planning.beliefs import KnownBoard
 from bayesplate.planning.gains import Readings, expected_gain
 from bayesplate.planning.together import _further, _joined, _Linear
-from bayesplate.plate.material import ORTHOTROPIC
 
 SD = 0.5
 NAMES = ("one", "two")

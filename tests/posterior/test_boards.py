@@ -10,23 +10,23 @@ import ritz
 from made_boards import CANTILEVER_LABELS, FREE_LABELS, NARROW, board_of, setup_of, with_noise
 from scipy import optimize, stats
 
-from bayesplate.cards import load_prior
+from bayesplate.board.board import density, vibrating_lengths
+from bayesplate.board.material import MODULI, moduli
+from bayesplate.board.prior import load_prior
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import CLAMPED_NOISE, DEFAULT_NOISE
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.estimates.leave_one_out import prediction_errors
 from bayesplate.estimates.paper import paper_system
 from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.estimates.refit import normal_misfit
 from bayesplate.frequencies.laws import cents
-from bayesplate.plate.board import density, vibrating_lengths
-from bayesplate.plate.material import MODULI, moduli
-from bayesplate.plate.setup import CLAMPED_NOISE, DEFAULT_NOISE
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.mode_errors import mode_errors
 from bayesplate.posterior.posing import pose
 from bayesplate.posterior.sampling import SamplerSettings
-from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
 PAPER = {

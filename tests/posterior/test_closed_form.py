@@ -11,11 +11,11 @@ from conjugate import NOISE, conjugate, rigidity_prior, sampled, stated
 from made_boards import CANTILEVER_LABELS, board_of, setup_of, with_noise
 from normal_case import NormalCase, differences, draws_of
 
-from bayesplate.cards import load_prior
+from bayesplate.board.prior import load_prior
+from bayesplate.board.quantity import Quantity
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import pose
 from bayesplate.posterior.sampling import SamplerSettings
-from bayesplate.quantities import Quantity
 
 
 @pytest.fixture(scope="module")

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from runs import fit
 
-from bayesplate.cards import StatedPrior, load_prior
-from bayesplate.cards.shelf import shelf_folder
+from bayesplate.board.prior import StatedPrior, load_prior
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.shelf import shelf_folder
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.posterior.contradictions import require_possible_noise
 from bayesplate.posterior.posing import pose
-from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
 BOARD = "fiemme-spruce-clamped"

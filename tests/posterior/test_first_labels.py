@@ -9,13 +9,13 @@ import pytest
 import ritz
 from made_boards import board_of, setup_of, with_noise
 
-from bayesplate.cards import load_prior
+from bayesplate.board.prior import load_prior
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading import Peak
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.labels import Label
-from bayesplate.plate.measured import Peak
 from bayesplate.posterior import first_labels
 from bayesplate.posterior.first_labels import Way, only_way, probable_ways, propose_labels
-from bayesplate.quantities import Quantity
 
 LABELS = ((1, 1), (2, 0), (2, 1), (0, 2), (1, 2), (3, 0), (3, 1), (2, 2), (3, 2), (4, 0))
 HERTZ = ritz.simulate(ritz.FREE_SPRUCE, LABELS)

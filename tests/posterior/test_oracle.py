@@ -19,8 +19,8 @@ from scipy import stats
 from scipy.special import ndtr
 from statistics_checks import Truth, differences, differences_from_normal
 
+from bayesplate.board.prior import load_prior
 from bayesplate.campaigns.evidence import bridge_sampling
-from bayesplate.cards import load_prior
 from bayesplate.posterior.posing import pose
 
 THINNING_LOSS = 0.9

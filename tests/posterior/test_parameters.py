@@ -8,8 +8,8 @@ import ritz
 from made_boards import CANTILEVER_LABELS, board_of, setup_of
 from scipy import stats
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.posterior.parameters import Parameters
-from bayesplate.quantities import Quantity
 
 CLAMPED = {"x0": Quantity.from_mean(0.030, 0.0005)}
 

@@ -10,14 +10,14 @@ import ritz
 from made_boards import CANTILEVER_LABELS, board_of, setup_of
 from scipy import stats
 
-from bayesplate.cards import load_prior
+from bayesplate.board.prior import load_prior
+from bayesplate.board.quantity import Quantity
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import pose
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.posterior.target import Posterior
 from bayesplate.posterior.thinning import thin_walker_major
-from bayesplate.quantities import Quantity
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

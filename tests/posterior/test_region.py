@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bayesplate.board.material import RIGIDITIES
+from bayesplate.board.quantity import Quantity
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.estimates.refit import refit
 from bayesplate.frequencies.full import full_log_frequencies
 from bayesplate.frequencies.laws import ExactLaw, cents
-from bayesplate.plate.material import RIGIDITIES
-from bayesplate.plate.readings import reading_sd
+from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.posterior import laplace
 from bayesplate.posterior.laplace import law_tolerance, linearisation_errors, noise_widenings, predictor, worst_cents
 from bayesplate.posterior.posing import pose
-from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
 N_FRESH = 12

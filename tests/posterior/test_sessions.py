@@ -11,7 +11,13 @@ import ritz
 from made_boards import CANTILEVER_LABELS, NARROW, board_of, models_at, peaks_of, setup_of
 from normal_case import NormalCase, differences, draws_of
 
-from bayesplate.cards import load_prior
+from bayesplate.board.attached import AttachedItem, DeclaredFluid
+from bayesplate.board.board import Board, made_board
+from bayesplate.board.parameter import BOARD
+from bayesplate.board.prior import load_prior
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.sessions import discrepancy_names, sessions, with_discrepancies
+from bayesplate.board.setup import DEFAULT_NOISE
 from bayesplate.diagnosis import baseline as home
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.forms import forms
@@ -23,14 +29,9 @@ from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import OtherMode
 from bayesplate.modes.naming import Place
 from bayesplate.modes.terms import Parity
-from bayesplate.plate.board import Board, made_board
-from bayesplate.plate.parameter import BOARD
-from bayesplate.plate.sessions import discrepancy_names, sessions, with_discrepancies
-from bayesplate.plate.setup import DEFAULT_NOISE, AttachedItem, DeclaredFluid
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.sampling import SamplerSettings
-from bayesplate.quantities import Quantity
 
 SCATTER, DISCREPANCY, N_SESSIONS, N_BOARDS = 0.003, 0.006, 4, 400
 SCALE = "discrepancy[day 1 to day 4]"
@@ -73,7 +74,7 @@ def test_setups_that_hold_and_load_the_board_alike_are_sessions():
     assert found.inputs["discrepancy[one to third day]"] == DEFAULT_NOISE
     assert len(found.parameters) == len(made.parameters) + 1 + len(CANTILEVER_LABELS)
     assert with_discrepancies(found) == found
-    assert found.to_card() == made.to_card()
+    assert found.to_toml() == made.to_toml()
     alone = board_of(ritz.FINNISH, [one, *others[1:6]])
     assert with_discrepancies(alone) == alone
 

@@ -11,12 +11,12 @@ import pytest
 import ritz
 from scipy import stats
 
-from bayesplate.cards import load_prior
-from bayesplate.plate.board import Board
+from bayesplate.board.board import Board
+from bayesplate.board.prior import load_prior
+from bayesplate.board.quantity import Quantity
 from bayesplate.posterior import slips
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.slips import LARGE_NOISE, RARITY, Readings, noise_remarks, reading_remarks
-from bayesplate.quantities import Quantity
 
 PLATE = ritz.Plate.from_moduli(11e9, 0.95e9, 0.67e9, 0.4, rho=406.0, h=2.8e-3, L_x=0.55, L_y=0.2, edges=ritz.ALL_FREE)
 NOISE = 0.003

@@ -10,13 +10,13 @@ import pytest
 
 import bayesplate.frequencies.spectrum
 import bayesplate.posterior.assessment
-from bayesplate.cards import load_prior
+from bayesplate.board.material import MODULI, RIGIDITIES
+from bayesplate.board.prior import load_prior
 from bayesplate.estimates.identifiability import Identifiability, remarks
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.spectrum import sign_conflicts, spectrum
 from bayesplate.frequencies.system import system_of
 from bayesplate.labels import Label
-from bayesplate.plate.material import MODULI, RIGIDITIES
 from bayesplate.posterior.assessment import assess as assessed
 from bayesplate.posterior.convergence import assess
 from bayesplate.posterior.draws import named_draws

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from statistics_checks import furthest
 
+from bayesplate.board.material import RIGIDITIES
 from bayesplate.frequencies.laws import cents
-from bayesplate.plate.material import RIGIDITIES
 from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.draws import named_draws
 from bayesplate.posterior.inference import infer

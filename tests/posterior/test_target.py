@@ -10,14 +10,14 @@ import ritz
 from made_boards import CANTILEVER_LABELS, FREE_LABELS, board_of, models_at, setup_of, swapped, with_noise
 from scipy import stats
 
-from bayesplate.cards import StatedPrior, load_prior
+from bayesplate.board.material import moduli
+from bayesplate.board.parameter import BOARD
+from bayesplate.board.prior import StatedPrior, load_prior
+from bayesplate.board.quantity import Quantity
 from bayesplate.estimates.identifiability import identifiability
 from bayesplate.estimates.least_squares import weighted_least_squares
-from bayesplate.plate.material import moduli
-from bayesplate.plate.parameter import BOARD
 from bayesplate.posterior.posing import pose
 from bayesplate.posterior.target import Posterior
-from bayesplate.quantities import Quantity
 
 EXACT = 1e-10
 """Relative, of frequencies and estimates; the eigenvalues themselves are good to some 1e-12."""

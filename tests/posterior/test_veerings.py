@@ -15,7 +15,7 @@ from calibration.truths import Design, draw_truth, make_problem
 from scipy import stats
 from scipy.optimize import minimize
 
-from bayesplate.cards import load_prior
+from bayesplate.board.prior import load_prior
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.assessment import labels_contradicted
 from bayesplate.posterior.posing import PosedProblem, pose

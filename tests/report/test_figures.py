@@ -13,10 +13,10 @@ from made_isotropic import steel
 from made_reports import fitted
 from made_summaries import spread
 
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading import Peak
 from bayesplate.estimates.sheet import sheet
 from bayesplate.frequencies.system import system_of
-from bayesplate.plate.measured import Peak
-from bayesplate.quantities import Quantity
 from bayesplate.report.board import board_picture
 from bayesplate.report.chladni import chladni_sheet
 from bayesplate.report.constants import modulus_title, percentiles_pictures

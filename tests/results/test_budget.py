@@ -9,8 +9,8 @@ import pytest
 import ritz
 from made_boards import CANTILEVER_LABELS, board_of, setup_of
 
-from bayesplate.plate.sessions import with_discrepancies
-from bayesplate.quantities import Quantity
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.sessions import with_discrepancies
 from bayesplate.results.budget import budget, input_remarks, input_shares, row_words
 from bayesplate.workflow.prepare import prepare
 

@@ -15,8 +15,8 @@ from made_boards import setup_of
 from made_reports import fitted
 from made_summaries import SUMMARY
 
-from bayesplate.plate.readings import ReadingErrors
-from bayesplate.quantities import Quantity
+from bayesplate.board.quantity import Quantity
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.report.content import summary_sentences
 from bayesplate.results.contract import json_text
 from bayesplate.results.modes import mode_rows

@@ -15,8 +15,7 @@ import bayesplate
 PACKAGE = Path(bayesplate.__file__).parent
 
 ROAD = (
-    "cards",
-    "plate",
+    "board",
     "modes",
     "effects",
     "frequencies",
@@ -30,7 +29,7 @@ ROAD = (
     "report",
 )
 """Each room sees the rooms before it."""
-OPEN_TO_ALL = {"errors", "files", "locks", "quantities", "labels", "libraries", "streams"}
+OPEN_TO_ALL = {"errors", "files", "locks", "labels", "libraries", "streams"}
 ROOMS = {
     **{room: {*ROAD[: i + 1], *OPEN_TO_ALL} for i, room in enumerate(ROAD)},
     "recordings": {"recordings", "modes", *OPEN_TO_ALL},
@@ -239,18 +238,18 @@ def test_every_file_of_the_package_is_read():
     """The rules would hold for an empty list of files as well."""
     read = {path.relative_to(PACKAGE).parts[0] for path in PACKAGE.rglob("*.py")}
 
-    assert {"cards", "plate", "modes", "frequencies", "errors.py", "labels.py", "quantities.py"} <= read
+    assert {"board", "modes", "frequencies", "errors.py", "labels.py"} <= read
 
 
 BAD_FILES = [
-    ("plate/bad.py", "from bayesplate.modes.terms import Weights", "plate imports modes"),
-    ("plate/bad.py", "from bayesplate import modes", "plate imports modes"),
-    ("plate/bad.py", "import bayesplate.modes.plate", "plate imports modes"),
-    ("cards/bad.py", "def f():\n    from bayesplate.plate.board import Board", "cards imports plate"),
+    ("board/bad.py", "from bayesplate.modes.terms import Weights", "board imports modes"),
+    ("board/bad.py", "from bayesplate import modes", "board imports modes"),
+    ("board/bad.py", "import bayesplate.modes.plate", "board imports modes"),
+    ("board/bad.py", "def f():\n    from bayesplate.effects import declare", "board imports effects"),
     ("modes/bad.py", "import importlib\nimportlib.import_module('bayesplate.report.page')", "modes imports report"),
     ("diagnosis/words.py", "from bayesplate.campaigns.shared import Shared", "diagnosis imports campaigns"),
     ("campaigns/bad.py", "from bayesplate.report.page import policy", "campaigns imports report"),
-    ("recordings/bad.py", "from bayesplate.plate.board import Board", "recordings imports plate"),
+    ("recordings/bad.py", "from bayesplate.board.board import Board", "recordings imports board"),
     ("posterior/bad.py", "from bayesplate.workflow.fit import fit", "posterior imports workflow"),
     ("modes/bad.py", "def f():\n    from bayesplate.workflow.modes import modes", "modes imports workflow"),
     ("modes/__init__.py", "from bayesplate.workflow.modes import modes", "modes imports workflow"),
@@ -258,7 +257,7 @@ BAD_FILES = [
     ("terminal.py", "from bayesplate.cli import main", "terminal imports cli"),
     ("workflow/bad.py", "from bayesplate.terminal import reporting", "workflow imports terminal"),
     ("batch.py", "from bayesplate.cli import main", "batch imports cli"),
-    ("errors.py", "from bayesplate.cards.board import BoardCard", "errors imports cards"),
+    ("errors.py", "from bayesplate.board.board import Board", "errors imports board"),
     ("gadgets/bad.py", "", "stands in no known room: gadgets"),
     ("diagnosis/bad.py", "", "stands in no known part of diagnosis"),
     ("diagnosis/gadgets/bad.py", "", "stands in no known part of diagnosis"),
@@ -300,7 +299,7 @@ BAD_FILES = [
     ("results/bad.py", "import bayesplate.modes.solve", "results takes bayesplate.modes.solve from modes"),
     ("results/bad.py", "import numpy as np\nnp.load('x', allow_pickle=True)", "allows pickles"),
     *(
-        ("cards/bad.py", f"import os, pathlib\n{call}", "writes a file by itself: bayesplate.files does")
+        ("board/bad.py", f"import os, pathlib\n{call}", "writes a file by itself: bayesplate.files does")
         for call in (
             "pathlib.Path('x').write_text('')",
             "pathlib.Path('x').write_bytes(b'')",
@@ -309,8 +308,8 @@ BAD_FILES = [
             "os.replace('x', 'y')",
         )
     ),
-    ("cards/bad.py", "x = eval('1')", "calls eval"),
-    ("cards/bad.py", "exec('x = 1')", "calls exec"),
+    ("board/bad.py", "x = eval('1')", "calls eval"),
+    ("board/bad.py", "exec('x = 1')", "calls exec"),
     ("modes/bad.py", "import numpy as np\nnp.random.seed(1)", "uses the global random state: seed"),
     ("modes/bad.py", "from numpy.random import normal", "uses the global random state: normal"),
     ("modes/bad.py", "import importlib\nimportlib.import_module('em' + 'cee')", "imports a module of a computed name"),

@@ -10,11 +10,11 @@ from generator.boards import PlantedBoard
 from generator.designs import POISSON, Design
 from numpy.typing import NDArray
 
+from bayesplate.board.material import rigidities
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.search import Found
 from bayesplate.diagnosis.sizes import size_posterior
 from bayesplate.diagnosis.verdict import Verdict
-from bayesplate.plate.material import rigidities
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 Read = Callable[[Mapping[str, Any], float, float], float]

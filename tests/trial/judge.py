@@ -16,13 +16,13 @@ from trial.amplitudes import recovered
 from trial.cells import KINDS, SENSORS, Cell
 from trial.shared import control_of, ground_of, shared_law
 
+from bayesplate.board.material import MODULI
 from bayesplate.diagnosis.claim import judge_claim, named_in_part, nested_of
 from bayesplate.diagnosis.constants import Constants, draw_constants
 from bayesplate.diagnosis.null_control import NullControl
 from bayesplate.diagnosis.search import Found, search
 from bayesplate.diagnosis.verdict import Verdict, alternatives, answers, decide
 from bayesplate.errors import BayesplateError
-from bayesplate.plate.material import MODULI
 
 Record = dict[str, Any]
 

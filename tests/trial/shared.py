@@ -20,6 +20,8 @@ from made_baselines import baseline_at
 from numpy.typing import NDArray
 from trial.cells import KINDS, SENSORS, UNKNOWN, Setting
 
+from bayesplate.board.board import Board
+from bayesplate.board.material import RIGIDITIES
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.forms import Form, forms
 from bayesplate.diagnosis.laws import FormLaw, form_law
@@ -29,8 +31,6 @@ from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.refit import Predict
 from bayesplate.frequencies.laws import ExactLaw
 from bayesplate.frequencies.model import SetupModel
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import RIGIDITIES
 from bayesplate.posterior.laplace import exact_models
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.workflow.prepare import prepare

@@ -12,7 +12,7 @@ import pytest
 import runs
 
 import bayesplate
-from bayesplate.cards.shelf import shelf_folder
+from bayesplate.board.shelf import shelf_folder
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import SamplerSettings
 

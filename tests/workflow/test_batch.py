@@ -26,7 +26,9 @@ from made_summaries import SUMMARY
 from runs import files_in
 
 import bayesplate
-from bayesplate.cards import load_named, load_prior, read_board_text
+from bayesplate.board.board import Board
+from bayesplate.board.named import load_named
+from bayesplate.board.prior import load_prior
 from bayesplate.cli import main
 from bayesplate.errors import BatchError, CheckpointError, InputError
 from bayesplate.results.contract import json_text
@@ -46,7 +48,7 @@ def rows_of(table: bytes) -> dict[str, dict[str, str]]:
 def cards(tmp_path_factory) -> Path:
     """Three boards, two bad cards, and a prior card beside them."""
     folder = write_cards(tmp_path_factory.mktemp("cards") / "tops")
-    (folder / "own-prior.toml").write_text(load_prior("spruce").to_card().replace('"spruce"', '"own-prior"'))
+    (folder / "own-prior.toml").write_text(load_prior("spruce").to_toml().replace('"spruce"', '"own-prior"'))
     return folder
 
 
@@ -115,7 +117,7 @@ def test_one_board_is_a_pure_function_that_travels(two, one):
     """What the table says of a board, and its files, are what `fit_board` gives with its seed; nothing is changed by
     the way to another process."""
     row = rows_of(two.table.read_bytes())["b"]
-    board, prior = read_board_text(card_text("b", 1.01), "b"), load_prior("weakly-informative")
+    board, prior = Board.from_text(card_text("b", 1.01), "b"), load_prior("weakly-informative")
     with pytest.raises(InputError, match="request tables clamped: wanted the published coefficients"):
         bayesplate.fit_board(board, prior)
     request = bayesplate.FitRequest(seed=int(row["seed"]), tables=load_named(board).tables)
@@ -312,12 +314,13 @@ def test_a_row_is_the_card_that_the_template_and_its_cells_make(table):
     boards = boards_of(table, table.parent / "template.toml")
     one, two = (boards.card(at) for at, name in enumerate(boards.names) if name in ("top-1", "top-2"))
 
-    assert (one.plate.mass_g.mean, one.plate.mass_g.sd, one.plate.density_kg_m3) == (300.0, 2.0, None)
-    assert one.plate.thickness_mm.mean == 3.1
-    assert [str(label) for label in one.setups[0].frequencies_hz] == ["(0,0)", "(0,1)", "(1,0)", "(1,1)", "(0,2)"]
-    assert two.plate.thickness_mm.readings == (2.9, 3.0, 3.1)
-    assert two.plate.density_kg_m3.mean == 399.0
-    assert len(two.setups[0].frequencies_hz) == 4
+    assert (one.inputs["mass"].mean, one.inputs["mass"].sd) == (0.3, 0.002)
+    assert "density" not in one.inputs
+    assert one.inputs["thickness"].mean == pytest.approx(3.1e-3)
+    assert [str(label) for label in one.setups[0].labels] == ["(0,0)", "(0,1)", "(1,0)", "(1,1)", "(0,2)"]
+    assert two.inputs["thickness"].readings == pytest.approx((2.9e-3, 3.0e-3, 3.1e-3))
+    assert two.inputs["density"].mean == 399.0
+    assert len(two.setups[0].labels) == 4
 
 
 def test_two_boards_of_one_name_have_two_rows_and_one_line_whether_begun_or_gone_on_with(table, tmp_path):

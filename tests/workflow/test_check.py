@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 from runs import read_json
 
 import bayesplate
-from bayesplate.cards import card_names
+from bayesplate.board.shelf import card_names
 from bayesplate.cli import main
 from bayesplate.results.contract import as_json
 

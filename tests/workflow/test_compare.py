@@ -8,10 +8,10 @@ import pytest
 import runs
 from click.testing import CliRunner
 
+from bayesplate.board.reading import Peak
 from bayesplate.cli import main
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.laws import cents
-from bayesplate.plate.measured import Peak
 from bayesplate.results.contract import as_json
 from bayesplate.workflow.compare import compare
 from bayesplate.workflow.prepare import prepare

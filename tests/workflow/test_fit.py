@@ -13,8 +13,9 @@ import ritz
 from runs import Run, read_json
 
 import bayesplate
-from bayesplate.cards import card_names, load_board, load_prior
-from bayesplate.plate.from_card import board_from_card
+from bayesplate.board.board import Board
+from bayesplate.board.prior import load_prior
+from bayesplate.board.shelf import shelf_folder
 from bayesplate.results.contract import as_json
 
 QUANTILES = ("q05", "q25", "q50", "q75", "q95")
@@ -96,7 +97,7 @@ def test_the_paper_s_own_constants_lie_in_the_posterior(summaries):
 
 def test_the_summary_is_strict_json_that_names_what_was_run(fiemme, summaries):
     summary = summaries["fiemme"]
-    card = load_board("fiemme-spruce-clamped")
+    card = Board.from_toml("fiemme-spruce-clamped")
 
     assert _text(fiemme).endswith("}\n")
     assert summary == as_json(fiemme.summary)
@@ -170,8 +171,7 @@ def test_the_archive_of_a_board_with_peaks_holds_what_each_factor_says(free):
 
 def test_peaks_narrow_the_constants(tmp_path):
     """Sixteen peaks in place of nine labels: at the expected noise the constants are known better."""
-    (shipped,) = (load_board(name).path for name in card_names("boards") if name == "spruce-free-2R")
-    assert shipped is not None
+    shipped = shelf_folder("boards") / "spruce-free-2R.toml"
     text = shipped.read_text(encoding="utf-8")
     without = tmp_path / "spruce-free-2R.toml"
     without.write_text(re.sub(r"\[\[setup\.peaks\]\]\n(.+\n)+", "", text), encoding="utf-8")
@@ -237,10 +237,10 @@ def test_predictions_are_rounded_as_the_readings_are(archive):
 
 
 def test_the_attributes_hold_card_priors_versions_and_seed(archive, summaries):
-    card = load_board("fiemme-spruce-clamped")
-    assert card.path is not None
+    card = Board.from_toml("fiemme-spruce-clamped")
+    file = shelf_folder("boards") / "fiemme-spruce-clamped.toml"
 
-    assert archive.attrs["card"] == card.path.read_text(encoding="utf-8")
+    assert archive.attrs["card"] == file.read_text(encoding="utf-8")
     assert archive.attrs["card_sha256"] == card.sha256
     assert archive.attrs["seed"] == "1"
     assert archive.attrs["prior"] == "weakly-informative"
@@ -332,6 +332,6 @@ def test_a_card_with_two_setups_gives_the_constants_it_was_made_from(tmp_path):
         entry = summary.elastic[name]
         assert abs(entry.mean - truth) < 4 * entry.sd, name
         assert entry.sd < 0.05 * truth, name
-    assert len(board_from_card(load_board(path)).setups) == 2
+    assert len(Board.from_toml(path).setups) == 2
     readings = arviz.from_netcdf(str(tmp_path / "out" / "posterior.nc"), engine="h5netcdf")["observed_data"]["reading"]
     assert readings.values.tolist() == [f"{setup} {label}" for setup, labels in by_setup.items() for label in labels]

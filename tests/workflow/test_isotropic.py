@@ -13,6 +13,7 @@ from scipy.stats import binom
 
 import bayesplate
 from bayesplate import Board, Quantity, Setup
+from bayesplate.board.material import isotropic_moduli, moduli, rigidities
 from bayesplate.diagnosis.known import known_fit
 from bayesplate.errors import InputError, NotIdentifiableError
 from bayesplate.estimates.least_squares import weighted_least_squares
@@ -20,7 +21,6 @@ from bayesplate.frequencies.laws import cents
 from bayesplate.planning.beliefs import Beliefs
 from bayesplate.planning.gains import Readings, expected_gain
 from bayesplate.planning.unmeasured import prior_explanation
-from bayesplate.plate.material import isotropic_moduli, moduli, rigidities
 from bayesplate.report.content import summary_sentences
 from bayesplate.results.contract import as_json
 
@@ -292,10 +292,10 @@ def test_a_board_comes_back_from_its_card():
     board = sheet(sheet_hz(70e9, 0.3), effects=("transverse_shear",))
     problem = bayesplate.Problem.from_card(board)
 
-    assert "isotropic = true" in board.to_card()
+    assert "isotropic = true" in board.to_toml()
     assert problem.board.isotropic
-    assert problem.board.to_card() == board.to_card()
-    assert "isotropic" not in replace(board, isotropic=False).to_card()
+    assert problem.board.to_toml() == board.to_toml()
+    assert "isotropic" not in replace(board, isotropic=False).to_toml()
 
 
 def test_the_poisson_ratio_of_nobody_is_that_of_its_kind():

@@ -8,10 +8,10 @@ import ritz
 import runs
 from click.testing import CliRunner
 
+from bayesplate.board.board import density, vibrating_lengths
 from bayesplate.cli import main
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.laws import cents
-from bayesplate.plate.board import density, vibrating_lengths
 from bayesplate.workflow.modes import modes
 from bayesplate.workflow.prepare import prepare
 from bayesplate.workflow.shown import show_modes

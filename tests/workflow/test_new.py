@@ -6,13 +6,14 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from stated import frequencies, millimetres
 
 import bayesplate
-from bayesplate.cards import load_board, read_board_text
+from bayesplate.board.board import Board
+from bayesplate.board.setup_keys import edge_letters
 from bayesplate.cli import main
 from bayesplate.frequencies.labels import label_faults
 from bayesplate.labels import Label
-from bayesplate.plate.from_card import board_from_card
 from bayesplate.workflow.new import new
 
 ANSWERS = ["", "550", "2,0", "200", "2.8", "125", "", "spruce", "35", "50", "111", "86", "", "", "", "", "Küche, 21 °C"]
@@ -30,15 +31,16 @@ def invoke(*arguments: str, answers: str = ""):
 def test_answers_become_a_card_that_check_takes():
     """A decimal comma is asked again; the modes asked about are modes of the board."""
     result = invoke(answers="\n".join(ANSWERS) + "\n")
-    card = load_board("my-board.toml")
+    card = Board.from_toml("my-board.toml")
 
     assert result.exit_code == 0, result.output
     assert "a number with a decimal point" in result.stderr
-    assert (card.plate.length_x_mm.mean, card.plate.length_y_mm.mean, card.plate.mass_g.mean) == (550, 200, 125)
-    assert (card.plate.thickness_mm.mean, card.plate.thickness_mm.sd) == (2.8, 0.05)
-    assert card.material.prior == "spruce"
-    assert card.notes == "Küche, 21 °C"
-    readings = {str(label): hz.mean for label, hz in card.setups[0].frequencies_hz.items()}
+    assert millimetres(card, "length_x", "length_y") == (550, 200)
+    assert card.inputs["mass"].mean == 0.125
+    assert (card.inputs["thickness"].mean, card.inputs["thickness"].sd) == pytest.approx((2.8e-3, 5e-5))
+    assert card.prior == "spruce"
+    assert card.card.table["notes"] == "Küche, 21 °C"
+    readings = {str(label): hz.mean for label, hz in frequencies(card.setups[0]).items()}
     assert readings == {"(1,1)": 35, "(2,0)": 50, "(0,2)": 111, "(2,1)": 86}
     assert bayesplate.check("my-board.toml").name == "my-board"
 
@@ -48,8 +50,8 @@ def test_the_line_for_peaks_without_a_label_can_be_used():
     line, *_ = (line for line in path.read_text(encoding="utf-8").splitlines() if "unlabelled_hz" in line)
     text = path.read_text(encoding="utf-8").replace(line, line.removeprefix("# "))
 
-    assert read_board_text(path.read_text(encoding="utf-8"), "a").setups[0].unlabelled_hz == ()
-    assert [peak.mean for peak in read_board_text(text, "a").setups[0].unlabelled_hz] == [404, 448.8]
+    assert Board.from_text(path.read_text(encoding="utf-8"), "a").setups[0].unlabelled == ()
+    assert Board.from_text(text, "a").setups[0].unlabelled == (404, 448.8)
 
 
 def test_every_question_can_be_skipped_and_modes_works_on_the_card():
@@ -70,7 +72,7 @@ def test_the_examples_are_modes_that_the_board_has(edges):
     Path("b.toml").write_text(text.replace('name = "a"', 'name = "b"') + named + "\n", encoding="utf-8")
 
     assert len(labels) == 8
-    assert label_faults(board_from_card(load_board("b.toml"))) == []
+    assert label_faults(Board.from_toml("b.toml")) == []
     if edges == "free":
         assert labels[:3] == ['"(1,1)"', '"(2,0)"', '"(0,2)"']
 
@@ -98,14 +100,14 @@ def test_the_end_of_the_answers_is_an_interruption():
 def test_options_ask_nothing():
     options = ["--length-x", "253", "--edges", "cantilever", "--title", 'a "b" \\ ü', "--frequency", "( 1, 0 ) = 52"]
     result = invoke("mine", *options)
-    card = load_board("mine.toml")
+    card = Board.from_toml("mine.toml")
 
     assert result.exit_code == 0, result.output
     assert card.title == 'a "b" \\ ü'
     assert "Next: bayesplate check mine.toml" in result.output
     assert "Next: bayesplate modes bare.toml" in invoke("bare", "--length-x", "253").output
-    assert card.setups[0].edges.letters == "CFFF"
-    assert card.setups[0].frequencies_hz[Label(1, 0)].mean == 52
+    assert edge_letters(card.setups[0].edges) == "CFFF"
+    assert frequencies(card.setups[0])[Label(1, 0)].mean == 52
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 import bayesplate
-from bayesplate.cards.shelf import shelf_folder
+from bayesplate.board.shelf import shelf_folder
 from bayesplate.cli import main
 from bayesplate.results.contract import as_json
 from bayesplate.workflow.prepare import default_folder

@@ -12,8 +12,8 @@ from runs import files_in
 from scipy import stats
 
 import bayesplate
-from bayesplate.cards import load_board
-from bayesplate.plate.material import moduli
+from bayesplate.board.board import Board
+from bayesplate.board.material import moduli
 
 BOARD = "fiemme-spruce-clamped"
 UNCERTAIN = "spruce-free-2R"
@@ -240,6 +240,13 @@ def test_points_outside_the_cube_are_refused(clamped):
         clamped.prior_transform([0.5, 1.5, 0.5, 0.5])
 
 
+def test_the_corners_of_the_cube_are_points_too(clamped):
+    for u in (0.0, 1.0):
+        theta = clamped.prior_transform(np.full(clamped.n_dim, u))
+        assert np.isfinite(theta).all()
+        assert not np.isnan(clamped.log_prob(theta))
+
+
 def test_the_plates_are_solved_once_and_not_before_they_are_needed(monkeypatch):
     from bayesplate.workflow import problem as module
 
@@ -279,7 +286,7 @@ def test_a_problem_a_card_and_a_board_give_the_same_draws_and_write_nothing(tmp_
     monkeypatch.chdir(tmp_path)
     board = clamped.board
     card = tmp_path / f"{BOARD}.toml"
-    board.to_card(card)
+    board.to_toml(card)
     before = files_in(tmp_path)
     results = [bayesplate.fit(given, seed=3) for given in (BOARD, clamped, board, card)]
 
@@ -287,13 +294,13 @@ def test_a_problem_a_card_and_a_board_give_the_same_draws_and_write_nothing(tmp_
     assert [result.folder for result in results] == [None] * 4
     assert len({result.draws.theta.tobytes() for result in results}) == 1
     assert results[2].summary == results[3].summary
-    assert results[2].summary.card_sha256 == load_board(card).sha256
+    assert results[2].summary.card_sha256 == Board.from_toml(card).sha256
 
 
 @pytest.mark.usefixtures("quickly")
 def test_what_is_written_of_a_board_is_what_is_written_of_its_card(tmp_path, clamped):
     card = tmp_path / f"{BOARD}.toml"
-    clamped.board.to_card(card)
+    clamped.board.to_toml(card)
     for name, given in (("board", clamped.board), ("card", card)):
         bayesplate.fit(given, out=tmp_path / name, report=False)
 
@@ -331,7 +338,7 @@ def test_a_board_whose_effects_a_card_cannot_state_is_refused(problem):
 def test_a_faulty_board_is_refused_as_its_card_would_be(tmp_path, clamped):
     thick = bayesplate.Quantity.exact(-3e-3)
     board = replace(clamped.board.with_priors({"thickness": thick}), effects=("grain_angel",))
-    Path(tmp_path / f"{BOARD}.toml").write_text(board.to_card(), encoding="utf-8")
+    Path(tmp_path / f"{BOARD}.toml").write_text(board.to_toml(), encoding="utf-8")
     told = []
     for given in (board, tmp_path / f"{BOARD}.toml"):
         with pytest.raises(bayesplate.InputError) as refused:

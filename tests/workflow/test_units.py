@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from bayesplate.cards.shelf import shelf_folder
+from bayesplate.board.shelf import shelf_folder
 from bayesplate.cli import main
 
 NAME = "finnish-spruce-cantilever"

@@ -84,7 +84,7 @@ def test_the_installed_package_finds_its_cards(installed, tmp_path):
     """Those of the wheel, not of the checkout that this environment may know too."""
     program = (
         "import bayesplate\n"
-        "from bayesplate.cards.shelf import card_names, shelf_folder\n"
+        "from bayesplate.board.shelf import card_names, shelf_folder\n"
         "print(bayesplate.__file__)\n"
         "print(shelf_folder('boards'))\n"
         "print(len(card_names('boards')), len(card_names('priors')), len(card_names('coefficients')))\n"

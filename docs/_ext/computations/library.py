@@ -11,12 +11,13 @@ import numpy as np
 
 import bayesplate
 from bayesplate import errors
+from bayesplate.board.setup import CLAMPED_NOISE, DEFAULT_NOISE
+from bayesplate.board.shelf import card_names
 from bayesplate.campaigns import diagnosis as of_campaigns
 from bayesplate.campaigns import evidence, likelihood, population, scatter
 from bayesplate.campaigns.agreement import p_value
 from bayesplate.campaigns.search import OF_TWO
 from bayesplate.campaigns.search import PRIOR as WAYS_BEFORE
-from bayesplate.cards.shelf import card_names
 from bayesplate.diagnosis.claim import IMPROBABLE, STANDARD_ERRORS
 from bayesplate.diagnosis.folds import NEEDED
 from bayesplate.diagnosis.hypotheses import NONE, ONE, TWO
@@ -29,7 +30,6 @@ from bayesplate.diagnosis.verdict import CLEARLY, WITHIN
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import joined
 from bayesplate.planning import gains, places
-from bayesplate.plate.setup import CLAMPED_NOISE, DEFAULT_NOISE
 from bayesplate.posterior.convergence import Gate
 from bayesplate.results import references as cited
 from bayesplate.workflow.prepare import prepare

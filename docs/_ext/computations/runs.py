@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from bayesplate.plate.sessions import DISCREPANCY
+from bayesplate.board.sessions import DISCREPANCY
 from commands import bench, printed
 from computations.markdown import picture, table, words_table
 

@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks import timing
 from benchmarks.peers.density import Density
 
-from bayesplate.plate.material import MODULI, RIGIDITIES
+from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.posterior.posing import PosedProblem
 
 BOARD = "fiemme-spruce-clamped"

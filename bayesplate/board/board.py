@@ -1,0 +1,557 @@
+"""The board on the bench: its size, its mass, what is known of its material, and the setups it was measured in."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bayesplate.board.board_keys import WARPS, BoardKeys, MaterialKeys, PlateKeys, read_board
+from bayesplate.board.card_file import CardFile
+from bayesplate.board.coefficients import CoefficientCard
+from bayesplate.board.material import ISOTROPIC, ORTHOTROPIC, Symmetry
+from bayesplate.board.parameter import BOARD, Parameter
+from bayesplate.board.prior import PriorCard, load_prior
+from bayesplate.board.quantity import Kind, Quantity
+from bayesplate.board.random_field import PlacedReadings, conditioned, thickness_readings, width_readings
+from bayesplate.board.setup import NOISE_WANTED, Setup
+from bayesplate.board.stated import are, quantities_of, unstatable, wrong_types
+from bayesplate.board.words import did_you_mean, effect_named
+from bayesplate.board.writing import toml_text, write_card
+from bayesplate.errors import Fault, InputError
+
+Values = Mapping[str, NDArray[np.float64]]
+"""Values of named quantities, SI: each a number or an (n_draws,) array."""
+
+INPUTS = {
+    "length_x": ("m", "length along the grain"),
+    "length_y": ("m", "length across the grain"),
+    "thickness": ("m", "thickness"),
+    "mass": ("kg", "mass"),
+    "density": ("kg/m^3", "density"),
+    "poisson_xy": ("1", "Poisson ratio nu_xy"),
+}
+"""What a card states of a board: unit, and what people call it."""
+_KINDS: Mapping[str, Kind] = {"poisson_xy": "normal"}
+DEFAULT_POISSON = Quantity.from_mean(0.4, 0.08, "normal")
+ISOTROPIC_POISSON = Quantity.from_mean(0.3, 0.06, "normal")
+"""Of an isotropic board: foams and glass lie near 0.2, most metals near 0.3, acrylic near 0.37."""
+
+
+@dataclass(frozen=True)
+class Board:
+    """A board and its setups, in SI units.
+
+    `Board.from_toml` reads one from a card and `to_toml` writes one, `Board.from_numbers` makes one from numbers,
+    `dataclasses.replace` and `with_priors` make another one from it.
+
+    Attributes
+    ----------
+    name : str
+    parameters : tuple of Parameter
+        What is known of the board besides the readings: length_x, length_y, thickness (m), mass (kg) or density
+        (kg m^-3), poisson_xy, the length each clamp covers, and what the declared effects take. A parameter with an
+        uncertainty is marginalised.
+    setups : tuple of Setup
+    prior : str
+        Name of the prior card.
+    title, source : str
+    effects : tuple of str
+        Declared effects.
+    implies : bool
+        Whether what is stated of the board (a sensor's mass, the fluid, a bounce) declares effects beside these; an
+        empty list of effects that somebody wrote down says that it does not.
+    chosen : tuple
+        Effects (`bayesplate.effects.Effect`) in another form than the card itself would give them.
+    shear_xz, shear_yz : Quantity or None, Pa
+    warp : dict of Quantity, m
+        What a straightedge tells of a board that is not flat, as far as it was stated: "cup", the rise across the
+        width; "bow", that along the length, negative on a saddle; "twist", a corner's lift off a table that the other
+        three touch.
+    isotropic : bool
+        One modulus in all directions: E_y = E_x = E and G_xy = E / (2 (1 + nu)), nu the input poisson_xy.
+    notes : tuple of str
+        What was assumed because the card does not say it.
+    card : CardFile or None
+        Where it was read, or the board that it was made of; None if it was made in Python.
+    """
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    setups: tuple[Setup, ...]
+    prior: str = "weakly-informative"
+    title: str = ""
+    source: str = ""
+    effects: tuple[str, ...] = ()
+    implies: bool = True
+    chosen: tuple[Any, ...] = ()
+    shear_xz: Quantity | None = None
+    shear_yz: Quantity | None = None
+    warp: Mapping[str, Quantity] = field(default_factory=dict)
+    isotropic: bool = False
+    notes: tuple[str, ...] = ()
+    card: CardFile | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "effects", tuple(map(effect_named, self.effects)))
+
+    @property
+    def symmetry(self) -> Symmetry:
+        """Which of its rigidities are free."""
+        return ISOTROPIC if self.isotropic else ORTHOTROPIC
+
+    @cached_property
+    def inputs(self) -> Mapping[str, Quantity]:
+        """Prior of every parameter by its name."""
+        return {parameter.name: parameter.prior for parameter in self.parameters}
+
+    @cached_property
+    def uncertain(self) -> tuple[Parameter, ...]:
+        """Parameters that carry an uncertainty, in a fixed order."""
+        return tuple(parameter for parameter in self.parameters if not parameter.prior.is_exact)
+
+    @property
+    def uncertain_inputs(self) -> dict[str, Quantity]:
+        """Priors of the uncertain parameters by name, in their order."""
+        return {parameter.name: parameter.prior for parameter in self.uncertain}
+
+    def parameter(self, name: str) -> Parameter:
+        """The parameter of a name; raises InputError with the names that there are."""
+        return _named("parameter", name, self.parameters)
+
+    def setup(self, name: str) -> Setup:
+        """The setup of a name; raises InputError with the names that there are."""
+        return _named("setup", name, self.setups)
+
+    def nominal(self) -> dict[str, NDArray[np.float64]]:
+        """Mean of every parameter."""
+        return {name: np.asarray(quantity.mean) for name, quantity in self.inputs.items()}
+
+    def with_parameters(self, parameters: Iterable[Parameter]) -> Board:
+        """The board with further parameters; one of the same name takes the place of the earlier one."""
+        joined = {parameter.name: parameter for parameter in (*self.parameters, *parameters)}
+        return replace(self, parameters=tuple(joined.values()))
+
+    def with_priors(self, priors: Mapping[str, Quantity | ArrayLike]) -> Board:
+        """The board with other priors of some of its parameters, by their names; numbers as in `from_numbers`."""
+        if not isinstance(priors, Mapping):
+            raise InputError(wrong_types(self.name, [("priors", priors, False, "a dict of quantities by name")]))
+        faults = [_unknown("priors", name, self.inputs) for name in priors if name not in self.inputs]
+        stated, unread = quantities_of(priors, "priors", "SI", _KINDS)
+        if faults or unread:
+            raise InputError([*faults, *unread])
+        return replace(
+            self,
+            parameters=tuple(
+                replace(one, prior=stated[one.name], assumed=None) if one.name in stated else one
+                for one in self.parameters
+            ),
+            setups=tuple(
+                replace(one, clamped={e: stated.get(one.input_name(e), length) for e, length in one.clamped.items()})
+                for one in self.setups
+            ),
+        )
+
+    def without(self, effects: Collection[str]) -> Board:
+        """The board without some of its declared effects, by their names."""
+        effects = {*map(effect_named, effects)}
+        return replace(
+            self,
+            effects=tuple(name for name in self.effects if name not in effects),
+            chosen=tuple(one for one in self.chosen if one.name not in effects),
+            parameters=tuple(one for one in self.parameters if one.effect not in effects),
+        )
+
+    @classmethod
+    def from_numbers(
+        cls,
+        name: str,
+        *,
+        length_x: Quantity | ArrayLike,
+        length_y: Quantity | ArrayLike,
+        thickness: Quantity | ArrayLike,
+        setups: Setup | Sequence[Setup],
+        mass: Quantity | ArrayLike | None = None,
+        density: Quantity | ArrayLike | None = None,
+        poisson_xy: Quantity | ArrayLike | None = None,
+        prior: str | os.PathLike[str] | PriorCard = "weakly-informative",
+        effects: Sequence[str] | None = None,
+        shear_xz: Quantity | ArrayLike | None = None,
+        shear_yz: Quantity | ArrayLike | None = None,
+        warp: Mapping[str, Quantity | ArrayLike] | None = None,
+        isotropic: bool = False,
+        title: str = "",
+        source: str = "",
+    ) -> Board:
+        """A board from numbers, arrays and quantities in SI units: a number is exact, an array holds readings.
+
+        What is wrong with it is said with the place on a card, when the board is used: `bayesplate.check(board)`.
+
+        Parameters
+        ----------
+        name : str
+            Letters, digits, . _ -
+        length_x, length_y, thickness : Quantity, number or array of readings, m
+        setups : Setup or sequence of Setup
+        mass : Quantity, number or array of readings, kg
+            Or the density; exactly one of the two.
+        density : Quantity, number or array of readings, kg m^-3
+        poisson_xy : Quantity, number or array of readings
+            By default that of the prior that the board is used with, where it states one, else 0.4 ± 0.08, or
+            0.3 ± 0.06 where the board is isotropic.
+        prior : str, path or PriorCard
+            Name of a shipped prior card, a path, or the card itself; a card that is not on the shelf is given again to
+            what uses the board: `Problem.from_card(board, prior=prior)`. What is not stated of noise and Poisson ratio
+            is taken from the prior that is given there.
+        effects : sequence of str, optional
+            Declared effects, beside those that are implied by what is stated; an empty list declares nothing at all.
+        shear_xz, shear_yz : Quantity, number or array of readings, Pa
+        warp : dict of Quantity, number or array of readings, m
+            "cup", "bow" and "twist", as far as they were read with a straightedge; a quantity is a normal one.
+        isotropic : bool
+            One modulus in all directions, as of metal, glass, foam or MDF; then the prior is its density of E.
+        title, source : str
+
+        Returns
+        -------
+        Board
+
+        Raises
+        ------
+        InputError
+            With every value that is no number, no array of numbers and no quantity, and every argument of another type.
+
+        Examples
+        --------
+        >>> import bayesplate
+        >>> free = bayesplate.Setup.from_frequencies({(1, 1): 134, (2, 0): [240, 242]}, edges="free", resolution=1)
+        >>> board = bayesplate.Board.from_numbers(
+        ...     "my-board", length_x=0.253, length_y=0.114, thickness=0.003, mass=0.041, setups=free
+        ... )
+        >>> board.inputs["thickness"].mean
+        0.003
+        """
+        faults = list(wrong_types(str(name), (
+            ("name", name, isinstance(name, str), "a text"),
+            ("setups", setups, isinstance(setups, Setup) or are(setups, Setup), "a Setup or a list of them"),
+            ("prior", prior, isinstance(prior, str | os.PathLike | PriorCard), "a name, a path or a PriorCard"),
+            ("effects", effects, effects is None or are(effects, str), "a list of names of effects"),
+            ("isotropic", isotropic, isinstance(isotropic, bool), "True or False"),
+            ("title", title, isinstance(title, str), "a text"),
+            ("source", source, isinstance(source, str), "a text"),
+            ("warp", warp, isinstance(warp, Mapping | None), "a dict of heights by cup, bow and twist"),
+        )))  # fmt: skip
+        stated = {
+            "length_x": length_x, "length_y": length_y, "thickness": thickness, "mass": mass, "density": density,
+            "poisson_xy": poisson_xy, "shear_xz": shear_xz, "shear_yz": shear_yz,
+        }  # fmt: skip
+        needed = ("length_x", "length_y", "thickness")
+        values = {key: one for key, one in stated.items() if one is not None or key in needed}
+        quantities, unread = quantities_of(values, str(name), "SI", _KINDS)
+        warps, faulty = _warps(warp, str(name)) if isinstance(warp, Mapping) else ({}, [])
+        unread += faulty
+        if faults or unread:
+            raise InputError([*faults, *unread])
+        card = prior if isinstance(prior, PriorCard) else load_prior(prior)
+        shear = {key: quantities.pop(key, None) for key in ("shear_xz", "shear_yz")}
+        return made_board(
+            name,
+            quantities,
+            (setups,) if isinstance(setups, Setup) else tuple(setups),
+            assumed_poisson=None if "poisson_xy" in quantities else usual_poisson(isotropic),
+            prior=prior.name if isinstance(prior, PriorCard) else os.fspath(prior),
+            effects=tuple(effects or ()),
+            implies=effects is None or bool(effects),
+            isotropic=isotropic,
+            title=title,
+            source=source,
+            warp=warps,
+            **shear,
+        ).assuming(card)
+
+    @classmethod
+    def from_toml(
+        cls,
+        name_or_path: str | os.PathLike[str],
+        *,
+        may_lack_frequencies: bool = False,
+        setup: str | os.PathLike[str] | None = None,
+    ) -> Board:
+        """Read a board card; the cards that it names are not read.
+
+        Parameters
+        ----------
+        name_or_path : str or path
+            Name of a shipped card, or a path: it contains a separator or ends in .toml.
+        may_lack_frequencies : bool
+            Whether a board that was not measured yet will do.
+        setup : str or path, optional
+            A file with a table [setup] that takes the place of the card's, key by key.
+
+        Returns
+        -------
+        Board
+
+        Raises
+        ------
+        InputError
+            If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at
+            once.
+        """
+        return cls.from_card(CardFile.load("boards", name_or_path), may_lack_frequencies, setup)
+
+    @classmethod
+    def from_text(cls, text: str, name: str, may_lack_frequencies: bool = False) -> Board:
+        """The same from what might stand in the file NAME.toml."""
+        return cls.from_card(CardFile.of(text, f"{name.removesuffix('.toml')}.toml"), may_lack_frequencies)
+
+    @classmethod
+    def from_card(
+        cls, card: CardFile, may_lack_frequencies: bool = False, setup: str | os.PathLike[str] | None = None
+    ) -> Board:
+        """The same from the table of a card."""
+        keys, card = read_board(card, may_lack_frequencies, setup)
+        plate, material = keys.plate, keys.material
+        inputs = {**dict(plate), "poisson_xy": material.poisson_xy}
+        return made_board(
+            keys.name,
+            {key: inputs[key] for key in INPUTS if inputs[key] is not None},
+            [Setup.from_keys(one) for one in keys.setups],
+            assumed_poisson=usual_poisson(material.isotropic) if material.poisson_xy is None else None,
+            title=keys.title,
+            source=keys.source,
+            prior=material.prior,
+            effects=keys.effects or (),
+            implies=keys.effects != (),
+            shear_xz=material.shear_xz,
+            shear_yz=material.shear_yz,
+            warp=plate.warp,
+            isotropic=material.isotropic,
+            card=card,
+        )
+
+    def assuming(self, prior: PriorCard | None, tables: Mapping[str, CoefficientCard] | None = None) -> Board:
+        """The board with what nobody stated of it taken from a prior, as far as that states it.
+
+        Parameters
+        ----------
+        prior : PriorCard or None
+        tables : dict of CoefficientCard, optional
+            By setup, those that the card names.
+        """
+        poisson = (prior and prior.poisson_xy) or usual_poisson(self.isotropic)
+        setups = [one.assuming_noise(prior) if one.is_noise_assumed else one for one in self.setups]
+        if tables is not None:
+            setups = [replace(one, published_coefficients=tables.get(one.name), table_name="") for one in setups]
+        return replace(
+            self,
+            setups=tuple(setups),
+            parameters=tuple(
+                replace(one, prior=poisson, assumed=poisson) if one.is_assumed else one for one in self.parameters
+            ),
+        )
+
+    def table(self) -> dict[str, Any]:
+        """The table of its card; raises InputError if a quantity has a density that no card can state."""
+        own = [one for one in self.parameters if one.owner == BOARD and not one.is_of_effect and not one.is_assumed]
+        inputs = {one.name: one.prior for one in own}
+        faults = [*self._unstatable()]
+        if faults:
+            raise InputError(faults)
+        poisson_xy = inputs.pop("poisson_xy", None)
+        material = {name: getattr(self, name) for name in ("isotropic", "shear_xz", "shear_yz")}
+        keys = BoardKeys.model_construct(
+            format=1,
+            name=self.name,
+            title=self.title,
+            source=self.source,
+            effects=self.effects if self.effects or not self.implies else None,
+            plate=PlateKeys.model_construct(None, **inputs, warp=self.warp),
+            material=MaterialKeys.model_construct(poisson_xy=poisson_xy, **material, prior=self.prior),
+        )
+        setups = [one.table() for one in self.setups]
+        return {
+            **keys.model_dump(by_alias=True, exclude_defaults=True, exclude={"setups"}),
+            "setup": setups[0] if len(setups) == 1 else setups,
+        }
+
+    def _unstatable(self) -> Iterator[Fault]:
+        """Every quantity that a card cannot state."""
+        for one in self.parameters:
+            if not one.is_of_effect and one.owner.kind != "group":  # sessions are found again when the card is read
+                yield from unstatable(one.name, one.prior, "normal" if one.name == "poisson_xy" else "log-normal")
+        for name, modulus in (("shear_xz", self.shear_xz), ("shear_yz", self.shear_yz)):
+            if modulus is not None:
+                yield from unstatable(name, modulus)
+        for setup in self.setups:
+            for place, quantity in setup.uncertain_keys():
+                yield from unstatable(f"{setup.name} {place}", quantity)
+        for name, rise in self.warp.items():
+            yield from unstatable(f"warp {name}", rise, "normal", WARPS[name])
+        for setup in self.setups:
+            if setup.noise.is_exact:
+                yield Fault(f"{setup.name} noise", NOISE_WANTED, "an exact number")
+
+    def to_toml(self, path: str | os.PathLike[str] | None = None, *, force: bool = False) -> str:
+        """The board as a card, in TOML.
+
+        Parameters
+        ----------
+        path : path, optional
+            File to write, NAME.toml; nothing is written without it.
+        force : bool
+            Replace a file that is there.
+
+        Returns
+        -------
+        str
+            The text of the card; reading it gives the board again.
+
+        Raises
+        ------
+        InputError
+            If a quantity has a density that no card can state, or the file cannot be written.
+        """
+        text = toml_text(self.table())
+        if path is not None:
+            write_card(path, self.name, text, force=force)
+        return text
+
+    @property
+    def file(self) -> str:
+        """The name of its card, as messages show it."""
+        return self.card.shown if self.card is not None else f"{self.name}.toml"
+
+    @property
+    def folder(self) -> Path | None:
+        """Where cards that it names by a relative path are looked for; None for the working directory."""
+        return None if self.card is None else self.card.folder
+
+    @property
+    def text(self) -> str:
+        """Its card as it was read; that of a board made in Python is written."""
+        return self.to_toml() if self.card is None else self.card.text
+
+    @property
+    def sha256(self) -> str:
+        """Hexadecimal SHA-256 of its card."""
+        return (self.card or CardFile(self.table(), self.file)).sha256
+
+    @property
+    def reading_names(self) -> tuple[str, ...]:
+        """Setup and label of every reading, in the order of all results: "cantilever (1,0)"."""
+        return tuple(f"{setup.name} {label}" for setup in self.setups for label in setup.labels)
+
+    @property
+    def short_reading_names(self) -> tuple[str, ...]:
+        """The same for sentences: without the setup where there is only one, "(1,0)"."""
+        return self.reading_names if len(self.setups) > 1 else tuple(map(str, self.setups[0].labels))
+
+
+def _warps(stated: Mapping[str, Quantity | ArrayLike], place: str) -> tuple[dict[str, Quantity], list[Fault]]:
+    """Heights by name from what was stated of them, cup and twist from zero on, and what cannot be one."""
+    unknown = [_unknown(f"{place} warp", key, WARPS) for key in stated if key not in WARPS]
+    known = {key: stated[key] for key in WARPS if key in stated}
+    found, faults = quantities_of(known, f"{place} warp", "in m", dict.fromkeys(WARPS, "normal"))
+    for key, one in found.items():
+        if one.kind == "normal" and not one.is_exact and one.lower == -math.inf:
+            found[key] = replace(one, lower=WARPS[key])
+    return found, [*unknown, *faults]
+
+
+def _unknown(place: str, name: object, known: Iterable[str]) -> Fault:
+    names = tuple(known)
+    near = did_you_mean(name, names) if isinstance(name, str) else ""
+    return Fault(place, f"one of {', '.join(names)}", str(name), near)
+
+
+Named = TypeVar("Named", Parameter, Setup)
+
+
+def _named(place: str, name: str, among: Iterable[Named]) -> Named:
+    by_name = {one.name: one for one in among}
+    if name not in by_name:
+        raise InputError(_unknown(place, name, by_name))
+    return by_name[name]
+
+
+def usual_poisson(is_isotropic: bool) -> Quantity:
+    """The Poisson ratio of a board of which nothing is known, of wood or isotropic: an object of its own."""
+    return replace(ISOTROPIC_POISSON if is_isotropic else DEFAULT_POISSON)
+
+
+def assumed_notes(board: Board) -> tuple[str, ...]:
+    """A sentence on the Poisson ratio that was assumed, where nobody stated one."""
+    nu = board.parameter("poisson_xy")
+    told = f"nu_xy = {nu.prior.mean:g} ± {nu.prior.sd:g} was assumed"
+    return (f"the card gives no Poisson ratio: {told}",) if nu.is_assumed else ()
+
+
+def made_board(
+    name: str,
+    inputs: Mapping[str, Quantity],
+    setups: Sequence[Setup],
+    assumed_poisson: Quantity | None = None,
+    **more: Any,
+) -> Board:
+    """A board from quantities in SI units, without a card.
+
+    Parameters
+    ----------
+    name : str
+    inputs : dict of Quantity
+        length_x, length_y, thickness (m), mass (kg) or density (kg m^-3), and poisson_xy. A thickness or a width that
+        was read at places becomes the mean over the board of the field that the readings tell of.
+    setups : sequence of Setup
+        What their clamps cover becomes parameters too.
+    assumed_poisson : Quantity, optional
+        A Poisson ratio that nobody stated, where `inputs` has none.
+    **more
+        Other attributes of `Board`.
+
+    Returns
+    -------
+    Board
+    """
+    inputs = {**inputs, **_means_of_fields(inputs)}
+    assumed = {} if assumed_poisson is None else {"poisson_xy": assumed_poisson}
+    stated = [
+        Parameter(key, BOARD, prior, INPUTS[key][0], words=INPUTS[key][1], assumed=assumed.get(key))
+        for key, prior in {**inputs, **assumed}.items()
+    ]
+    covered = [parameter for setup in setups for parameter in setup.clamped_parameters]
+    return Board(name, (*stated, *covered), tuple(setups), **more)
+
+
+def _means_of_fields(inputs: Mapping[str, Quantity]) -> dict[str, Quantity]:
+    """Sizes that were read at places with the mean over the board that their field has; an exact mean stays."""
+    read: dict[str, PlacedReadings | None] = {}
+    if "length_y" in inputs and inputs["length_y"].has_profile:
+        read["length_y"] = width_readings(inputs["length_y"], inputs["length_x"])
+    if "thickness" in inputs and inputs["thickness"].has_profile:
+        read["thickness"] = thickness_readings(inputs["thickness"], inputs["length_x"], inputs["length_y"])
+    found = {name: conditioned(one) for name, one in read.items() if one is not None and not inputs[name].is_exact}
+    return {name: replace(inputs[name], mean=field.mean, sd=field.sd) for name, field in found.items()}
+
+
+def density(values: Values) -> NDArray[np.float64]:
+    """Density of the board from the values of its inputs, kg m^-3."""
+    if "density" in values:
+        return np.asarray(values["density"])
+    return np.asarray(values["mass"] / (values["length_x"] * values["length_y"] * values["thickness"]))
+
+
+def vibrating_lengths(values: Values, setup: Setup) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Side lengths left free by the clamps of a setup, m."""
+    sides = []
+    for axis in ("x", "y"):
+        covered = sum(values[setup.input_name(e)] for e in setup.clamped if e.startswith(axis))
+        sides.append(np.asarray(values[f"length_{axis}"] - covered))
+    return sides[0], sides[1]

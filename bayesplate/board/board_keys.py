@@ -1,0 +1,190 @@
+"""The keys of a board card: what lies on the bench, what is known about its material, and its setups."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from functools import partial
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from bayesplate.board.card_file import CardFile
+from bayesplate.board.fragment import merged
+from bayesplate.board.measures import DENSITY, POISSON, QuantityReader
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.repeated import CALIPER, FEELER, FURTHEST_SIZES, RULE, SCALES
+from bayesplate.board.schema import Section, place, validated
+from bayesplate.board.setup_keys import SetupKeys
+from bayesplate.board.shelf import CAMPAIGN_REMEDY
+from bayesplate.board.values import (
+    Complaint,
+    Key,
+    Number,
+    Refusal,
+    read_effects,
+    read_format,
+    read_list,
+    read_name,
+    read_reference,
+    read_switch,
+    read_table,
+    read_text,
+)
+from bayesplate.board.words import quoted, shown
+from bayesplate.errors import Fault, InputError
+
+DEFAULT_PRIOR = "weakly-informative"
+MOST_SETUPS = 20
+_SIZE = partial(QuantityReader, furthest=FURTHEST_SIZES)
+_LENGTH = Number(1, 100_000, "mm", too_small="in mm: 1 m is 1000 mm, 1 cm is 10 mm")
+_LENGTH_X = _SIZE(_LENGTH, places=("at_y_mm",), resolution=RULE).key
+_LENGTH_Y = _SIZE(_LENGTH, places=("at_x_mm",), resolution=RULE).key
+_THICKNESS = _SIZE(Number(0.01, 1000, "mm"), places=("at_x_mm", "at_y_mm"), resolution=CALIPER).key
+_DENSITY = _SIZE(DENSITY).key
+_MASS = _SIZE(Number(1e-3, 1e8, "g"), resolution=SCALES).key
+_OVER = "seen from below every warp has the other sign, and turning the board over changes nothing"
+WARPS = {"cup": 0.0, "bow": -math.inf, "twist": 0.0}
+"""How a board may not be flat, and from where on: all signs at once change nothing, nor does the twist's alone."""
+_WARPS = {
+    name: QuantityReader(
+        Number(0 if lowest == 0 else -1000, 1000, "mm", _OVER if lowest == 0 else ""),
+        "normal",
+        resolution=FEELER,
+        widest=1000,
+        lower=lowest,
+    ).key
+    for name, lowest in WARPS.items()
+}
+_SHEAR = QuantityReader(Number(1e-4, 1000, "GPa")).key
+
+
+def _read_warp(value: object) -> dict[str, Quantity]:
+    """The rise across the width, along the length and of a corner, as a straightedge tells them."""
+    if not isinstance(value, dict):
+        raise Refusal(Complaint("a table of cup, bow and twist, { cup = 0.8 }", shown(value)))
+    return read_table(value, {name: key.read for name, key in _WARPS.items()})
+
+
+_WARP = Key(_read_warp, lambda found: {name: _WARPS[name].write(one) for name, one in found.items()})
+
+
+class PlateKeys(Section):
+    """The whole board before clamping: its lengths, and its mass or its density, one of the two.
+
+    Its warp is what a straightedge tells: `cup` is the rise across the width, `bow` that along the length, of
+    the cup's sign on a dome and negative on a saddle, `twist` a corner's lift off a table that the other three touch.
+    """
+
+    length_x: Annotated[Quantity, _LENGTH_X] = Field(
+        alias="length_x_mm", description="the length along the grain in mm"
+    )
+    length_y: Annotated[Quantity, _LENGTH_Y] = Field(
+        alias="length_y_mm", description="the length across the grain in mm"
+    )
+    thickness: Annotated[Quantity, _THICKNESS] = Field(alias="thickness_mm", description="the thickness in mm")
+    mass: Annotated[Quantity | None, _MASS] = Field(default=None, alias="mass_g")
+    density: Annotated[Quantity | None, _DENSITY] = Field(default=None, alias="density_kg_m3")
+    warp: Annotated[Mapping[str, Quantity], _WARP] = Field(default={}, alias="warp_mm")
+
+
+class MaterialKeys(Section):
+    """What is known of the material: nu_xy, thick-plate shear moduli, and the prior card of the constants.
+
+    An isotropic one has E_y = E_x, and G_xy = E_x / (2 (1 + nu_xy)).
+    """
+
+    poisson_xy: Annotated[Quantity | None, POISSON] = None
+    shear_xz: Annotated[Quantity | None, _SHEAR] = Field(default=None, alias="shear_xz_gpa")
+    shear_yz: Annotated[Quantity | None, _SHEAR] = Field(default=None, alias="shear_yz_gpa")
+    isotropic: Annotated[bool, Key(read_switch)] = False
+    prior: Annotated[str, Key(read_reference)] = DEFAULT_PRIOR
+
+
+def _as_list(value: object) -> list[Any]:
+    """One [setup] is a list of one; the tables themselves are read by SetupKeys."""
+    if isinstance(value, dict):
+        return [value]
+    return read_list(value, "[[setup]] tables", MOST_SETUPS)
+
+
+class BoardKeys(Section):
+    """A board card, in SI units. `read_board` makes one; a `Board` is made from it."""
+
+    format: Annotated[Literal[1], Key(read_format)] = Field(description="1")
+    name: Annotated[str, Key(read_name)] = Field(description="the name of the file without .toml")
+    title: Annotated[str, Key(read_text)] = ""
+    source: Annotated[str, Key(read_text)] = ""
+    notes: Annotated[str, Key(read_text)] = ""
+    effects: Annotated[tuple[str, ...] | None, Key(read_effects, list)] = None
+    plate: PlateKeys = Field(description="a [plate] table")
+    material: MaterialKeys = MaterialKeys()
+    setups: Annotated[tuple[SetupKeys, ...], BeforeValidator(_as_list)] = Field(
+        alias="setup", description="a [setup] table, or several [[setup]]"
+    )
+
+
+def read_board(
+    card: CardFile, may_lack_frequencies: bool = False, setup: str | os.PathLike[str] | None = None
+) -> tuple[BoardKeys, CardFile]:
+    """The keys of a card, and the card with a fragment that completes it.
+
+    Parameters
+    ----------
+    card : CardFile
+    may_lack_frequencies : bool
+        Whether a board that was not measured yet will do.
+    setup : str or path, optional
+        A file with a table [setup] that takes the place of the card's, key by key.
+
+    Raises
+    ------
+    InputError
+        With every fault of the card at once.
+    """
+    table, file = card.table, card.shown
+    if {*table} == {"setup"} and isinstance(table["setup"], dict):
+        remedy = f"it completes a card: CARD --setup {file}"
+        raise InputError(Fault(file, "a card, which has a [plate]", "a [setup] alone, as pick writes it", remedy))
+    if "boards" in table and not {"plate", "setup"} & table.keys():
+        raise InputError(Fault(file, "a board card", "a campaign", CAMPAIGN_REMEDY))
+    if setup is not None:
+        table, file = merged(table, file, setup)
+        card = CardFile(table, card.name, card.folder)
+    context = {"may_lack_frequencies": may_lack_frequencies}
+    return validated(BoardKeys, card, _faults_beside, context, file), card
+
+
+def _faults_beside(table: Mapping[str, Any], file: str) -> list[Fault]:
+    return [*_mass_faults(table, file), *_setup_name_faults(table, file)]
+
+
+def _mass_faults(table: Mapping[str, Any], file: str) -> list[Fault]:
+    plate = table.get("plate")
+    if not isinstance(plate, dict):
+        return []
+    given = [key for key in ("mass_g", "density_kg_m3") if key in plate]
+    if len(given) == 1:
+        return []
+    got = f"both, {shown(plate['mass_g'])} and {shown(plate['density_kg_m3'])}" if given else "neither"
+    return [Fault(place(file, table, ("plate",)), "exactly one of mass_g and density_kg_m3", got)]
+
+
+def _setup_name_faults(table: Mapping[str, Any], file: str) -> list[Fault]:
+    setups = table.get("setup")
+    if not isinstance(setups, list) or len(setups) < 2 or len(setups) > MOST_SETUPS:
+        return []
+    faults = []
+    seen: set[str] = set()
+    for index, setup in enumerate(setups):
+        if not isinstance(setup, dict):
+            continue
+        name = setup.get("name")
+        where = place(file, table, ("setup", index, "name"))
+        if name is None:
+            faults.append(Fault(where, "a name, because there are several setups", "nothing"))
+        elif isinstance(name, str) and name.casefold() in seen:
+            faults.append(Fault(where, "a name of its own", f"{quoted(name)} again"))
+        seen.add(str(name).casefold())
+    return faults

@@ -1,0 +1,145 @@
+"""A parameter of a model: its name and owner, its prior and unit, and the value at which it changes nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bayesplate.board.quantity import Quantity
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Owner:
+    """What a parameter belongs to: the board, one of its setups, or a group of boards or setups that share it.
+
+    Attributes
+    ----------
+    kind : "board", "setup" or "group"
+    name : str
+        Of the setup or the group; empty for the board.
+    """
+
+    kind: Literal["board", "setup", "group"] = "board"
+    name: str = ""
+
+    @property
+    def title(self) -> str:
+        """The name under which results list what it owns: "board", or that of the setup or group."""
+        return self.name or "board"
+
+
+BOARD = Owner()
+
+
+def shown_name(key: str, owner: Owner, effect: str = "") -> str:
+    """The name of a parameter wherever it is shown or looked up: "clamp_rotation.compliance[cantilever]".
+
+    The only place where such names are made; nothing takes them apart.
+    """
+    of_effect = f"{effect}." if effect else ""
+    of_owner = f"[{owner.name}]" if owner.name else ""
+    return f"{of_effect}{key}{of_owner}"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A quantity that a model takes: an input of the board, the noise of a setup, a constant, or the size of an effect.
+
+    Attributes
+    ----------
+    key : str
+        What it is called among its owner's own parameters, or among those of its effect.
+    owner : Owner
+    prior : Quantity
+        In SI units; sign and range are its bounds. An exact quantity fixes the parameter.
+    unit : str
+        SI.
+    null : float or None
+        The value at which it changes nothing: the zero size of an effect. None for what every board has.
+    effect : str
+        The effect it belongs to; empty for the board's inputs, constants and noise.
+    replaces : str
+        Name of the board's own input whose place it takes; empty if it stands beside them.
+    source : str
+        Where the prior comes from; empty if the card states it.
+    words : str
+        What people call it; empty where that is its key.
+    look : str
+        What it does to the board if it is one of an effect's components, in words; empty for what has a meaning alone.
+    usual : float or None
+        A representative size where one standard deviation above the mean is none: the place of something.
+    assumed : Quantity or None
+        What was taken for the prior because nobody stated one; see `is_assumed`.
+    """
+
+    key: str
+    owner: Owner
+    prior: Quantity
+    unit: str
+    null: float | None = None
+    effect: str = ""
+    replaces: str = ""
+    source: str = ""
+    words: str = ""
+    look: str = ""
+    usual: float | None = None
+    assumed: Quantity | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def is_assumed(self) -> bool:
+        """Whether the prior is still the very object that was assumed: whoever states another one replaces it."""
+        return self.prior is self.assumed
+
+    @property
+    def name(self) -> str:
+        """The name among all parameters of a board."""
+        return self.replaces or shown_name(self.key, self.owner, self.effect)
+
+    @property
+    def is_of_effect(self) -> bool:
+        """Whether it is the size of an effect, and not one of the board's own inputs."""
+        return bool(self.effect) and not self.replaces
+
+    @property
+    def is_component(self) -> bool:
+        """Whether a budget counts it together with others."""
+        return bool(self.look)
+
+    @property
+    def is_listed(self) -> bool:
+        """Whether it is told of by itself: a component that belongs to no effect means nothing alone."""
+        return self.is_of_effect or not self.is_component
+
+    @property
+    def nominal(self) -> float:
+        """A representative size: the median of a log-normal prior, one sd above a normal one if its bounds allow."""
+        if self.usual is not None and not self.prior.is_exact:
+            return self.usual
+        if self.prior.is_exact or self.prior.kind != "normal":
+            return self.prior.median
+        return float(np.clip(self.prior.value(1.0), self.prior.lower, self.prior.upper))
+
+    def log_density(self, value: ArrayLike) -> Floats:
+        """Logarithm of the prior density at values in SI units: array of the same shape, per unit."""
+        return self.prior.log_density(value)
+
+    def quantile(self, probability: ArrayLike) -> Floats:
+        """Values in SI units below which the prior has given probabilities: array of the same shape."""
+        return self.prior.quantile(probability)
+
+    def sample(self, rng: np.random.Generator, n: int) -> Floats:
+        """Draws from the prior: (n,) array, SI."""
+        return self.prior.sample(rng, n)
+
+
+_PEOPLE = {"Pa": (1e-9, "GPa"), "m": (1e3, "mm"), "kg": (1e3, "g"), "1": (1.0, ""), "rad": (180.0 / np.pi, "degrees")}
+
+
+def unit_of_people(unit: str) -> tuple[float, str]:
+    """Factor from an SI unit to the one that people use, and its name."""
+    return _PEOPLE.get(unit, (1.0, unit))

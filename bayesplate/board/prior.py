@@ -1,0 +1,344 @@
+"""The prior card: priors of the elastic constants, or of the rigidities, each with its source."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from bayesplate.board.card_file import CardFile
+from bayesplate.board.measures import DENSITY, POISSON, QuantityReader, read_factor, read_noise_percent, written_noise
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.schema import Section, validated
+from bayesplate.board.stated import wrong_types
+from bayesplate.board.units import in_unit, median_and_factor
+from bayesplate.board.values import (
+    Choice,
+    Complaint,
+    Key,
+    Number,
+    Refusal,
+    read_format,
+    read_name,
+    read_table,
+    read_text,
+)
+from bayesplate.board.words import did_you_mean, shown
+from bayesplate.board.writing import toml_text, write_card
+from bayesplate.errors import Fault, InputError
+
+ELASTIC = ("E_x", "E_y", "G_xy")
+RIGIDITY = ("D_x", "D_y", "D_s")
+OF_ISOTROPIC = "E"
+"""The one modulus of an isotropic board, stated beside the three or alone."""
+
+
+_CONSTANTS = (*ELASTIC, *RIGIDITY, OF_ISOTROPIC)
+
+
+@dataclass(frozen=True)
+class StatedPrior:
+    """A prior of a card, in SI units or percent, and the source it was taken from."""
+
+    quantity: Quantity
+    source: str
+
+
+_DISTRIBUTIONS = ("log-normal", "log-uniform")
+
+
+@dataclass(frozen=True)
+class _Constant:
+    """Reads { distribution, median_gpa, factor, source } or { distribution, lower_gpa, upper_gpa, source }."""
+
+    unit: Literal["gpa", "n_m"]
+
+    @property
+    def number(self) -> Number:
+        """What may stand in such a key."""
+        return Number(1e-6, 1e6, "GPa") if self.unit == "gpa" else Number(1e-9, 1e9, "N m")
+
+    def read(self, value: object) -> StatedPrior:
+        if not isinstance(value, dict):
+            raise Refusal(Complaint("a table with a distribution", shown(value)))
+        if value.get("distribution") not in _DISTRIBUTIONS:
+            read_table({"distribution": value.get("distribution")}, {"distribution": Choice(_DISTRIBUTIONS)})
+        number, si = self.number, self.number.si
+        median, lower, upper = (f"{key}_{self.unit}" for key in ("median", "lower", "upper"))
+        readers: dict[str, Any] = {"distribution": Choice(_DISTRIBUTIONS), "source": read_text}
+        if value["distribution"] == "log-normal":
+            readers |= {median: number, "factor": read_factor}
+            read = read_table(value, readers, needed=readers)
+            return StatedPrior(Quantity.from_median(read[median] * si, read["factor"]), read["source"])
+        readers |= {lower: number, upper: number}
+        read = read_table(value, readers, needed=readers)
+        if not read[lower] < read[upper]:
+            both = f"{shown(value[lower])} and {shown(value[upper])}"
+            raise Refusal(Complaint(f"{lower} below {upper}", both))
+        return StatedPrior(Quantity.from_range(read[lower] * si, read[upper] * si), read["source"])
+
+    def write(self, stated: StatedPrior) -> dict[str, Any]:
+        one, si = stated.quantity, self.number.si
+        if one.kind == "log-uniform":
+            numbers = {f"lower_{self.unit}": in_unit(one.lower, si), f"upper_{self.unit}": in_unit(one.upper, si)}
+        else:
+            median, factor = median_and_factor(one, si, lambda m, f: Quantity.from_median(m * si, f))
+            numbers = {f"median_{self.unit}": median, "factor": factor}
+        return {"distribution": one.kind, **numbers, "source": stated.source}
+
+
+def _with_source(read: Callable[[Any], Quantity], write: Callable[[Quantity], dict[str, Any]]) -> Key:
+    """A key that holds a quantity in a table with its source."""
+
+    def read_both(value: object) -> StatedPrior:
+        if not isinstance(value, dict):
+            raise Refusal(Complaint("a table with a source", shown(value)))
+        if "source" not in value:
+            raise Refusal(Complaint("where the numbers come from", "nothing", inside=("source",)))
+        quantity = read({key: entry for key, entry in value.items() if key != "source"})
+        return StatedPrior(quantity, read_text(value["source"]))
+
+    return Key(read_both, lambda stated: write(stated.quantity) | {"source": stated.source})
+
+
+_ELASTIC, _RIGIDITY = (Key(one.read, one.write) for one in (_Constant("gpa"), _Constant("n_m")))
+_NOISE = _with_source(read_noise_percent, lambda one: written_noise(one, 1.0))
+_POISSON = _with_source(POISSON.read, POISSON.write)
+_DENSITY = _with_source(QuantityReader(DENSITY), QuantityReader(DENSITY).written)
+
+
+class PriorCard(Section):
+    """Priors of E_x, E_y, G_xy or of D_x, D_y, D_s, of E for isotropic boards, and optionally the noise and nu_xy.
+
+    `load_prior` makes one.
+    """
+
+    format: Annotated[Literal[1], Key(read_format)] = Field(description="1")
+    name: Annotated[str, Key(read_name)] = Field(description="the name of the file without .toml")
+    title: Annotated[str, Key(read_text)] = ""
+    E_x: Annotated[StatedPrior | None, _ELASTIC] = None
+    E_y: Annotated[StatedPrior | None, _ELASTIC] = None
+    G_xy: Annotated[StatedPrior | None, _ELASTIC] = None
+    D_x: Annotated[StatedPrior | None, _RIGIDITY] = None
+    D_y: Annotated[StatedPrior | None, _RIGIDITY] = None
+    D_s: Annotated[StatedPrior | None, _RIGIDITY] = None
+    E: Annotated[StatedPrior | None, _ELASTIC] = None
+    stated_noise: Annotated[StatedPrior | None, _NOISE] = Field(default=None, alias="noise_percent")
+    stated_poisson: Annotated[StatedPrior | None, _POISSON] = Field(default=None, alias="poisson_xy")
+    stated_density: Annotated[StatedPrior | None, _DENSITY] = Field(default=None, alias="density_kg_m3")
+
+    @classmethod
+    def from_quantities(
+        cls,
+        name: str,
+        constants: Mapping[str, Quantity],
+        *,
+        source: str | Mapping[str, str],
+        noise: Quantity | None = None,
+        poisson_xy: Quantity | None = None,
+        density: Quantity | None = None,
+        title: str = "",
+    ) -> PriorCard:
+        """A prior from quantities.
+
+        Parameters
+        ----------
+        name : str
+        constants : dict of Quantity
+            E_x, E_y, G_xy in Pa, or D_x, D_y, D_s in N m, and E in Pa of isotropic boards, beside them or alone; each
+            from `Quantity.from_median` or `Quantity.from_range`.
+        source : str or dict of str
+            Where the numbers come from: one text, or one for each of them (also noise, poisson_xy, density_kg_m3).
+        noise : Quantity, optional
+            Relative noise of a frequency, from `Quantity.from_median`.
+        poisson_xy : Quantity, optional
+            Normal: `Quantity.from_mean(0.4, 0.08, "normal")`.
+        density : Quantity, optional
+            kg m^-3; no density is taken from it, but a board of another one is asked about.
+        title : str
+
+        Returns
+        -------
+        PriorCard
+
+        Raises
+        ------
+        InputError
+            With everything that a prior card cannot hold, and its place on the card.
+        """
+        faults = list(wrong_types(str(name), (
+            ("name", name, isinstance(name, str), "a text"),
+            ("title", title, isinstance(title, str), "a text"),
+            ("constants", constants, isinstance(constants, Mapping), "a dict of quantities by name"),
+            ("source", source, isinstance(source, str | Mapping), "a text, or a dict of texts by name"),
+        )))  # fmt: skip
+        if faults:
+            raise InputError(faults)
+        if not isinstance(source, str):  # as `sources` has it, for a prior that is made of another one
+            source = {"noise" if key == "noise_percent" else key: one for key, one in source.items()}
+        faults = [Fault(f"{name} {key}", f"one of {', '.join(_CONSTANTS)}", "an unknown name")
+                  for key in constants if key not in _CONSTANTS]  # fmt: skip
+        known = "Quantity.from_median or Quantity.from_range, a constant known to some extent"
+        for key, quantity, kinds, wanted in (
+            *((key, one, ("log-normal", "log-uniform"), known) for key, one in constants.items()),
+            ("noise", noise, ("log-normal",), "Quantity.from_median"),
+            ("poisson_xy", poisson_xy, ("normal",), 'Quantity.from_mean(0.4, 0.08, "normal")'),
+            ("density", density, ("log-normal",), "Quantity.from_mean(430, 60)"),
+        ):
+            if not (_is_of_a_card(quantity, kinds) or (quantity is None and key not in constants)):
+                got = "another kind of quantity" if isinstance(quantity, Quantity) else repr(quantity)
+                faults.append(Fault(f"{name} {key}", f"{wanted}, without bounds", got))
+        further = {"noise": noise, "poisson_xy": poisson_xy, "density_kg_m3": density}
+        stated = {**constants, **{key: one for key, one in further.items() if one is not None}}
+        faults += _source_faults(name, source, stated)
+        if faults:
+            raise InputError(faults)
+
+        fields = {"noise": "stated_noise", "poisson_xy": "stated_poisson", "density_kg_m3": "stated_density"}
+        priors: dict[str, Any] = {
+            fields.get(key, key): StatedPrior(
+                one.scaled(100.0) if key == "noise" else one, source if isinstance(source, str) else source[key]
+            )
+            for key, one in stated.items()
+        }
+        made = cls.model_construct(format=1, name=name, title=title, **priors)
+        return validated(cls, CardFile(made.table(), f"{name}.toml"), _set_faults)
+
+    def table(self) -> dict[str, Any]:
+        """The table of the card."""
+        return self.model_dump(by_alias=True, exclude_defaults=True)
+
+    def to_toml(self, path: str | os.PathLike[str] | None = None, *, force: bool = False) -> str:
+        """The prior as a card, in TOML.
+
+        Parameters
+        ----------
+        path : path, optional
+            File to write, NAME.toml; nothing is written without it.
+        force : bool
+            Replace a file that is there.
+
+        Returns
+        -------
+        str
+            The text of the card.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        text = toml_text(self.table())
+        if path is not None:
+            write_card(path, self.name, text, force=force)
+        return text
+
+    @property
+    def stated_constants(self) -> dict[str, StatedPrior]:
+        """Name of the constant to its prior and source: all of E_x, E_y, G_xy or all of D_x, D_y, D_s.
+
+        Of a prior of isotropic boards alone E_x, which is their E.
+        """
+        found = {name: stated for name in (*ELASTIC, *RIGIDITY) if (stated := getattr(self, name)) is not None}
+        return found if found or self.E is None else {"E_x": self.E}
+
+    @property
+    def is_of_isotropic(self) -> bool:
+        """Whether it is a prior of isotropic boards alone, which states E and nothing else of the constants."""
+        return self.E is not None and not any(getattr(self, name) for name in (*ELASTIC, *RIGIDITY))
+
+    def for_board(self, is_isotropic: bool) -> PriorCard | None:
+        """The prior as a board takes it: of E alone where that is isotropic; None where it states no such constants."""
+        if not is_isotropic:
+            return None if self.is_of_isotropic else self
+        return None if self.E is None else self.model_copy(update=dict.fromkeys((*ELASTIC, *RIGIDITY)))
+
+    @property
+    def constants(self) -> dict[str, Quantity]:
+        """Name of the constant to its prior, in SI units."""
+        return {name: stated.quantity for name, stated in self.stated_constants.items()}
+
+    @property
+    def noise_percent(self) -> Quantity | None:
+        """Prior of the noise in percent, if the card states one."""
+        return self.stated_noise.quantity if self.stated_noise else None
+
+    @property
+    def poisson_xy(self) -> Quantity | None:
+        """Prior of nu_xy, if the card states one."""
+        return self.stated_poisson.quantity if self.stated_poisson else None
+
+    @property
+    def density(self) -> Quantity | None:
+        """Densities that such boards have, kg m^-3, if the card states them."""
+        return self.stated_density.quantity if self.stated_density else None
+
+    @property
+    def sources(self) -> dict[str, str]:
+        """Name of each stated prior to its source."""
+        stated = {
+            "noise_percent": self.stated_noise,
+            "poisson_xy": self.stated_poisson,
+            "density_kg_m3": self.stated_density,
+        }
+        return {name: one.source for name, one in (self.stated_constants | stated).items() if one}
+
+
+def load_prior(name_or_path: str | os.PathLike[str], beside: Path | None = None) -> PriorCard:
+    """Read a prior card.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+        Name of a shipped card, or a path: it contains a separator or ends in .toml.
+    beside : Path, optional
+        Folder that a relative path starts from: that of the board card which names the prior.
+
+    Raises
+    ------
+    InputError
+        If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at once.
+    """
+    return validated(PriorCard, CardFile.load("priors", name_or_path, beside), _set_faults)
+
+
+def read_prior_text(text: str, name: str) -> PriorCard:
+    """Read a prior card from a text, as if it stood in NAME.toml; raises InputError like `load_prior`."""
+    return validated(PriorCard, CardFile.of(text, f"{name}.toml"), _set_faults)
+
+
+def _is_of_a_card(quantity: object, kinds: tuple[str, ...]) -> bool:
+    """Whether a prior card can state a density: it is of such a kind, and has no bounds but those of its kind."""
+    if not isinstance(quantity, Quantity) or quantity.is_exact or quantity.kind not in kinds:
+        return False
+    return quantity.kind == "log-uniform" or (quantity.lower == -math.inf and quantity.upper == math.inf)
+
+
+def _source_faults(name: str, source: str | Mapping[str, str], stated: Collection[str]) -> Iterator[Fault]:
+    """Sources that are empty or lacking, and those of a name that a prior cannot have."""
+    wanted = "where the numbers come from"
+    if isinstance(source, str):
+        if not source.strip():
+            yield Fault(f"{name} source", wanted, "an empty text")
+        return
+    known = (*_CONSTANTS, "noise", "poisson_xy", "density_kg_m3")
+    for key in source:
+        if key not in known:
+            yield Fault(f"{name} source {key}", f"one of {', '.join(known)}", str(key), did_you_mean(str(key), known))
+    for key in stated:
+        if not isinstance(source.get(key), str) or not source[key].strip():
+            yield Fault(f"{name} source {key}", wanted, repr(source.get(key)))
+
+
+def _set_faults(table: Mapping[str, Any], file: str) -> list[Fault]:
+    """Three priors that belong together, no mixture and no gap; or that of an isotropic board alone."""
+    given = [name for name in (*ELASTIC, *RIGIDITY) if name in table]
+    if tuple(given) in (ELASTIC, RIGIDITY) or (not given and OF_ISOTROPIC in table):
+        return []
+    wanted = f"all of {', '.join(ELASTIC)} or all of {', '.join(RIGIDITY)}"
+    return [Fault(file, wanted, ", ".join(given) or "none of them")]

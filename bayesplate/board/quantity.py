@@ -1,0 +1,444 @@
+"""A number with its uncertainty is a prior: readings, a standard deviation, log-normal, bounded."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import zip_longest
+from numbers import Real
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import log_ndtr, ndtr, ndtri
+
+from bayesplate.errors import Fault, InputError
+
+Kind = Literal["normal", "log-normal", "log-uniform"]
+Floats = NDArray[np.float64]
+_BETWEEN = math.nextafter(0.0, 1.0), math.nextafter(1.0, 0.0)
+_LOG_ROOT_TWO_PI = 0.5 * math.log(2.0 * math.pi)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number and what is not known about it.
+
+    It is sampled in a standard coordinate z, normal with mean 0 and standard deviation 1: `value` leads from z to the
+    number, `standard` back, `log_prior` is the density of z. An exact quantity has one value whatever z is.
+
+    Attributes
+    ----------
+    mean, sd : float
+        Mean and standard deviation, in the quantity's unit, before truncation; sd = 0 says that the number is exact.
+    kind : {"normal", "log-normal", "log-uniform"}
+        A positive physical quantity is log-normal with exactly this mean and sd; a Poisson ratio is normal; a constant
+        of which only the range is known is log-uniform between its bounds.
+    lower, upper : float
+        Bounds; a normal or log-normal density is truncated there and normalised again.
+    readings : tuple of float
+        What was read, in the quantity's unit; empty if only a mean was given.
+    resolution : float
+        Step to which the readings were rounded, in the quantity's unit.
+    at_x, at_y : tuple of float
+        Places of the readings on the plate, in the unit of the place; one per reading, or empty.
+    place_sd : float
+        Standard deviation of each coordinate of these places, in their unit; 0 if they are as stated.
+    """
+
+    mean: float
+    sd: float = 0.0
+    kind: Kind = "log-normal"
+    lower: float = -math.inf
+    upper: float = math.inf
+    readings: tuple[float, ...] = ()
+    resolution: float = 0.0
+    at_x: tuple[float, ...] = ()
+    at_y: tuple[float, ...] = ()
+    place_sd: float = 0.0
+
+    def __post_init__(self) -> None:
+        faults = tuple(self._faults())
+        if faults:
+            raise InputError(faults)
+
+    def _faults(self) -> Iterator[Fault]:
+        """What makes no quantity of these values."""
+        if self.kind not in get_args(Kind):
+            yield Fault("kind", ", ".join(get_args(Kind)), repr(self.kind))
+        if not math.isfinite(self.mean):
+            yield Fault("mean", "a finite number", f"{self.mean}")
+        for name, size in (("sd", self.sd), ("resolution", self.resolution), ("place_sd", self.place_sd)):
+            if not 0 <= size < math.inf:
+                yield Fault(name, "a finite number, zero or positive", f"{size}")
+        if self.kind == "log-normal" and self.sd > 0 and self.mean <= 0:
+            yield Fault("mean", "a positive number for a log-normal quantity", f"{self.mean}")
+        is_range = self.kind == "log-uniform"
+        if not self.lower < self.upper or (is_range and not 0 < self.lower < self.upper < math.inf):
+            wanted = "0 < lower < upper" if is_range else "lower < upper"
+            yield Fault("bounds", wanted, f"{self.lower} and {self.upper}")
+        for places in (self.at_x, self.at_y):
+            if places and len(places) != len(self.readings):
+                yield Fault("places", f"one per reading ({len(self.readings)})", f"{len(places)}")
+
+    @classmethod
+    def exact(cls, value: float) -> Quantity:
+        """A number without uncertainty."""
+        number = _number("value", value)
+        return cls(number, kind="log-normal" if number > 0 else "normal")
+
+    @classmethod
+    def from_mean(
+        cls, mean: float, sd: float, kind: Kind = "log-normal", lower: float = -math.inf, upper: float = math.inf
+    ) -> Quantity:
+        """A number with a standard deviation, both in the quantity's unit; log-normal unless said otherwise."""
+        return cls(_number("mean", mean), _number("sd", sd), kind, _number("lower", lower), _number("upper", upper))
+
+    @classmethod
+    def from_median(cls, median: float, factor: float) -> Quantity:
+        """A log-normal quantity whose logarithm has the standard deviation ln(factor).
+
+        Parameters
+        ----------
+        median : float
+            Positive, in the quantity's unit.
+        factor : float
+            Above 1: about two thirds of the probability lies between median / factor and median * factor.
+        """
+        median, factor = _number("median", median), _number("factor", factor)
+        if not (0 < median < math.inf and 1 < factor < math.inf):
+            raise InputError(Fault("median and factor", "median > 0 and factor > 1", f"{median} and {factor}"))
+        variance = math.log(factor) ** 2
+        mean = median * math.exp(variance / 2)
+        return cls(mean, mean * math.sqrt(math.expm1(variance)))
+
+    @classmethod
+    def from_range(cls, lower: float, upper: float) -> Quantity:
+        """A quantity whose logarithm is uniform between two positive bounds, in the quantity's unit."""
+        lower, upper = _number("lower", lower), _number("upper", upper)
+        if not 0 < lower < upper < math.inf:
+            raise InputError(Fault("bounds", "0 < lower < upper", f"{lower} and {upper}"))
+        width = math.log1p((upper - lower) / lower)
+        mean, half = (upper - lower) / width, 0.5 * width
+        # x coth(x) - 1, by its series where all digits would cancel
+        squares = half / math.tanh(half) - 1.0 if half > 1e-3 else half**2 / 3.0
+        return cls(mean, mean * math.sqrt(squares), "log-uniform", lower, upper)
+
+    @classmethod
+    def from_readings(
+        cls,
+        readings: Sequence[float],
+        resolution: float = 0.0,
+        at_x: Sequence[float] = (),
+        at_y: Sequence[float] = (),
+        kind: Kind = "log-normal",
+        place_sd: float = 0.0,
+    ) -> Quantity:
+        """The mean of readings, with sd**2 = s**2 / n + resolution**2 / 12.
+
+        The first term is the squared standard error; the second, the rounding error, is not averaged away, because
+        readings of one thing are rounded alike. With one reading only the rounding remains. Readings at different
+        places are rounded each on its own, and the second term is resolution**2 / (12 n).
+
+        Parameters
+        ----------
+        readings : sequence of float
+            At least one, in the quantity's unit.
+        resolution : float
+            Step to which they were rounded; 0 if they were not.
+        at_x, at_y : sequence of float
+            Places of the readings, one each; empty if they have none.
+        kind : {"normal", "log-normal"}
+        place_sd : float
+            See the class.
+        """
+        given: object = readings
+        if isinstance(given, str) or not isinstance(given, Iterable):
+            raise InputError(Fault("readings", "a list or an array of numbers", repr(readings)))
+        values = tuple(_number("readings", value) for value in readings)
+        if not values:
+            raise InputError(Fault("readings", "at least one", "none"))
+        if not all(map(math.isfinite, values)):
+            raise InputError(Fault("readings", "finite numbers", f"{list(values)}"))
+        resolution = _number("resolution", resolution)
+        # statistics computes with fractions: equal readings have a variance of exactly zero
+        scatter = statistics.variance(values) / len(values) if len(values) > 1 else 0.0
+        places_x, places_y = (tuple(_number("places", value) for value in places) for places in (at_x, at_y))
+        n_places = len(set(zip_longest(places_x, places_y)))
+        sd = math.sqrt(scatter + resolution**2 / 12 / (len(values) if n_places > 1 else 1))
+        return cls(statistics.mean(values), sd, kind, readings=values, resolution=resolution,
+                   at_x=places_x, at_y=places_y, place_sd=_number("place_sd", place_sd))  # fmt: skip
+
+    @classmethod
+    def of(cls, stated: Quantity | ArrayLike | None, kind: Kind = "log-normal") -> Quantity:
+        """What was stated as a quantity: a number is exact, an array holds readings, a quantity stays.
+
+        Parameters
+        ----------
+        stated : Quantity, number or array of any shape, in the quantity's unit
+        kind : {"normal", "log-normal"}
+            Of readings; see the class.
+
+        Returns
+        -------
+        Quantity
+
+        Raises
+        ------
+        InputError
+            If it is none of these, or not finite.
+        """
+        if isinstance(stated, Quantity):
+            return stated
+        try:
+            values = np.asarray(stated)
+        except ValueError:  # rows of different lengths
+            values = np.asarray(None)
+        if values.dtype.kind not in "iuf":
+            raise InputError(Fault("quantity", "a number, an array of readings or a Quantity", repr(stated)))
+        if not np.isfinite(values).all():
+            raise InputError(Fault("quantity", "finite numbers", repr(stated)))
+        if values.ndim:
+            return cls.from_readings(values.astype(np.float64).ravel().tolist(), kind=kind)
+        return cls.exact(float(values))
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the number has no uncertainty."""
+        return self.sd == 0
+
+    @property
+    def has_profile(self) -> bool:
+        """Whether the readings have places, so that they describe how the quantity varies over the plate."""
+        return bool(self.at_x or self.at_y)
+
+    @property
+    def log_sd(self) -> float:
+        """Standard deviation of the logarithm, before truncation; 0 if exact."""
+        if self.is_exact:
+            return 0.0
+        if self.kind == "normal":
+            raise ValueError("log_sd: wanted the quantity of a positive thing, got a normal one")
+        if self.kind == "log-uniform":
+            return math.log(self.upper / self.lower) / math.sqrt(12.0)
+        return math.sqrt(math.log1p((self.sd / self.mean) ** 2))
+
+    @property
+    def factor(self) -> float:
+        """exp of the standard deviation of the logarithm: two thirds of a log-normal lie within it about the median."""
+        return math.exp(self.log_sd)
+
+    @property
+    def median(self) -> float:
+        """The value at z = 0, in the quantity's unit."""
+        if self.is_exact or self.kind == "normal":
+            return self.mean
+        if self.kind == "log-uniform":
+            return math.sqrt(self.lower * self.upper)
+        return self.mean * math.exp(-(self.log_sd**2) / 2)
+
+    def value(self, z: ArrayLike) -> Floats:
+        """The number at the standard coordinate z.
+
+        Parameters
+        ----------
+        z : array of any shape, no unit
+
+        Returns
+        -------
+        array of the same shape, in the quantity's unit
+        """
+        coordinate = np.asarray(z, dtype=np.float64)
+        if self.is_exact:
+            return np.full(coordinate.shape, self.mean)[()]
+        if self.kind == "normal":
+            return np.asarray(self.mean + self.sd * coordinate)[()]
+        if self.kind == "log-uniform":
+            return np.asarray(self.lower * (self.upper / self.lower) ** ndtr(coordinate))[()]
+        return np.asarray(self.median * np.exp(self.log_sd * coordinate))[()]
+
+    def standard(self, value: ArrayLike) -> Floats:
+        """The standard coordinate of a value; the inverse of `value`.
+
+        Parameters
+        ----------
+        value : array of any shape, in the quantity's unit
+
+        Returns
+        -------
+        array of the same shape, no unit
+            0 if the quantity is exact; infinite beyond what a quantity can be: zero for a log-normal one, its bounds
+            for a log-uniform one.
+        """
+        number = np.asarray(value, dtype=np.float64)
+        if self.is_exact:
+            return np.zeros(number.shape)[()]
+        if self.kind == "normal":
+            return np.asarray((number - self.mean) / self.sd)[()]
+        if self.kind == "log-uniform":
+            share = np.log(np.clip(number, self.lower, self.upper) / self.lower) / math.log(self.upper / self.lower)
+            return np.asarray(ndtri(share))[()]
+        positive = number > 0
+        ratio = np.where(positive, number, self.median) / self.median
+        return np.where(positive, np.log(ratio) / self.log_sd, -np.inf)[()]
+
+    def log_prior(self, z: ArrayLike) -> Floats:
+        """Logarithm of the density of z, normalised over the part within the bounds.
+
+        Parameters
+        ----------
+        z : array of any shape, no unit
+
+        Returns
+        -------
+        array of the same shape, no unit
+            -inf outside the bounds. An exact quantity has no bounds to keep and returns the standard normal density.
+        """
+        coordinate = np.asarray(z, dtype=np.float64)
+        density = -0.5 * coordinate**2 - _LOG_ROOT_TWO_PI
+        if self.is_exact or (self.lower == -math.inf and self.upper == math.inf):
+            return np.asarray(density)[()]
+        low, high = self.standard_bounds
+        inside = (coordinate >= low) & (coordinate <= high)
+        return np.where(inside, density - _log_probability(low, high), -np.inf)[()]
+
+    @property
+    def standard_bounds(self) -> tuple[float, float]:
+        """The standard coordinates of the bounds; infinite where there are none."""
+        low = float(self.standard(self.lower)) if math.isfinite(self.lower) else -math.inf
+        high = float(self.standard(self.upper)) if math.isfinite(self.upper) else math.inf
+        return low, high
+
+    def log_density(self, value: ArrayLike) -> Floats:
+        """Logarithm of the normalised density of the quantity itself.
+
+        Parameters
+        ----------
+        value : array of any shape, in the quantity's unit
+
+        Returns
+        -------
+        array of the same shape, per unit
+            -inf outside the support.
+
+        Raises
+        ------
+        ValueError
+            If the quantity is exact, and so has no density.
+        """
+        if self.is_exact:
+            raise ValueError("log_density: wanted an uncertain quantity, got an exact one")
+        number = np.asarray(value, dtype=np.float64)
+        if self.kind == "normal":
+            return np.asarray(self.log_prior(self.standard(number)) - math.log(self.sd))[()]
+        possible = number > 0
+        logarithm = np.log(np.where(possible, number, self.median))
+        return np.where(possible, self.log_density_of_log(logarithm) - logarithm, -np.inf)[()]
+
+    def log_density_of_log(self, logarithm: ArrayLike) -> Floats:
+        """Logarithm of the normalised density of the logarithm of a positive quantity.
+
+        Parameters
+        ----------
+        logarithm : array of any shape, of the quantity in its unit
+
+        Returns
+        -------
+        array of the same shape, no unit
+            -inf outside the support.
+
+        Raises
+        ------
+        ValueError
+            If the quantity is exact or normal.
+        """
+        if self.is_exact or self.kind == "normal":
+            raise ValueError("log_density_of_log: wanted the quantity of a positive thing, got an exact or normal one")
+        at = np.asarray(logarithm, dtype=np.float64)
+        if self.kind == "log-uniform":
+            low, high = math.log(self.lower), math.log(self.upper)
+            return np.where((at >= low) & (at <= high), -math.log(high - low), -np.inf)[()]
+        log_sd = self.log_sd
+        return np.asarray(self.log_prior((at - math.log(self.median)) / log_sd) - math.log(log_sd))[()]
+
+    def standard_quantile(self, probability: ArrayLike) -> Floats:
+        """The standard coordinate below which the quantity lies with a given probability.
+
+        Parameters
+        ----------
+        probability : array of any shape, 0 to 1
+
+        Returns
+        -------
+        array of the same shape, no unit
+            Finite at 0 and 1 too, where it is that of the nearest number between them.
+        """
+        share = np.asarray(probability, dtype=np.float64)
+        low, high = self.standard_bounds
+        if low > 0:  # probabilities next to 1 have lost their digits: the same from the other end
+            above, beyond = float(ndtr(-low)), float(ndtr(-high))
+            return np.asarray(-ndtri(np.clip(beyond + (above - beyond) * (1.0 - share), *_BETWEEN)))[()]
+        below, within = float(ndtr(low)), float(ndtr(high))
+        return np.asarray(ndtri(np.clip(below + (within - below) * share, *_BETWEEN)))[()]
+
+    def quantile(self, probability: ArrayLike) -> Floats:
+        """The value below which the quantity lies with a given probability.
+
+        Parameters
+        ----------
+        probability : array of any shape, 0 to 1
+
+        Returns
+        -------
+        array of the same shape, in the quantity's unit
+        """
+        return self.value(self.standard_quantile(probability))
+
+    def sample(self, rng: np.random.Generator, n: int) -> Floats:
+        """Draws of the quantity: (n,) array in its unit."""
+        return np.asarray(self.quantile(rng.uniform(size=n)))
+
+    def scaled(self, factor: float, place_factor: float = 1.0) -> Quantity:
+        """The same quantity in another unit.
+
+        Parameters
+        ----------
+        factor : float
+            Positive. It multiplies mean, sd, bounds, readings and resolution.
+        place_factor : float
+            The same for the places of the readings.
+        """
+        if not factor > 0:
+            raise ValueError(f"factor: wanted a positive number, got {factor}")
+        return replace(
+            self,
+            mean=self.mean * factor,
+            sd=self.sd * factor,
+            lower=self.lower * factor,
+            upper=self.upper * factor,
+            readings=tuple(value * factor for value in self.readings),
+            resolution=self.resolution * factor,
+            at_x=tuple(place * place_factor for place in self.at_x),
+            at_y=tuple(place * place_factor for place in self.at_y),
+            place_sd=self.place_sd * place_factor,
+        )
+
+
+def _number(place: str, value: object) -> float:
+    """A number as such; raises InputError for a text, a truth value and an array."""
+    is_scalar = isinstance(value, np.ndarray) and not value.ndim and value.dtype.kind in "iuf"
+    if isinstance(value, bool) or not (is_scalar or isinstance(value, Real)):
+        raise InputError(Fault(place, "a number", repr(value)))
+    return float(value)  # type: ignore[arg-type]
+
+
+def _log_probability(low: float, high: float) -> float:
+    """Logarithm of the standard normal probability between two bounds, stable in both tails."""
+    if low > 0:
+        low, high = -high, -low
+    log_high, log_low = float(log_ndtr(high)), float(log_ndtr(low))
+    if log_low == -math.inf:
+        return log_high
+    return log_high + math.log(-math.expm1(log_low - log_high))

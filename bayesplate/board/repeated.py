@@ -1,0 +1,101 @@
+"""Readings of one thing: a list with decimal commas or strays is refused, one without scatter gets a resolution."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from bayesplate.board.values import Complaint
+from bayesplate.board.words import shown
+
+FURTHEST_SIZES = 2.0
+"""Ratio of the largest to the smallest reading of one size or mass. A board tapers by less; one that does not is a
+profile, whose readings have places."""
+
+FURTHEST_FREQUENCIES = 1.1
+"""The same of one mode's frequency. Frequencies of a free board scatter by 0.3 %; clamping it again moves them by up to
+2.4 % (one standard deviation), so two readings a tenth apart are of two modes."""
+
+CALIPER, FEELER, RULE = 0.05, 0.1, 1.0  # mm
+SCALES, FINE_SCALES = 1.0, 0.1  # g
+"""Resolutions that are assumed where all readings are alike and the card states none: of a thickness, of a warp, of
+lengths, of the board's mass and of the mass of something attached. Alike readings have no scatter, but no instrument is
+exact."""
+
+_WHOLE_NUMBERS_APART = 1.5
+_JOINED_APART = 1.25
+"""[2, 3, 2] may be whole millimetres; [2, 8, 2, 7] are further apart than 1.5, and 2.8 and 2.7 nearer than 1.25."""
+
+_LONGEST_DECIMALS = 999
+
+
+def comma_complaint(items: Sequence[Any], furthest: float) -> Complaint | None:
+    """What is wrong with [2,8, 2,7]: TOML reads four whole numbers where two decimals were meant.
+
+    Parameters
+    ----------
+    items : sequence
+        The list as TOML read it.
+    furthest : float
+        Ratio up to which readings of this thing may lie apart.
+
+    Returns
+    -------
+    Complaint or None
+        None where the whole numbers may be the readings themselves, or the decimals would not go together either.
+    """
+    pairs = _pairs(items)
+    if not pairs or spread(items) <= _WHOLE_NUMBERS_APART:
+        return None
+    texts = [f"{whole}.{decimals}" for whole, decimals in pairs]
+    if spread([float(text) for text in texts]) > min(_JOINED_APART, furthest):
+        return None
+    remedy = f"a decimal point: {_listed(texts)}; whole numbers so far apart are not readings of one thing"
+    return _complaint(items, pairs, remedy)
+
+
+def peak_comma_complaint(items: Sequence[Any]) -> Complaint | None:
+    """The same of a list of different peaks, [448,8, 594,1]; a list in ascending order is never refused."""
+    pairs = _pairs(items)
+    wholes, decimals = [w for w, _ in pairs], [d for _, d in pairs]
+    if not pairs or wholes != sorted(wholes) or max(len(str(d)) for d in decimals) >= len(str(wholes[0])):
+        return None
+    remedy = f"a decimal point: {_listed([f'{w}.{d}' for w, d in pairs])}; or the whole numbers in ascending order"
+    return _complaint(items, pairs, remedy)
+
+
+def scatter_complaint(readings: Sequence[float], furthest: float) -> Complaint | None:
+    """What is wrong with readings of one thing that lie further apart than a factor; None if they do not."""
+    if spread(readings) <= furthest:
+        return None
+    wanted = f"readings of one thing, the largest at most {furthest:g} times the smallest"
+    remedy = "one of them is another thing's, or a decimal has a comma in place of its point"
+    return Complaint(wanted, f"{min(readings):g} and {max(readings):g}", remedy)
+
+
+def are_alike(readings: Sequence[Any]) -> bool:
+    """Whether readings do not differ, so that their scatter says nothing."""
+    return all(reading == readings[0] for reading in readings)
+
+
+def spread(values: Sequence[float]) -> float:
+    """Ratio of the largest to the smallest; infinite where one is not positive."""
+    return max(values) / min(values) if min(values) > 0 else float("inf")
+
+
+def _pairs(items: Sequence[Any]) -> list[tuple[int, int]]:
+    """Whole numbers two by two, the second of each short enough for decimals; empty if they are not."""
+    if not items or len(items) % 2 or any(type(item) is not int or not 0 <= item < 10**9 for item in items):
+        return []
+    pairs = list(zip(items[::2], items[1::2], strict=True))
+    return pairs if all(decimals <= _LONGEST_DECIMALS for _, decimals in pairs) else []
+
+
+def _complaint(items: Sequence[int], pairs: Sequence[tuple[int, int]], remedy: str) -> Complaint:
+    if all(0 < whole <= 999 and decimals > 99 for whole, decimals in pairs):
+        remedy += f"; without a separator of thousands: {_listed([f'{w}{d}' for w, d in pairs])}"
+    return Complaint("numbers without commas inside them", _listed([shown(item) for item in items]), remedy)
+
+
+def _listed(texts: Sequence[str]) -> str:
+    return f"[{', '.join(texts[:6])}{', ...' if len(texts) > 6 else ''}]"

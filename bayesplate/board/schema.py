@@ -1,0 +1,176 @@
+"""A table is held against a model, and everything that does not fit becomes a fault with its place."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cache
+from typing import Any, TypeVar, get_args, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic.fields import FieldInfo
+
+from bayesplate.board.card_file import CardFile
+from bayesplate.board.values import Complaint, Refusal
+from bayesplate.board.words import did_you_mean, name_complaint, quoted, shown
+from bayesplate.errors import Fault, InputError
+
+MOST_FAULTS = 50
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,60}")
+Keys = tuple[str, ...]
+
+
+class Section(BaseModel):
+    """A part of a card: frozen, and unknown keys are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+CardModel = TypeVar("CardModel", bound=Section)
+
+
+def validated(
+    model: type[CardModel],
+    card: CardFile,
+    faults_of: Callable[[Mapping[str, Any], str], Iterable[Fault]] = lambda table, file: (),
+    context: Mapping[str, Any] | None = None,
+    file: str = "",
+) -> CardModel:
+    """A card from the table of its file.
+
+    Parameters
+    ----------
+    model : subclass of Section
+    card : CardFile
+    faults_of : callable
+        What is wrong with keys beside one another, from the raw table and the file's name as messages show it: these
+        faults are reported together with those of single keys.
+    context : mapping, optional
+        Handed to the model.
+    file : str
+        In place of the file's name in messages.
+
+    Raises
+    ------
+    InputError
+        With every fault of the card at once, the first fifty written out.
+    """
+    table, file = card.table, file or card.shown
+    found = [*_name_faults(table, file, card.stem), *faults_of(table, file)]
+    try:
+        read = model.model_validate(table, context={"card": card, **(context or {})})
+    except ValidationError as error:
+        details = error.errors(include_url=False)
+        found += [fault for detail in details[:MOST_FAULTS] for fault in _faults(model, table, file, detail)]
+        more = len(details) - MOST_FAULTS
+    else:
+        if not found:
+            return read
+        more = 0
+    more = max(more, 0) + len(found[MOST_FAULTS:])
+    listed = found[:MOST_FAULTS]
+    if more:
+        listed.append(Fault(file, "a card without faults", f"{more} more faults, not listed"))
+    raise InputError(listed)
+
+
+def place(file: str, table: Mapping[str, Any], inside: Sequence[str | int]) -> str:
+    """Where a value stands: 'my-board.toml [plate] thickness_mm', 'my-board.toml [[setup]] 2 "free" edges.x0'."""
+    if not inside:
+        return file
+    head, *rest = inside
+    value = table.get(str(head))
+    number = rest[0] if rest else None
+    if isinstance(value, list) and isinstance(number, int) and any(isinstance(entry, dict) for entry in value):
+        rest = rest[1:]
+        entry = value[number] if number < len(value) else None
+        name = entry.get("name") if isinstance(entry, dict) else None
+        text = f"{file} [[{head}]] {number + 1}" + (f" {quoted(name)}" if isinstance(name, str) else "")
+    elif isinstance(value, dict):
+        rest = rest[1:] if rest and isinstance(rest[0], int) else rest
+        text = f"{file} [{_key(str(head))}]"
+    else:
+        text = f"{file} {_key(str(head))}"
+    separator = " "
+    for part in rest:
+        text += f" {part + 1}" if isinstance(part, int) else separator + _key(part)
+        separator = " " if isinstance(part, int) else "."
+    return text
+
+
+def _key(key: str) -> str:
+    return key if _BARE_KEY.fullmatch(key) else quoted(key)
+
+
+def _faults(model: type[Section], table: Mapping[str, Any], file: str, detail: Any) -> Iterator[Fault]:
+    """The faults behind one error of pydantic."""
+    inside: tuple[str | int, ...] = detail["loc"]
+    for one in _complaints(model, inside, detail):
+        yield Fault(place(file, table, (*inside, *one.inside)), one.wanted, one.got, one.remedy)
+
+
+def _complaints(model: type[Section], inside: tuple[str | int, ...], detail: Any) -> Sequence[Complaint]:
+    error = detail.get("ctx", {}).get("error")
+    if isinstance(error, Refusal):
+        return error.complaints
+    sections = sections_of(model)
+    keys = tuple(part for part in inside if isinstance(part, str))
+    if detail["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+        return (_unknown_key(keys, sections),)
+    if detail["type"] == "missing":
+        return (Complaint(sections[keys[:-1]][keys[-1]], "nothing"),)
+    if detail["type"] == "too_long":
+        return (Complaint(f"at most {detail['ctx']['max_length']} tables", str(len(detail["input"]))),)
+    several = detail["type"] in ("tuple_type", "list_type")
+    wanted = f"tables below [[{'.'.join(keys)}]], in double brackets" if several else "a table"
+    return (Complaint(wanted, shown(detail["input"])),)
+
+
+def _unknown_key(keys: Keys, sections: Mapping[Keys, Mapping[str, str]]) -> Complaint:
+    *outer, key = keys
+    known = sections[tuple(outer)]
+    remedy = did_you_mean(key, known)
+    home = next((place for place, others in sections.items() if key in others), None)
+    if not remedy and home is not None:
+        remedy = f"it belongs in [{'.'.join(home)}]" if home else "it belongs above the first table"
+    return Complaint(f"one of {', '.join(known)}", "an unknown key", remedy)
+
+
+@cache
+def sections_of(model: Any) -> dict[Keys, dict[str, str]]:
+    """The sections of a card model: key path to known keys, each with a description of what is wanted."""
+    found: dict[Keys, dict[str, str]] = {(): {}}
+    for name, field in _fields(model).items():
+        key = field.alias or name
+        found[()][key] = field.description or "a value"
+        for inner in _models_in(field.annotation):
+            for path, keys in sections_of(inner).items():
+                found[(key, *path)] = keys
+    return found
+
+
+def _fields(model: Any) -> dict[str, FieldInfo]:
+    """The fields of a pydantic model, or of a dataclass that pydantic reads."""
+    if issubclass(model, BaseModel):
+        return model.model_fields
+    hints = get_type_hints(model, include_extras=True)
+    return {name: FieldInfo.from_annotation(hints[name]) for name in model.__dataclass_fields__}
+
+
+def _models_in(annotation: Any) -> Iterator[type]:
+    if hasattr(annotation, "__pydantic_config__") or hasattr(annotation, "model_fields"):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _models_in(part)
+
+
+def _name_faults(table: Mapping[str, Any], file: str, stem: str) -> list[Fault]:
+    """The name of a card must be the name of its file."""
+    name = table.get("name")
+    if not isinstance(name, str) or name == stem:
+        return []
+    complaint = name_complaint(stem)
+    if complaint:
+        remedy = "rename the file" + ("" if name_complaint(name) else f" to {name}.toml")
+        return [Fault(file, complaint, quoted(stem), remedy)]
+    return [Fault(f"{file} name", f"{quoted(stem)}, the name of the file", quoted(name))]

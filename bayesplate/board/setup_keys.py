@@ -1,0 +1,229 @@
+"""The keys of a [setup]: how the edges are held, and the frequencies that were measured that way."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+
+from bayesplate.board.attached import AttachedItem, DeclaredFluid
+from bayesplate.board.measures import (
+    FIRST_LABEL,
+    MOST_MODES,
+    NOISE,
+    PLACE,
+    WHY_MOST_MODES,
+    Place,
+    QuantityReader,
+    by_label,
+)
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading import FREQUENCY, NO_OFFSET, SIGN, Peak
+from bayesplate.board.repeated import FURTHEST_SIZES, RULE, peak_comma_complaint
+from bayesplate.board.schema import Section
+from bayesplate.board.values import (
+    Choice,
+    Complaint,
+    Key,
+    Number,
+    Refusal,
+    read_each,
+    read_list,
+    read_name,
+    read_reference,
+    read_table,
+    read_text,
+    refuse,
+)
+from bayesplate.board.words import EDGE_WORDS, EDGES, shown
+from bayesplate.labels import Label
+
+MOST_ATTACHED = 50
+DEFAULT_SETUP_NAME = "setup"
+MISSED, SPURIOUS = 0.2, 0.02
+"""Probabilities where a card states none: that a mode below the highest peak left no peak, that a peak is no mode."""
+
+_OPEN, _PROBABILITY = 1e-9, "a probability: 98 % is 0.98"
+_CONFIDENCE = Number(_OPEN, 1, hint=_PROBABILITY).key
+_CONFIDENCES = by_label(_CONFIDENCE)
+_CHANCE = Number(_OPEN, 1 - _OPEN, hint=_PROBABILITY).key
+_CLAMPED = Number(0.01, 100_000, "mm", "leave the edge out if the clamp covers nothing")
+_CLAMPED_LENGTH = QuantityReader(_CLAMPED, furthest=FURTHEST_SIZES, resolution=RULE).key
+_BOUNCE = QuantityReader(Number(0.01, 1000, "Hz"), furthest=FURTHEST_SIZES).key
+_EDGE_WANTED = 'a word for each of the four edges x0, x1, y0, y1: "clamped", "supported" or "free"'
+
+End = Literal["clamped", "supported", "free"]
+ReadEdge = Annotated[End, Key(Choice(EDGE_WORDS))]
+
+
+class Edges(Section):
+    """How the four edges are held; x0 is the edge at x = 0."""
+
+    x0: ReadEdge = Field(description=_EDGE_WANTED)
+    x1: ReadEdge = Field(description=_EDGE_WANTED)
+    y0: ReadEdge = Field(description=_EDGE_WANTED)
+    y1: ReadEdge = Field(description=_EDGE_WANTED)
+
+    @property
+    def words(self) -> dict[str, End]:
+        """Edge name to word, in the order x0, x1, y0, y1."""
+        return {"x0": self.x0, "x1": self.x1, "y0": self.y0, "y1": self.y1}
+
+    @property
+    def letters(self) -> str:
+        """The paper's four letters, "CFFF", in its order x0, y0, x1, y1."""
+        return edge_letters(self.words)
+
+
+def edge_letters(words: Mapping[str, str]) -> str:
+    """The paper's four letters, "CFFF", in its order x0, y0, x1, y1, from the words of the four edges."""
+    return "".join(words[edge][0].upper() for edge in ("x0", "y0", "x1", "y1"))
+
+
+def edge_words(text: object) -> dict[str, End] | None:
+    """All four edges from one word, or from four letters in the paper's order x0, y0, x1, y1; None from other texts."""
+    letters: dict[str, End] = {"C": "clamped", "S": "supported", "F": "free"}
+    for word in letters.values():
+        if text == word:
+            return dict.fromkeys(EDGES, word)
+    if not (isinstance(text, str) and len(text) == len(EDGES) and {*text} <= {*letters}):
+        return None
+    x0, y0, x1, y1 = (letters[letter] for letter in text)
+    return {"x0": x0, "x1": x1, "y0": y0, "y1": y1}
+
+
+def _edges_table(value: object) -> object:
+    """Refuse a word where the table of the edges stands, and write out the table that it may mean."""
+    if isinstance(value, dict):
+        return value
+    words = edge_words(value)
+    table = ", ".join(f'{edge} = "{word}"' for edge, word in (words or {}).items())
+    raise Refusal(Complaint("a table", shown(value), f"edges = {{ {table} }}" if words else "x0 is the edge at x = 0"))
+
+
+class HammerKeys(Section):
+    """Where the hammer hit."""
+
+    place: Annotated[Place, PLACE] = Field(alias="at_mm", description="the place [x, y] in mm")
+
+
+class SupportKeys(Section):
+    """What the record says of the support of a free board."""
+
+    bounce: Annotated[Quantity | None, _BOUNCE] = Field(default=None, alias="bounce_hz")
+
+
+def _read_setup_name(value: object) -> str:
+    name = read_name(value)
+    if name.casefold() == "board":
+        raise Refusal(Complaint("another name", '"board"', "results use it for the board's own effects"))
+    return name
+
+
+def _read_unlabelled(value: object) -> tuple[Quantity, ...]:
+    if value == []:
+        return ()
+    items = read_list(value, "frequencies", MOST_MODES, WHY_MOST_MODES)
+    refuse(peak_comma_complaint(items))
+    return tuple(read_each(enumerate(items), FREQUENCY.read))
+
+
+def _read_clamped(value: object) -> dict[str, Quantity]:
+    if not isinstance(value, dict):
+        raise Refusal(Complaint("a table of clamped edges, { x0 = 30 }", shown(value)))
+    return read_table(value, dict.fromkeys(EDGES, _CLAMPED_LENGTH.read))
+
+
+_CLAMPS = Key(_read_clamped, lambda found: {edge: _CLAMPED_LENGTH.write(one) for edge, one in found.items()})
+_UNLABELLED = Key(_read_unlabelled, lambda found: [FREQUENCY.write(one) for one in found])
+_ALL_OR_EACH = Key(
+    lambda value: _CONFIDENCES.read(value) if isinstance(value, dict) else _CONFIDENCE.read(value),
+    lambda found: _CONFIDENCES.write(found) if isinstance(found, Mapping) else found,
+)
+
+
+class SetupKeys(Section):
+    """A [setup] of a board card, in SI units, keyed by label or by edge, never by position."""
+
+    name: Annotated[str, Key(_read_setup_name)] = DEFAULT_SETUP_NAME
+    notes: Annotated[str, Key(read_text)] = ""
+    edges: Annotated[Edges, BeforeValidator(_edges_table)] = Field(description=_EDGE_WANTED)
+    clamped: Annotated[Mapping[str, Quantity], _CLAMPS] = Field(default={}, alias="clamped_mm")
+    first_label: Annotated[Label, FIRST_LABEL] = NO_OFFSET
+    resolution: Annotated[float, Number(1e-6, 1000, "Hz").key] = Field(default=0.0, alias="resolution_hz")
+    published_coefficients: Annotated[str, Key(read_reference)] = ""
+    noise: Annotated[Quantity | None, NOISE] = Field(default=None, alias="noise_percent")
+    unlabelled: Annotated[tuple[Quantity, ...], _UNLABELLED] = Field(default=(), alias="unlabelled_hz")
+    peaks: tuple[Peak, ...] = Field(default=(), max_length=MOST_MODES)
+    missed: Annotated[float, _CHANCE] = Field(default=MISSED, alias="missed_probability")
+    spurious: Annotated[float, _CHANCE] = Field(default=SPURIOUS, alias="spurious_probability")
+    frequencies: Annotated[Mapping[Label, Quantity], by_label(FREQUENCY)] = Field(default={}, alias="frequencies_hz")
+    signs: Annotated[Mapping[Label, str], by_label(SIGN)] = {}
+    label_confidence: Annotated[float | Mapping[Label, float], _ALL_OR_EACH] = 1.0
+    attached: tuple[AttachedItem, ...] = Field(default=(), max_length=MOST_ATTACHED)
+    hammer: HammerKeys | None = None
+    support: SupportKeys | None = None
+    fluid: DeclaredFluid | None = None
+    air: DeclaredFluid | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _always_has_frequencies(cls, table: Any) -> Any:
+        """None at all are a fault of their key, like an empty table of them."""
+        return {"frequencies_hz": {}, **table} if isinstance(table, dict) else table
+
+    def confidence_in(self, label: Label) -> float:
+        """Probability that a label is right."""
+        stated = self.label_confidence
+        return stated.get(label, 1.0) if isinstance(stated, Mapping) else stated
+
+    # These compare two keys. They read info.data, which holds the earlier keys that were themselves in order, so that
+    # they complain beside the faults of other keys and never because of one.
+
+    @field_validator("clamped")
+    @classmethod
+    def _names_clamped_edges(cls, value: Mapping[str, Quantity], info: ValidationInfo) -> Mapping[str, Quantity]:
+        edges = info.data.get("edges")
+        if edges is not None:
+            loose = [edge for edge in value if edges.words[edge] != "clamped"]
+            if loose:
+                raise Refusal(*(Complaint("a clamped edge", f"a {edges.words[e]} one", inside=(e,)) for e in loose))
+        return value
+
+    @field_validator("air")
+    @classmethod
+    def _is_no_second_fluid(cls, value: DeclaredFluid | None, info: ValidationInfo) -> DeclaredFluid | None:
+        if info.data.get("fluid") is not None:
+            raise Refusal(Complaint("[setup.fluid] alone, which means the same", "both", "leave [setup.air] out"))
+        return value
+
+    @field_validator("peaks")
+    @classmethod
+    def _stands_once(cls, value: tuple[Peak, ...]) -> tuple[Peak, ...]:
+        firsts = [(i, value.index(peak)) for i, peak in enumerate(value)]
+        wanted, remedy = "a peak of its own", "repeated readings of one peak are a list: hz = [.., ..]"
+        again = [Complaint(wanted, f"peak {first + 1} again", remedy, (i,)) for i, first in firsts if first < i]
+        if again:
+            raise Refusal(*again)
+        return value
+
+    @field_validator("frequencies")
+    @classmethod
+    def _holds_a_frequency(cls, value: Mapping[Label, Quantity], info: ValidationInfo) -> Mapping[Label, Quantity]:
+        may_lack = (info.context or {}).get("may_lack_frequencies", False)
+        peaks = [info.data.get(key) for key in ("unlabelled", "peaks")]
+        if not value and peaks == [(), ()] and not may_lack:
+            raise Refusal(Complaint('measured frequencies, "(1,0)" = 52', "no modes"))
+        return value
+
+    @field_validator("signs", "label_confidence")
+    @classmethod
+    def _have_a_frequency(cls, value: Any, info: ValidationInfo) -> Any:
+        frequencies: Mapping[Label, Any] | None = info.data.get("frequencies")
+        if frequencies is not None and isinstance(value, Mapping):
+            stray = [str(label) for label in value if label not in frequencies]
+            if stray:
+                wanted = "a label among the frequencies_hz"
+                raise Refusal(*(Complaint(wanted, text, inside=(text,)) for text in stray))
+        return value

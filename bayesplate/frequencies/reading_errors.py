@@ -1,0 +1,262 @@
+"""The error of a reading: the setup's noise, the reading's own uncertainty, and its rounding, in one model.
+
+About the predicted ln f a reading scatters by s z, with s the noise joined with the reading's own standard deviation
+and z normal, or Student's with four degrees of freedom. A plain number tells only the interval that was rounded to it,
+and has a probability in place of a density. Where second moments alone count, as in a weight of least squares, rounding
+adds resolution^2 / 12 to the variance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bayesplate.board.setup import Setup
+from bayesplate.frequencies.densities import NORMAL, STUDENT, Density
+
+Floats = NDArray[np.float64]
+
+_LOWEST = 1e-3
+"""Share of a reading that its rounding interval stays above: the logarithm needs a positive end."""
+_DECIMALS = 9
+"""Of a rounded reading in Hz: more than anyone writes."""
+_NEAR = 1e-4
+"""Share of an interval's scale about its middle where the first-order term is good to 1e-8 and a difference is not."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReadingErrors:
+    """How the readings of a setup err about the frequencies that a model predicts.
+
+    Attributes
+    ----------
+    frequency : (n_modes,) array, Hz
+        As read.
+    own_sd : (n_modes,) array
+        Relative standard deviation that a reading states itself; 0 if it states none.
+    resolution : (n_modes,) array, Hz
+        Step of the rounding; 0 where there is none, or where `own_sd` holds its error.
+    robust : bool
+        Student's density with four degrees of freedom in place of the normal one.
+    """
+
+    frequency: Floats
+    own_sd: Floats
+    resolution: Floats
+    robust: bool = False
+
+    @classmethod
+    def of(cls, setup: Setup, robust: bool = False) -> ReadingErrors:
+        """Errors of a setup's readings; plain numbers are rounded to its resolution, others state their own sd."""
+        own = setup.relative_sd
+        return cls(setup.measured, own, np.where(own == 0, setup.resolution, 0.0), robust)
+
+    @classmethod
+    def of_peaks(cls, setup: Setup, readings: Iterable[int], robust: bool = False) -> ReadingErrors:
+        """Errors of a setup's peaks without a label, then of some of its labelled readings, by their indices."""
+        every = [peak.frequency for peak in setup.peaks] + [setup.readings[i].frequency for i in readings]
+        own = np.array([one.sd / one.mean for one in every])
+        return cls(np.array([one.mean for one in every]), own, np.where(own == 0, setup.resolution, 0.0), robust)
+
+    def at(self, kept: NDArray[Any]) -> ReadingErrors:
+        """Some of the readings, or all in another order."""
+        return replace(self, frequency=self.frequency[kept], own_sd=self.own_sd[kept], resolution=self.resolution[kept])
+
+    @cached_property
+    def log_frequency(self) -> Floats:
+        """ln of the measured frequencies, Hz: (n_modes,) array."""
+        return np.log(self.frequency)
+
+    @cached_property
+    def log_low(self) -> Floats:
+        """ln of the lower ends of the rounding intervals; `log_frequency` where there is no rounding."""
+        return np.log(np.maximum(self.frequency - self.resolution / 2.0, _LOWEST * self.frequency))
+
+    @cached_property
+    def log_high(self) -> Floats:
+        """ln of the upper ends of the rounding intervals; `log_frequency` where there is no rounding."""
+        return np.log(self.frequency + self.resolution / 2.0)
+
+    @cached_property
+    def rounded(self) -> NDArray[np.bool_]:
+        """Which readings are known as an interval: (n_modes,) array."""
+        return self.resolution > 0
+
+    @cached_property
+    def own_variance(self) -> Floats:
+        """Relative variance of each reading apart from the noise, its own and its rounding's: (n_modes,) array."""
+        return np.asarray(self.own_sd**2 + (self.resolution / self.frequency) ** 2 / 12.0)
+
+    def sd(self, noise: ArrayLike) -> Floats:
+        """Relative standard deviation of each reading: noise, own uncertainty and rounding together.
+
+        Parameters
+        ----------
+        noise : float or (n_draws,) array
+            Relative; under Student's density it is the scale.
+
+        Returns
+        -------
+        (n_modes,) or (n_draws, n_modes) array
+        """
+        return _join(noise, np.sqrt(self.own_variance))
+
+    def log_likelihood(self, predicted: Floats, noise: ArrayLike) -> Floats:
+        """Logarithm of the probability of each reading.
+
+        Parameters
+        ----------
+        predicted : (n_modes,) or (n_draws, n_modes) array
+            ln f (Hz) of the model; not a number where it has none.
+        noise : float or (n_draws,) array
+
+        Returns
+        -------
+        (n_modes,) or (n_draws, n_modes) array
+            Of the rounding interval for rounded readings, otherwise of the density of ln f; -inf where the model has
+            no frequency.
+        """
+        rounded = self.rounded
+        z, low, high, scale = self._standardised(predicted, noise)
+        result = np.empty(z.shape)
+        result[..., ~rounded] = self._density.log(z[..., ~rounded]) - np.log(scale[..., ~rounded])
+        result[..., rounded] = self._density.log_between(low[..., rounded], high[..., rounded])
+        return np.where(np.isnan(predicted), -np.inf, result)
+
+    def log_likelihood_of_pairs(self, readings: NDArray[np.intp], predicted: Floats, noise: Floats) -> Floats:
+        """Logarithm of the probability of some readings, each if it were of the mode that it is paired with.
+
+        Parameters
+        ----------
+        readings : (n_pairs,) array of int
+        predicted : (n_pairs, n_draws) array
+            ln f (Hz) of their modes.
+        noise : (n_draws,) array
+
+        Returns
+        -------
+        (n_pairs, n_draws) array
+        """
+        if self.rounded.any():
+            return np.ascontiguousarray(self.at(readings).log_likelihood(predicted.T, noise).T)
+        scale = np.ascontiguousarray(_join(noise, self.own_sd).T)
+        z = self.log_frequency[readings, None] - predicted
+        z /= scale[readings]
+        return np.asarray(self._density.log(z) - np.log(scale)[readings])
+
+    def log_most(self, lowest: Floats, highest: Floats, least_noise: float, most_noise: float) -> Floats:
+        """The most that `log_likelihood_of_pairs` may be, or somewhat more, where it is known within ranges.
+
+        Parameters
+        ----------
+        lowest, highest : (n_modes,) array
+            ln f (Hz).
+        least_noise, most_noise : float
+
+        Returns
+        -------
+        (n_readings, n_modes) array
+        """
+        away = np.maximum(lowest - self.log_high[:, None], self.log_low[:, None] - highest)
+        z = np.maximum(away, 0.0) / _join(most_noise, self.own_sd)[:, None]
+        result = self._density.log(z) - np.log(_join(least_noise, self.own_sd))[:, None]
+        if self.rounded.any():  # the interval is a part of what lies beyond its nearer end, on either side
+            result[self.rounded] = np.log(2.0) + self._density.log_below(-z[self.rounded])
+        return np.asarray(result)
+
+    def deviance_residuals(self, predicted: Floats, noise: ArrayLike) -> tuple[Floats, Floats]:
+        """Signed roots of the deviances, and how they change with the prediction.
+
+        Their squares are 2 (max ln p - ln p): summed, twice the negative log likelihood but for a constant. For a
+        reading that is not rounded and has normal errors they are its standardised residuals.
+
+        Parameters
+        ----------
+        predicted : (n_modes,) or (n_draws, n_modes) array
+            ln f (Hz) of the model.
+        noise : float or (n_draws,) array
+
+        Returns
+        -------
+        residuals : (n_modes,) or (n_draws, n_modes) array
+            Positive where the reading lies above the prediction; for a rounded one, the middle of its interval.
+        slopes : array of the same shape
+            Derivatives by the predicted ln f: negative, and next to zero within an interval wider than the noise.
+
+        References
+        ----------
+        McCullagh and Nelder, Generalized Linear Models, 2nd ed., 1989, section 2.4.3.
+        """
+        z, low, high, scale = self._standardised(predicted, noise)
+        residuals, slopes = np.empty(z.shape), np.empty(z.shape)
+        exact, rounded = (..., ~self.rounded), (..., self.rounded)
+        residuals[exact], slopes[exact] = self._of_density(z[exact])
+        residuals[rounded], slopes[rounded] = self._of_interval(low[rounded], high[rounded])
+        return residuals, -slopes / scale
+
+    def simulate(self, predicted: Floats, noise: ArrayLike, rng: np.random.Generator) -> Floats:
+        """Readings that a model would give, rounded where the measured ones are.
+
+        Parameters
+        ----------
+        predicted : (n_draws, n_modes) array
+            ln f (Hz).
+        noise : float or (n_draws,) array
+        rng : numpy.random.Generator
+
+        Returns
+        -------
+        (n_draws, n_modes) array, Hz
+        """
+        hertz = np.exp(predicted + _join(noise, self.own_sd) * self._density.draw(rng, predicted.shape))
+        steps = self.resolution[self.rounded]
+        whole = np.round(hertz[..., self.rounded] / steps)
+        hertz[..., self.rounded] = np.round(whole * steps, _DECIMALS)  # 483 * 0.1 lies just above the reading 48.3
+        return np.asarray(hertz)
+
+    @property
+    def _density(self) -> Density:
+        return STUDENT if self.robust else NORMAL
+
+    def _standardised(self, predicted: Floats, noise: ArrayLike) -> tuple[Floats, Floats, Floats, Floats]:
+        """Reading and ends of its interval less the prediction, in units of the scale; and the scale."""
+        scale = np.broadcast_to(_join(noise, self.own_sd), predicted.shape)
+        z, low, high = ((log - predicted) / scale for log in (self.log_frequency, self.log_low, self.log_high))
+        return z, low, high, scale
+
+    def _of_density(self, z: Floats) -> tuple[Floats, Floats]:
+        """Signed root of a density's deviance, and its derivative by z."""
+        root = np.sqrt(self._density.deviance(z))
+        at_peak = root == 0
+        slopes = np.abs(self._density.slope(z)) / np.where(at_peak, 1.0, root)
+        return np.sign(z) * root, np.where(at_peak, np.sqrt(self._density.curvature), slopes)
+
+    def _of_interval(self, low: Floats, high: Floats) -> tuple[Floats, Floats]:
+        """The same for a probability between two bounds: the derivative is for both bounds moving together."""
+        density = self._density
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        highest, found = density.log_between(-half, half), density.log_between(low, high)
+        root = np.sqrt(np.maximum(2.0 * (highest - found), 0.0))
+        pull = np.abs(np.exp(density.log(low) - found) - np.exp(density.log(high) - found))
+        stiffness = np.sqrt(2.0 * density.slope(half) * np.exp(density.log(half) - highest))
+        near = (np.abs(middle) * (1.0 + half) < _NEAR) | (root == 0)
+        slopes = np.where(near, stiffness, pull / np.where(near, 1.0, root))
+        return np.where(near, stiffness * middle, np.sign(middle) * root), slopes
+
+
+def reading_sd(setups: Sequence[Setup], noise: Iterable[float]) -> Floats:
+    """Relative standard deviation of all readings, setup after setup, at one noise per setup: (n_modes,) array."""
+    return np.concatenate([ReadingErrors.of(setup).sd(one) for setup, one in zip(setups, noise, strict=True)])
+
+
+def _join(noise: ArrayLike, own: Floats) -> Floats:
+    """Noise and another standard deviation of each reading: (n_modes,) or (n_draws, n_modes) array."""
+    level = np.asarray(noise, dtype=np.float64)
+    if (level < 0).any():
+        raise ValueError("noise: wanted a relative standard deviation, got a negative number; is it a logarithm?")
+    return np.asarray(np.hypot(level[..., None], own))
