@@ -30,7 +30,7 @@ from bayesplate.posterior.parameters import Parameters
 
 Floats = NDArray[np.float64]
 
-_ACCEPTED_CENTS = 0.5
+_ACCEPTED_CENTS = 0.05
 """Error of a law where it is checked: what `check` solves in full is shown to a tenth of a cent beside it."""
 
 
