@@ -11,7 +11,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: fit test slow docs lock audit calibration spectra campaigns plans recordings sand measured bars coverage two-setups \
+.PHONY: fit test slow docs lock audit calibration spectra campaigns plans recordings roving sand measured bars coverage two-setups \
 	trial benchmarks peers batch
 
 fit: $(VENV)/installed
@@ -50,6 +50,9 @@ campaigns: $(VENV)/tested-with
 
 recordings: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/run_recordings.py --recordings 200 --workers 2 --out results/recordings.jsonl --publish docs/validation
+
+roving: $(VENV)/tested-with
+	$(BIN)/python tests/calibration/run_roving.py --boards 50 --workers 2 --out results/roving.jsonl --publish docs/validation
 
 sand: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/run_sand.py --pictures 20 --workers 2 --out results/sand.jsonl --publish docs/validation

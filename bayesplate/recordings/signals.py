@@ -49,11 +49,6 @@ class Recording:
     sensor: Place | None = None
     remarks: tuple[str, ...] = ()
 
-    @property
-    def duration(self) -> float:
-        """Length, s."""
-        return self.response.size / self.rate
-
     def at(self, hammer: Place | None, sensor: Place | None) -> Recording:
         """The same, taken between two places."""
         return replace(self, hammer=hammer, sensor=sensor)

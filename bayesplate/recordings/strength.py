@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.recordings.local_fit import STEADY
 from bayesplate.recordings.modes_found import Mode
 from bayesplate.recordings.signals import Motion
 from bayesplate.recordings.spectra import Spectra
@@ -97,11 +98,13 @@ def _forces(spectra: Spectra, modes: Sequence[Mode]) -> list[Complex]:
         return [spectra.force[line] for line in nearest]
     delays, gains = np.zeros(spectra.places.size), np.ones(spectra.places.size)
     hertz = np.array([mode.frequency for mode in modes])
-    residues = np.array([mode.residues for mode in modes]).reshape(len(modes), -1)
+    ringing = [mode for mode in modes if mode.decay * spectra.duration >= STEADY] or modes  # tones keep their own time
+    rung = np.array([mode.frequency for mode in ringing])
+    residues = np.array([mode.residues for mode in ringing]).reshape(len(ringing), -1)
     for place in range(len(spectra.between)):
         own = np.flatnonzero(spectra.places == place)
         if own.size > 1:
-            delays[own], gains[own] = _delays(hertz, residues[:, own])
+            delays[own], gains[own] = _delays(rung, residues[:, own])
     return [gains * np.exp(-2j * np.pi * one * delays) for one in hertz]
 
 

@@ -19,10 +19,11 @@ TIMES = [0.5, 1.9, 3.3, 4.7, 6.1]
 AT = np.arange(round(SECONDS * RATE)) / RATE
 
 
-@lru_cache(maxsize=1)
-def taps() -> np.ndarray:
-    """Five taps, their greatest value 1."""
-    heard = hits(np.random.default_rng(21), TIMES, (0.03, 0.02), (0.52, 0.03), rate=RATE, seconds=SECONDS)[1]
+@lru_cache(maxsize=2)
+def taps(decibels: float = 45.0) -> np.ndarray:
+    """Five taps, their greatest value 1, the noise so many dB below them."""
+    rng, places = np.random.default_rng(21), ((0.03, 0.02), (0.52, 0.03))
+    heard = hits(rng, TIMES, *places, rate=RATE, seconds=SECONDS, decibels=decibels)[1]
     return heard / np.abs(heard).max()
 
 
@@ -31,9 +32,9 @@ def tone(hertz: float, share: float) -> np.ndarray:
     return share * np.sin(2.0 * np.pi * hertz * AT + hertz)
 
 
-def picked(added: np.ndarray) -> Picked:
+def picked(added: np.ndarray, decibels: float = 45.0) -> Picked:
     """Modes of the taps with something added, from all five of them."""
-    taken = take([[Recording("tap.wav", RATE, taps() + added)]], HIGHEST)
+    taken = take([[Recording("tap.wav", RATE, taps(decibels) + added)]], HIGHEST)
     assert (len(taken.spectra.names), taken.remarks) == (5, ())
     return pick_modes(taken.spectra, 20.0, HIGHEST)
 
@@ -44,13 +45,15 @@ LINES = {
     "a fan between two modes": (tone(137.3, 0.05), "a steady line"),
     "a tone on a mode": (tone(float(board().damped[2]) + 0.3, 0.03), "a steady line"),
     "a faint tone": (tone(87.3, 0.003), "a steady line"),
+    "loud tones everywhere": (sum(tone(hertz, 0.5) for hertz in (66.1, 93.7, 111.3, 137.9, 163.2)), "a steady line"),
 }
 
 
+@pytest.mark.parametrize("decibels", [45.0, 75.0], ids=["a room", "a quiet room"])
 @pytest.mark.parametrize("name", LINES)
-def test_a_steady_tone_takes_no_mode_with_it_and_is_named(name):
+def test_a_steady_tone_takes_no_mode_with_it_and_is_named(name, decibels):
     added, kind = LINES[name]
-    found = picked(added)
+    found = picked(added, decibels)
 
     truth = board().damped[board().damped < 0.98 * HIGHEST]
     likely = [mode for mode in found.likely if mode.frequency < 0.98 * HIGHEST]

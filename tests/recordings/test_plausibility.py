@@ -141,3 +141,11 @@ def test_damping_carries_by_how_much_it_moves_with_the_choice_of_lines():
 
     assert one.window_sd == 0.0
     assert one.damping_sd == pytest.approx(np.hypot(0.01, 0.2) / 400.0)
+
+
+def test_beside_loud_lines_that_do_not_decay_no_mode_is_faint_and_they_are_named():
+    modes = [*(mode(100.0 * i) for i in range(1, 6)), *(mode(hertz, damping=1e-6) for hertz in (83.1, 130.7, 220.3))]
+    found = verdicts(SPECTRA, modes, [*(answer() for _ in range(5)), *(answer(300.0) for _ in range(3))])
+
+    assert max(one.spurious for one in found[:5]) < 0.1
+    assert {one.kind for one in found[5:]} == {"a steady line"}

@@ -129,6 +129,7 @@ def test_refused_files_leave_no_folder_and_name_every_fault(tmp_path):
             {"files": ["a.wav"], "motion": "loud", "polarity": "up"},
             r'motion: wanted "acceleration".*\npolarity: wanted',
         ),
+        ({"files": ["a.wav"], "channels": "0"}, r'channels: wanted "force,response", "response,force"'),
         ({"files": ["a.wav"], "sand": {-1.0: 3}}, r"sand -1\.0: wanted a frequency in Hz.*\nsand -1\.0: wanted a name"),
     ],
 )
