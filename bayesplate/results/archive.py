@@ -20,6 +20,8 @@ from bayesplate.results.contract import as_json
 from bayesplate.results.summary import Summary
 
 Variables = Mapping[str, tuple[Sequence[str], NDArray[Any]]]
+GROUPS = ("posterior", "log_prior", "log_likelihood", "posterior_predictive", "sample_stats", "observed_data")
+"""In the order of the file; a group of which nothing is known is empty."""
 DRAWN = ("chain", "draw")
 """Dimensions of every draw; chain = ensemble."""
 
@@ -30,7 +32,7 @@ def tree_of(groups: Mapping[str, Variables], labels: Mapping[str, Sequence[str]]
     Parameters
     ----------
     groups : dict of dict of (dimensions, array)
-        Variables by group and name.
+        Variables by group (`GROUPS`) and name.
     labels : dict of sequence of str
         Of each dimension besides chain and draw.
     attributes : dict of str
@@ -42,8 +44,8 @@ def tree_of(groups: Mapping[str, Variables], labels: Mapping[str, Sequence[str]]
     """
     xarray: Any = import_module("xarray")
     datasets = {"/": xarray.Dataset(attrs=dict(sorted(attributes.items())))}
-    for group, variables in groups.items():
-        dataset = xarray.Dataset(dict(variables))
+    for group in GROUPS:
+        dataset = xarray.Dataset(dict(groups.get(group, {})))
         axes: dict[Any, Any] = {name: np.arange(size) for name, size in dataset.sizes.items() if name in DRAWN}
         named = {name: list(each) for name, each in labels.items() if name in dataset.sizes}
         datasets[group] = dataset.assign_coords(axes | named)

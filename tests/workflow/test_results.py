@@ -10,12 +10,10 @@ from matplotlib.figure import Figure
 from read_pages import ALLOWED, Read
 
 import bayesplate
+from bayesplate.results.archive import GROUPS
 from bayesplate.results.contract import as_json
 
 BOARD = "fiemme-spruce-clamped"
-
-
-GROUPS = ("posterior", "log_prior", "log_likelihood", "posterior_predictive", "sample_stats", "observed_data")
 
 
 @pytest.fixture(scope="module")
