@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_searches import with_modes
 from scipy.special import logsumexp
 from scipy.stats import t as student
 
@@ -142,10 +143,13 @@ def test_the_constants_of_the_search_are_those_of_the_sampler_without_effect(nam
     """
     fitted = fit(name, law="exact")
     found = search(prepare_search(baseline_of(fitted.inference.problem), tried=()))
-    linear = replace(found, ground=replace(found.ground, baseline=replace(found.ground.baseline, predict=None)))
+    base = found.ground.baseline
+    every, middle = base.every, base.log_rigidities
+    straight = with_modes(base, predict=lambda x: every.log_frequency + (x - middle) @ every.slopes.T)
+    linear = replace(found, ground=replace(found.ground, baseline=straight))
     off = {}
     for way, each in (("exact", found), ("linear", linear)):
-        drawn = draw_constants(each, np.random.default_rng(1), N_DRAWS).values
+        drawn = draw_constants(each, np.random.default_rng(1), N_DRAWS)
         for modulus in MODULI:
             sampled = np.log(np.ravel(fitted.draws.moduli[modulus]))
             found_there = np.log(drawn[modulus])
@@ -207,8 +211,8 @@ def test_the_constants_of_the_search_are_those_of_the_sampler_with_shear(diagnos
     after = diagnosed("paper-cantilever-fe").after
     found = search(simulated.ground)
     index = next(i for i, h in enumerate(simulated.ground.hypotheses) if h.members == (SHEAR,))
-    drawn = draw_constants(found, np.random.default_rng(2), N_DRAWS, among=[index]).values
-    bare = draw_constants(found, np.random.default_rng(2), N_DRAWS, among=[0]).values
+    drawn = draw_constants(found, np.random.default_rng(2), N_DRAWS, among=[index])
+    bare = draw_constants(found, np.random.default_rng(2), N_DRAWS, among=[0])
     off = []
     for modulus in MODULI:
         sampled = np.log(np.ravel(after.draws.moduli[modulus]))

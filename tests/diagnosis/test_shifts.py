@@ -194,7 +194,7 @@ def test_a_visible_part_is_never_larger_than_the_whole_shift(weights):
 @pytest.fixture(scope="module")
 def uneven():
     """A measured board of uneven thickness."""
-    return Problem.from_card("spruce-free-3L").posed
+    return Problem.from_card("spruce-free-3L", effects=("thickness_profile", "outline_profile")).posed
 
 
 @pytest.mark.slow
