@@ -31,8 +31,8 @@ from bayesplate.posterior.parameters import Parameters
 Floats = NDArray[np.float64]
 
 _ACCEPTED_CENTS = 0.05
-"""Error of a law where it is checked, cents. At the ends of a prior it errs more: with half a cent here transverse shear
-was 0.7 cents off there, which took two nats from its odds on a half-top."""
+"""Error of a law where it is checked, cents. It errs more at the ends of a prior: with half a cent here, transverse
+shear was 0.7 cents off there, which took two nats from its odds on a half-top."""
 _BEYOND = 3
 """Modes above the wanted ones among which these are sought."""
 
