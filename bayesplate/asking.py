@@ -1,4 +1,4 @@
-"""What `new` is told on the command line: answers to questions, each of which may be skipped, or options."""
+"""What `new` is told on the command line: options, or answers to questions, each of which may be skipped."""
 
 from __future__ import annotations
 
@@ -17,17 +17,10 @@ SIZES = {
 }
 
 
-def given_answers(options: Mapping[str, Any]) -> dict[str, Any]:
+def answers(options: Mapping[str, Any]) -> dict[str, Any]:
     """Arguments of `bayesplate.workflow.new.new` from options that were given."""
-    told = {name: value for name, value in options.items() if name not in (*SIZES, "frequency")}
-    told["sizes"] = {name: options[name] for name in SIZES if name in options}
-    told["frequencies"] = {}
-    for text in options.get("frequency", ()):
-        label, sign, hertz = text.rpartition("=")
-        if not sign:
-            raise click.UsageError(f'--frequency {text!r}: write a label and its frequency, "(1,1)=35".')
-        told["frequencies"][label.strip()] = hertz.strip()
-    return told
+    told = {name: value for name, value in options.items() if name not in SIZES}
+    return {"frequencies": {}, **told, "sizes": {name: options[name] for name in SIZES if name in options}}
 
 
 def asked_answers(path: str | None) -> dict[str, Any]:

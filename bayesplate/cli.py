@@ -3,23 +3,30 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
 from shlex import quote
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from bayesplate.asking import asked_answers, given_answers
+from bayesplate.asking import answers, asked_answers
 from bayesplate.options import (
     PATH,
     costs,
+    frequencies,
     mass_kg,
     names,
     places,
-    refuse_both,
+    refuse_contradictions,
     sand_pictures,
-    shared_options,
+    shared_option,
 )
 from bayesplate.terminal import print_json, print_shown, progress_line, reporting, say
+
+if TYPE_CHECKING:
+    from bayesplate.workflow.shown import Shown
 
 
 class Commands(click.Group):
@@ -52,178 +59,137 @@ def main() -> None:
         os.environ.setdefault(variable, "1")
 
 
-@main.command()
-@click.argument("card")
-@shared_options("effects", "setup", "json", "quiet", "debug")
-def check(card: str, effects: list[str] | None, setup: str | None, as_json: bool, quiet: bool, debug: bool) -> None:
-    """Every fault of CARD, or what a fit of it can identify."""
-    with reporting(as_json=as_json, debug=debug):
-        from bayesplate.workflow.check import check as run
-        from bayesplate.workflow.shown import show_check
+@dataclass(frozen=True)
+class Answer:
+    """What a command found.
 
-        report = run(card, effects=effects, setup=setup)
+    Attributes
+    ----------
+    content : object
+        What `--json` prints.
+    shown : callable, optional
+        What people are shown.
+    closing : str
+        Where things were written, and what comes next.
+    then : callable, optional
+        Called at the end; its error is the command's.
+    """
+
+    content: Any
+    shown: Callable[[], Shown] | None = None
+    closing: str = ""
+    then: Callable[[], None] | None = None
+
+    def print(self, *, as_json: bool, quiet: bool) -> None:
+        """Print what was asked for."""
         if as_json:
-            print_json(report)
+            print_json(self.content)
         elif not quiet:
-            print_shown(show_check(report))
+            if self.shown is not None:
+                print_shown(self.shown())
+            if self.closing:
+                say(self.closing)
 
 
-@main.command()
-@click.argument("card")
-@shared_options(
-    "out", "seed", "effects", "setup", "linear", "exact", "robust", "report", "force", "resume", "json", "quiet",
-    "debug",
-)  # fmt: skip
-def fit(
-    card: str,
-    out: str | None,
-    linear: bool,
-    exact: bool,
-    as_json: bool,
-    quiet: bool,
-    debug: bool,
-    **asked: Any,
-) -> None:
+CARD = click.argument("card")
+
+
+def command(
+    *options: str, argument: Callable[..., Any] = CARD, has_progress: bool = False
+) -> Callable[[Callable[..., Answer]], click.Command]:
+    """A command with its argument, the shared options of these names, and those above it; its answer is printed."""
+
+    def decorate(run: Callable[..., Answer]) -> click.Command:
+        @wraps(run)
+        def whole(as_json: bool, quiet: bool, debug: bool, **asked: Any) -> None:
+            refuse_contradictions(asked)
+            if "linear" in asked:
+                is_linear, is_exact = asked.pop("linear"), asked.pop("exact")
+                asked["law"] = "linear" if is_linear else "exact" if is_exact else None
+            with reporting(as_json=as_json, debug=debug):
+                with progress_line(shown=has_progress and not quiet and not as_json) as tell:
+                    if has_progress:
+                        asked["progress"] = tell
+                    if "out" in options and "card" in asked and asked["out"] is None:
+                        from bayesplate.workflow.prepare import default_folder
+
+                        asked["out"] = default_folder(asked["card"])
+                    answer = run(**asked)
+                answer.print(as_json=as_json, quiet=quiet)
+            if answer.then is not None:
+                with reporting(as_json=False, debug=debug):
+                    answer.then()
+
+        own = getattr(run, "__click_params__", [])  # which stand first in the help
+        whole.__click_params__ = []  # type: ignore[attr-defined]
+        for name in reversed((*options, "json", "quiet", "debug")):
+            shared_option(name)(whole)
+        whole.__click_params__ += own  # type: ignore[attr-defined]
+        return main.command(name=run.__name__)(argument(whole))
+
+    return decorate
+
+
+@command("effects", "setup")
+def check(card: str, **asked: Any) -> Answer:
+    """Every fault of CARD, or what a fit of it can identify."""
+    from bayesplate.workflow.check import check as run
+    from bayesplate.workflow.shown import show_check
+
+    report = run(card, **asked)
+    return Answer(report, lambda: show_check(report))
+
+
+@command("out", "seed", "effects", "setup", "linear", "exact", "robust", "report", "force", "resume", has_progress=True)
+def fit(card: str, **asked: Any) -> Answer:
     """Posterior of the elastic constants of CARD.
 
     Writes report.html, summary.json and posterior.nc.
     """
-    refuse_both(asked["force"], asked["resume"], "--force starts anew and --resume continues")
-    refuse_both(linear, exact, "--linear and --exact force different laws")
-    with reporting(as_json=as_json, debug=debug):
-        with progress_line(shown=not quiet and not as_json) as tell:
-            from bayesplate.workflow.fit import fit as run
-            from bayesplate.workflow.prepare import default_folder
+    from bayesplate.workflow.fit import fit as run
+    from bayesplate.workflow.shown import show_fit
 
-            folder = default_folder(card) if out is None else out
-            result = run(
-                card, out=folder, law="linear" if linear else "exact" if exact else None, progress=tell, **asked
-            )
-        if as_json:
-            print_json(result.summary)
-        elif not quiet:
-            from bayesplate.workflow.shown import show_fit
-
-            print_shown(show_fit(result.summary))
-            say(f"written to {result.folder}")
+    result = run(card, **asked)
+    return Answer(result.summary, lambda: show_fit(result.summary), f"written to {result.folder}")
 
 
-@main.command()
-@click.argument("card")
-@shared_options("out", "seed", "effects", "setup", "force", "json", "quiet", "debug")
-def modes(
-    card: str,
-    out: str | None,
-    seed: int,
-    effects: list[str] | None,
-    setup: str | None,
-    force: bool,
-    as_json: bool,
-    quiet: bool,
-    debug: bool,
-) -> None:
+@command("out", "seed", "effects", "setup", "force")
+def modes(card: str, **asked: Any) -> Answer:
     """Lowest modes of CARD, and a sheet of their Chladni figures."""
-    with reporting(as_json=as_json, debug=debug):
-        from bayesplate.workflow.modes import modes as run
-        from bayesplate.workflow.prepare import default_folder
-        from bayesplate.workflow.shown import show_modes
+    from bayesplate.workflow.modes import modes as run
+    from bayesplate.workflow.shown import show_modes
 
-        folder = default_folder(card) if out is None else out
-        result = run(card, out=folder, seed=seed, effects=effects, setup=setup, force=force)
-        if as_json:
-            print_json(result.summary)
-        elif not quiet:
-            print_shown(show_modes(result.summary))
+    result = run(card, **asked)
+    return Answer(result.summary, lambda: show_modes(result.summary))
 
 
-@main.command()
-@click.argument("card")
-@shared_options("coefficients", "write_to", "seed", "effects", "force", "json", "quiet", "debug")
-def compare(
-    card: str,
-    coefficients: Any,
-    out: str | None,
-    seed: int,
-    effects: list[str] | None,
-    force: bool,
-    as_json: bool,
-    quiet: bool,
-    debug: bool,
-) -> None:
+@command("coefficients", "write_to", "seed", "effects", "force", has_progress=True)
+def compare(card: str, **asked: Any) -> Answer:
     """Every method on CARD side by side.
 
     Each as a thin and as a shear-flexible plate.
     """
-    with reporting(as_json=as_json, debug=debug):
-        with progress_line(shown=not quiet and not as_json) as tell:
-            from bayesplate.workflow.compare import compare as run
+    from bayesplate.workflow.compare import compare as run
+    from bayesplate.workflow.shown import show_compare
 
-            result = run(
-                card,
-                coefficients=coefficients,
-                seed=seed,
-                effects=effects,
-                out=out,
-                force=force,
-                progress=tell,
-            )
-        if as_json:
-            print_json(result)
-        elif not quiet:
-            from bayesplate.workflow.shown import show_compare
-
-            print_shown(show_compare(result))
+    result = run(card, **asked)
+    return Answer(result, lambda: show_compare(result))
 
 
-@main.command()
-@click.argument("card")
-@shared_options("out", "seed", "effects", "setup", "report", "force", "resume", "json", "quiet", "debug")
-def diagnose(
-    card: str,
-    out: str | None,
-    seed: int,
-    effects: list[str] | None,
-    setup: str | None,
-    report: bool,
-    force: bool,
-    resume: bool,
-    as_json: bool,
-    quiet: bool,
-    debug: bool,
-) -> None:
+@command("out", "seed", "effects", "setup", "report", "force", "resume", has_progress=True)
+def diagnose(card: str, **asked: Any) -> Answer:
     """Trace what the plate model misses on CARD to a physical effect.
 
     Adds the effect, and reports the error before and after.
     """
-    refuse_both(force, resume, "--force starts anew and --resume continues")
-    with reporting(as_json=as_json, debug=debug):
-        with progress_line(shown=not quiet and not as_json) as tell:
-            from bayesplate.workflow.diagnose import diagnose as run
-            from bayesplate.workflow.prepare import default_folder
+    from bayesplate.workflow.diagnose import diagnose as run
+    from bayesplate.workflow.shown import show_diagnosis
 
-            folder = default_folder(card) if out is None else out
-            result = run(
-                card,
-                out=folder,
-                report=report,
-                seed=seed,
-                effects=effects,
-                setup=setup,
-                force=force,
-                resume=resume,
-                progress=tell,
-            )
-        if as_json:
-            print_json(result.to_json())
-        elif not quiet:
-            from bayesplate.workflow.shown import show_diagnosis
-
-            print_shown(show_diagnosis(result.diagnosis))
-            say(f"written to {result.folder}")
+    result = run(card, **asked)
+    return Answer(result.to_json(), lambda: show_diagnosis(result.diagnosis), f"written to {result.folder}")
 
 
-@main.command()
-@click.argument("card")
+@command("out", "seed", "effects", "force", has_progress=True)
 @click.option("--for", "goal", metavar="WHAT", help="E_x, E_y, G_xy, constants or explanations.")
 @click.option(
     "--cost",
@@ -234,45 +200,20 @@ def diagnose(
     help="Minutes that a reading (1), a new clamping (10) or another board (30) takes.",
 )
 @click.option("--between", callback=names, help="Effects to be told apart, comma separated.")
-@shared_options("out", "seed", "effects", "force", "json", "quiet", "debug")
-def plan(
-    card: str,
-    goal: str | None,
-    costs: Any,
-    between: list[str] | None,
-    out: str | None,
-    seed: int,
-    effects: list[str] | None,
-    force: bool,
-    as_json: bool,
-    quiet: bool,
-    debug: bool,
-) -> None:
+def plan(card: str, **asked: Any) -> Answer:
     """What to measure next on CARD.
 
     Ranks measurements by what they are expected to give and what they cost.
     """
-    with reporting(as_json=as_json, debug=debug):
-        with progress_line(shown=not quiet and not as_json) as tell:
-            from bayesplate.workflow.plan import plan as run
-            from bayesplate.workflow.prepare import default_folder
+    from bayesplate.workflow.plan import plan as run
+    from bayesplate.workflow.shown import show_plan
 
-            folder = default_folder(card) if out is None else out
-            result = run(
-                card, goal=goal, costs=costs, between=between, out=folder, seed=seed, effects=effects, force=force,
-                progress=tell,
-            )  # fmt: skip
-        if as_json:
-            print_json(result.summary)
-        elif not quiet:
-            from bayesplate.workflow.shown import show_plan
-
-            print_shown(show_plan(result.summary))
-            say(f"written to {folder}: {', '.join(path.name for path in result.files)}")
+    result = run(card, **asked)
+    closing = f"written to {asked['out']}: {', '.join(path.name for path in result.files)}"
+    return Answer(result.summary, lambda: show_plan(result.summary), closing)
 
 
-@main.command()
-@click.argument("path", required=False)
+@command(argument=click.argument("path", required=False))
 @click.option("--length-x", metavar="MM", help="Length along the grain.")
 @click.option("--length-y", metavar="MM", help="Length across the grain.")
 @click.option("--thickness", metavar="MM")
@@ -281,34 +222,37 @@ def plan(
 @click.option("--prior", metavar="NAME", help="Prior card, spruce or weakly-informative.")
 @click.option("--title", help="A line for people.")
 @click.option("--notes", help="Free text.")
-@click.option("--frequency", multiple=True, metavar="LABEL=HZ", help='As often as there are modes: "(1,1)=35".')
-@shared_options("json", "quiet", "debug")
-def new(path: str | None, as_json: bool, quiet: bool, debug: bool, **answers: Any) -> None:
+@click.option(
+    "--frequency",
+    "frequencies",
+    multiple=True,
+    callback=frequencies,
+    metavar="LABEL=HZ",
+    help='As often as there are modes: "(1,1)=35".',
+)
+def new(path: str | None, **options: Any) -> Answer:
     """Write a first card to PATH.
 
     It asks, or takes the options where there are any.
     """
-    given = {name: value for name, value in answers.items() if value}
-    options = given_answers(given)
-    with reporting(as_json=as_json, debug=debug):
-        from bayesplate.workflow.new import new as run
+    from bayesplate.workflow.new import new as run
 
-        told = {"name": path or "my-board"} | (options if given or as_json or quiet else asked_answers(path))
-        card = run(told.pop("name"), **told)
-        if as_json:
-            print_json({"path": str(card)})
-        elif not quiet:
-            shown = quote(str(card))
-            say(
-                f"written to {card}. Next: bayesplate check {shown}, which tells every fault, or what it can say"
-                if told.get("frequencies")
-                else f"written to {card}. Next: bayesplate modes {shown}, which shows the figures and where to listen; "
-                f"bayesplate plan {shown}, where to tap; with frequencies bayesplate check {shown}"
-            )
+    given = {name: value for name, value in options.items() if value}
+    asked = click.get_current_context().params
+    may_ask = not given and not asked["as_json"] and not asked["quiet"]
+    told = asked_answers(path) if may_ask else {"name": path or "my-board", **answers(given)}
+    card = run(told.pop("name"), **told)
+    shown = quote(str(card))
+    following = (
+        f"check {shown}, which tells every fault, or what it can say"
+        if told.get("frequencies")
+        else f"modes {shown}, which shows the figures and where to listen; bayesplate plan {shown}, where to tap; "
+        f"with frequencies bayesplate check {shown}"
+    )
+    return Answer({"path": str(card)}, closing=f"written to {card}. Next: bayesplate {following}")
 
 
-@main.command()
-@click.argument("files", nargs=-1, required=True, type=PATH)
+@command("force", argument=click.argument("files", nargs=-1, required=True, type=PATH))
 @click.option("--card", metavar="CARD", help="Board card with sizes and edges: labels are computed for it.")
 @click.option("--rate", type=float, metavar="HZ", help="Samples per second, where a file does not say it.")
 @click.option(
@@ -336,44 +280,37 @@ def new(path: str | None, as_json: bool, quiet: bool, debug: bool, **answers: An
 @click.option("--lowest", type=float, default=20.0, show_default=True, metavar="HZ")
 @click.option("--highest", type=float, default=1000.0, show_default=True, metavar="HZ")
 @click.option("--out", type=PATH, default="results/recordings", show_default=True, help="Output folder.")
-@shared_options("force", "json", "quiet", "debug")
-def pick(files: tuple[str, ...], out: str, force: bool, as_json: bool, quiet: bool, debug: bool, **given: Any) -> None:
+def pick(files: tuple[str, ...], **asked: Any) -> Answer:
     """Frequencies of the modes in recordings FILES.
 
     Writes the [setup] that a card takes, too.
     """
-    with reporting(as_json=as_json, debug=debug):
-        from bayesplate.workflow.pick import FRAGMENT, PAGE
-        from bayesplate.workflow.pick import pick as run
-        from bayesplate.workflow.pick_words import show_pick
+    from bayesplate.workflow.pick import FRAGMENT, PAGE
+    from bayesplate.workflow.pick import pick as run
+    from bayesplate.workflow.pick_words import show_pick
 
-        result = run(files, out=out, force=force, **given)
-        if as_json:
-            print_json(result.summary)
-        elif not quiet:
-            print_shown(show_pick(result.summary))
-            completes = f"{quote(given['card'] or 'CARD')} --setup {quote(f'{out}/{FRAGMENT}')}"
-            say(f"written to {out}: {FRAGMENT}, {PAGE}. Next: bayesplate fit {completes}")
+    out = asked["out"]
+    result = run(files, **asked)
+    completes = f"{quote(asked['card'] or 'CARD')} --setup {quote(f'{out}/{FRAGMENT}')}"
+    closing = f"written to {out}: {FRAGMENT}, {PAGE}. Next: bayesplate fit {completes}"
+    return Answer(result.summary, lambda: show_pick(result.summary), closing)
 
 
-@main.command()
-@click.argument("card")
-@shared_options("effects", "json", "quiet", "debug")
-def cite(card: str, effects: list[str] | None, as_json: bool, quiet: bool, debug: bool) -> None:
+@command("effects")
+def cite(card: str, **asked: Any) -> Answer:
     """References of exactly what a fit of CARD uses."""
-    with reporting(as_json=as_json, debug=debug):
-        from bayesplate.workflow.cite import cite as run
-        from bayesplate.workflow.cite import cite_text
+    from bayesplate.workflow.cite import cite as run
+    from bayesplate.workflow.cite import cite_text
 
-        sections = run(card, effects=effects)
-        if as_json:
-            print_json({section.title.lower(): list(section.entries) for section in sections})
-        elif not quiet:
-            say(cite_text(sections), nl=False)
+    sections = run(card, **asked)
+    content = {section.title.lower(): list(section.entries) for section in sections}
+    return Answer(content, closing=cite_text(sections).removesuffix("\n"))
 
 
-@main.command()
-@click.argument("source")
+@command(
+    "out", "seed", "effects", "linear", "exact", "robust", "report", "force", "resume",
+    argument=click.argument("source"), has_progress=True,
+)  # fmt: skip
 @click.option("--template", metavar="CARD", help="With a table: the card of what is common to its boards.")
 @click.option("--workers", type=click.IntRange(1), help="Processes (default: one for each core).")
 @click.option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster that computes in their place.")
@@ -387,49 +324,17 @@ def cite(card: str, effects: list[str] | None, as_json: bool, quiet: bool, debug
     help="A specification, moduli in GPa, density in kg/m3: E_x=10:14, density=:420.",
 )
 @click.option("--rigidity", type=float, metavar="N_M", help="D_x in N m for which each board's thickness is wanted.")
-@shared_options(
-    "out", "seed", "effects", "linear", "exact", "robust", "report", "force", "resume", "json", "quiet", "debug"
-)
-def batch(
-    source: str,
-    out: str | None,
-    linear: bool,
-    exact: bool,
-    match: str | None,
-    limit: tuple[str, ...],
-    rigidity: float | None,
-    as_json: bool,
-    quiet: bool,
-    debug: bool,
-    **asked: Any,
-) -> None:
+def batch(source: str, *, match: str | None, limit: tuple[str, ...], rigidity: float | None, **asked: Any) -> Answer:
     """Fit many boards: a folder of cards, or the rows of a table.
 
     One table of all, and a page that grades them. SOURCE is the folder or the table.
     """
-    refuse_both(asked["force"], asked["resume"], "--force starts anew and --resume continues")
-    refuse_both(linear, exact, "--linear and --exact force different laws")
-    refuse_both(asked["workers"] is not None, asked["dask"] is not None, "--workers are processes here, --dask others")
-    with reporting(as_json=as_json, debug=debug):
-        with progress_line(shown=not quiet and not as_json) as tell:
-            from bayesplate.workflow.batch import batch as run
-            from bayesplate.workflow.batch import default_batch_folder
-            from bayesplate.workflow.batch_grading import grading_request
+    from bayesplate.workflow.batch import batch as run
+    from bayesplate.workflow.batch import default_batch_folder
+    from bayesplate.workflow.batch_grading import grading_request
+    from bayesplate.workflow.shown import show_batch
 
-            result = run(
-                source,
-                default_batch_folder(source) if out is None else out,
-                law="linear" if linear else "exact" if exact else None,
-                grading=grading_request(match, limit, rigidity),
-                progress=tell,
-                **asked,
-            )
-        if as_json:
-            print_json(result.summary)
-        elif not quiet:
-            from bayesplate.workflow.shown import show_batch
-
-            print_shown(show_batch(result.summary, result.grading))
-            say(f"written to {result.folder}")
-    with reporting(as_json=False, debug=debug):
-        result.require_all()
+    out = asked.pop("out") or default_batch_folder(source)
+    result = run(source, out, grading=grading_request(match, limit, rigidity), **asked)
+    closing = f"written to {result.folder}"
+    return Answer(result.summary, lambda: show_batch(result.summary, result.grading), closing, result.require_all)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from math import inf
 from typing import Any
 
@@ -12,8 +12,8 @@ PATH = click.Path(readable=False)
 """A path as it is given: what cannot be read is invalid input, told by those who read it, and no fault of usage."""
 
 
-def shared_options(*wanted: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """The shared options that a command takes, in one order."""
+def shared_option(name: str) -> Callable[..., Any]:
+    """An option that several commands take, as a decorator."""
     known = {
         "out": click.option("--out", type=PATH, help="Output folder (default results/NAME)."),
         "seed": click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Random seed."),
@@ -43,16 +43,22 @@ def shared_options(*wanted: str) -> Callable[[Callable[..., None]], Callable[...
         "quiet": click.option("--quiet", is_flag=True, help="Print nothing but errors."),
         "debug": click.option("--debug", is_flag=True, help="Show the traceback of an error."),
     }
-
-    def decorate(command: Callable[..., None]) -> Callable[..., None]:
-        for name in reversed(wanted):
-            command = known[name](command)
-        return command
-
-    return decorate
+    return known[name]
 
 
-def refuse_both(one: bool, other: bool, why: str) -> None:
+def refuse_contradictions(asked: Mapping[str, Any]) -> None:
+    """Refuse options that exclude each other.
+
+    Raises
+    ------
+    click.UsageError
+    """
+    refuse_both(asked.get("force"), asked.get("resume"), "--force starts anew and --resume continues")
+    refuse_both(asked.get("linear"), asked.get("exact"), "--linear and --exact force different laws")
+    refuse_both(asked.get("workers"), asked.get("dask"), "--workers are processes here, --dask others")
+
+
+def refuse_both(one: object, other: object, why: str) -> None:
     if one and other:
         raise click.UsageError(f"{why}: give one of them.")
 
@@ -102,6 +108,17 @@ def mass_kg(context: click.Context, option: click.Parameter, given: str | None) 
         wanted = "wanted a mass in g, or mass and standard deviation, with decimal points"
         raise click.BadParameter(f"{wanted}, got {given!r}: 0.6 or 0.6,0.1")
     return 1e-3 * grams, 1e-3 * sd
+
+
+def frequencies(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:
+    """Frequencies "LABEL=HZ" by their label."""
+    found = {}
+    for text in given:
+        label, sign, hertz = text.rpartition("=")
+        if not sign:
+            raise click.UsageError(f'--frequency {text!r}: write a label and its frequency, "(1,1)=35".')
+        found[label.strip()] = hertz.strip()
+    return found
 
 
 def sand_pictures(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> dict[float, str]:

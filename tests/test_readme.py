@@ -22,8 +22,8 @@ PAGE, ARVIZ = (
     (ROOT / "docs" / "how_to" / name).read_text(encoding="utf-8")
     for name in ("use_from_python.md", "check_with_arviz.md")
 )
-LONGEST = 90
-"""Lines of the README that are not empty: a screen and a half."""
+LONGEST = 70
+"""Lines of the README that are not empty, besides what `make fit` prints: a screen."""
 USED = {"results/finnish-spruce-cantilever/summary.json": b"{}", "results/my-board/summary.json": b"{}"}
 
 
@@ -56,7 +56,8 @@ def test_the_readme_runs_writes_nothing_and_prints_what_a_terminal_of_80_columns
 
 
 def test_the_readme_is_short_and_its_links_lead_somewhere():
-    lines = [line for line in README.splitlines() if line.strip() and not line.startswith(("```", "<!--"))]
+    written = re.sub(r"```\nElastic constants.*?```", "", README, flags=re.DOTALL)
+    lines = [line for line in written.splitlines() if line.strip() and not line.startswith(("```", "<!--"))]
     links = re.findall(r"\]\(([^)#]+)\)", README)
 
     assert len(lines) <= LONGEST

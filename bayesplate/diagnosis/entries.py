@@ -13,7 +13,7 @@ from bayesplate.diagnosis.signatures import look_alikes
 from bayesplate.diagnosis.sizes import likely_form, size_posterior
 from bayesplate.diagnosis.verdict import Answer, Verdict, answer_words, p_words
 from bayesplate.effects import EFFECTS, effects_of
-from bayesplate.posterior.doubts import times
+from bayesplate.posterior.slips import times
 from bayesplate.results.contract import finite
 
 Floats = NDArray[np.float64]

@@ -16,8 +16,15 @@ from numpy.typing import NDArray
 
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import effect_name, joined
-from bayesplate.estimates.refit import Bounds, Misfit, Predict, has_come_to_rest, n_constants, sensitivities
-from bayesplate.estimates.side_by_side import most_likely_of_each
+from bayesplate.estimates.refit import (
+    Bounds,
+    Misfit,
+    Predict,
+    has_come_to_rest,
+    most_likely,
+    n_constants,
+    sensitivities,
+)
 from bayesplate.plate.board import Board
 
 HIGH_LEVERAGE = 0.9
@@ -222,14 +229,16 @@ def prediction_errors(
             return misfit(predict(x))[0] ** 2
 
     squares = squared(starts)
-    (whole,) = most_likely_of_each(predict, misfit, best(starts, squares)[None], [()], bounds)
+    whole = most_likely(predict, misfit, best(starts, squares), bounds)
     in_sample = np.asarray(target - predict(whole[None, :])[0])
     left_out = np.full(target.size, np.nan)
     modes = [(reading,) for reading in range(target.size)] if modes is None else modes
     if len(modes) > n:
         starts, squares = (np.concatenate(both) for both in ((starts, whole[None]), (squares, squared(whole[None]))))
         without = np.stack([best(starts, np.delete(squares, list(mode), axis=1)) for mode in modes])
-        fitted = most_likely_of_each(predict, misfit, without, modes, bounds)
+        fitted = np.stack(
+            [most_likely(predict, misfit, at, bounds, mode) for at, mode in zip(without, modes, strict=True)]
+        )
         fitted[~has_come_to_rest(fitted, without, n)] = np.nan
         for mode, predicted in zip(map(list, modes), predict(fitted), strict=True):
             left_out[mode] = (target - predicted)[mode]

@@ -19,12 +19,13 @@ from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.identifiability import identifiability
 from bayesplate.estimates.labelling import LIKELY, with_labels
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
+from bayesplate.estimates.unusual import MOST_ORTHOTROPIC
 from bayesplate.estimates.wide_search import Guess, search_widely
 from bayesplate.frequencies.model import setup_model, with_others
 from bayesplate.frequencies.peaks import PeakLikelihood, takes_part
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board
-from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
+from bayesplate.plate.material import MODULI, RIGIDITIES, Moduli, moduli
 from bayesplate.plate.setup import Setup
 from bayesplate.posterior.target import Posterior
 
@@ -35,6 +36,10 @@ _NEAR = 1e-4
 """Of ln D, near enough to label peaks."""
 _N_LEVELS = 17
 _MOST_ROUNDS = 8
+FEWEST_PEAKS = 4
+"""Three fix the constants whatever they are called."""
+_UNUSUAL = 0.02
+"""Probability that a plate is stiffer along y than along x, or that no wood is as orthotropic."""
 FAR = 0.5
 """Of ln D: walks lead from one answer to another that is nearer, and do not find one that is farther off."""
 POSSIBLE = 0.02
@@ -63,6 +68,12 @@ class Way:
     log_rigidities: NDArray[np.float64]
     log_density: float
     log_density_unlike: float
+
+    @property
+    def is_usual(self) -> bool:
+        """Whether the plate is stiffer along x, and no more than any wood is."""
+        elastic = _moduli(self)
+        return bool(1.0 <= elastic.E_x / elastic.E_y <= MOST_ORTHOTROPIC)
 
     def is_far_from(self, other: Way) -> bool:
         """Whether the constants are others altogether."""
@@ -115,12 +126,10 @@ def propose_labels(board: Board, prior: PriorCard) -> Proposed:
     none = np.zeros((board.symmetry.n, board.symmetry.n))
     if not any(takes_part(setup) for setup in board.setups):
         return Proposed(board, None, none)
-    tried: list[tuple[Setup, ...]] = []
-    every = (_settled(board, guess, tried) for guess in _guesses(board, prior))
-    found = [one for one in every if one is not None]
+    found = _every_way(board, _guesses(board, prior))
     if len(found) < 2:
         return Proposed(*found[0], none) if found else Proposed(board, None, none)
-    judged = [one for one in (_judged(each, prior, start) for each, start in found) if one is not None]
+    judged = _judged(found, prior)
     if not judged:
         return Proposed(*found[0], none)
     leading = only_way(judged)
@@ -130,6 +139,30 @@ def propose_labels(board: Board, prior: PriorCard) -> Proposed:
     shares = softmax([one.log_density for one in near])
     rigidities = board.symmetry.rigidities(np.exp(best.log_rigidities), board.nominal()["poisson_xy"])
     return Proposed(best.board, np.array([float(rigidities[name]) for name in RIGIDITIES]), (off.T * shares) @ off)
+
+
+def probable_ways(board: Board, prior: PriorCard) -> list[tuple[Way, float]]:
+    """Ways to take the peaks of a board without a label for modes, with their probabilities, the most probable first.
+
+    A plate may be as unlike the board as `UNLIKE`, and is hardly stiffer along y than along x, which cards take along
+    the grain.
+
+    Parameters
+    ----------
+    board : Board
+    prior : PriorCard
+
+    Returns
+    -------
+    list of (Way, float)
+        Empty where there is a label already, or the peaks are too few to tell.
+    """
+    if any(setup.readings for setup in board.setups) or sum(len(one.peaks) for one in board.setups) < FEWEST_PEAKS:
+        return []
+    ways = _judged(_every_way(board, search_widely(board, prior, np.random.default_rng(0))), prior)
+    ways = [one for one in ways if sum(len(setup.readings) for setup in one.board.setups) >= FEWEST_PEAKS]
+    log_shares = [one.log_density_unlike + (0.0 if one.is_usual else np.log(_UNUSUAL)) for one in ways]
+    return sorted(zip(ways, softmax(log_shares).tolist(), strict=True), key=lambda one: -one[1]) if ways else []
 
 
 def only_way(ways: Sequence[Way]) -> Way:
@@ -158,11 +191,15 @@ def only_way(ways: Sequence[Way]) -> Way:
     )
 
 
-def _constants_words(way: Way) -> str:
+def _moduli(way: Way) -> Moduli:
     nominal = way.board.nominal()
     found = way.board.symmetry.rigidities(np.exp(way.log_rigidities), nominal["poisson_xy"])
-    elastic = moduli(found["D_x"], found["D_y"], found["D_s"], nominal["thickness"], nominal["poisson_xy"])
-    return ", ".join(f"{name} {1e-9 * float(value):.3g}" for name, value in zip(MODULI, elastic, strict=True)) + " GPa"
+    return moduli(found["D_x"], found["D_y"], found["D_s"], nominal["thickness"], nominal["poisson_xy"])
+
+
+def _constants_words(way: Way) -> str:
+    elastic = zip(MODULI, _moduli(way), strict=True)
+    return ", ".join(f"{name} {1e-9 * float(value):.3g}" for name, value in elastic) + " GPa"
 
 
 def _deciding_label(first: Way, second: Way) -> str:
@@ -176,6 +213,13 @@ def _deciding_label(first: Way, second: Way) -> str:
         if one != other:
             return f"the peak at {place[1]:g} Hz is {one} in the first and {other} in the second: "
     return ""
+
+
+def _every_way(board: Board, guesses: Sequence[Guess]) -> list[tuple[Board, NDArray[np.float64]]]:
+    """Labelled boards that come out of guesses of the constants, each once, and the rigidities that go with them."""
+    tried: list[tuple[Setup, ...]] = []
+    every = (_settled(board, guess, tried) for guess in guesses)
+    return [one for one in every if one is not None]
 
 
 def _settled(board: Board, guess: Guess, tried: list[tuple[Setup, ...]]) -> tuple[Board, NDArray[np.float64]] | None:
@@ -227,10 +271,14 @@ def _of_labelled(board: Board) -> Board:
     return replace(board, setups=tuple(setup for setup in board.setups if setup.readings))
 
 
-def _judged(board: Board, prior: PriorCard, start: NDArray[np.float64]) -> Way | None:
-    """A labelled board at its own estimate and the noise that suits it best; None if it has too few labels for one."""
-    if sum(len(setup.readings) for setup in board.setups) < board.symmetry.n:
-        return None
+def _judged(found: Sequence[tuple[Board, NDArray[np.float64]]], prior: PriorCard) -> list[Way]:
+    """Labelled boards at their own estimates; without those that have too few labels for one."""
+    enough = (one for one in found if sum(len(setup.readings) for setup in one[0].setups) >= one[0].symmetry.n)
+    return [_way(board, prior, start) for board, start in enough]
+
+
+def _way(board: Board, prior: PriorCard, start: NDArray[np.float64]) -> Way:
+    """A labelled board at its own estimate and the noise that suits it best."""
     estimate = weighted_least_squares(_of_labelled(board), _STEPS, start)
     models = [setup_model(system_of(board, setup), estimate.values) for setup in board.setups]
     models = [with_others(one, estimate.values) if takes_part(one.setup) else one for one in models]

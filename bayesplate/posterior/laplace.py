@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.least_squares import Estimate, log_measured
-from bayesplate.estimates.refit import design, normal_misfit
-from bayesplate.estimates.side_by_side import most_likely_of_each
+from bayesplate.estimates.refit import design, most_likely, normal_misfit
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.model import SetupModel, setup_model, with_exact, with_others
 from bayesplate.frequencies.peaks import takes_part
@@ -131,7 +130,7 @@ def _fitted(
         start = np.clip(centre[columns], bounds.lower + _INSIDE, bounds.upper - _INSIDE)
         if not np.isfinite(predict(start[None, :])).all():
             raise NotIdentifiableError(_no_plate(board, models, parameters.values_at(centre)))
-        centre[columns] = most_likely_of_each(predict, normal_misfit(target, scales), start[None], [()], bounds)[0]
+        centre[columns] = most_likely(predict, normal_misfit(target, scales), start, bounds)
         if is_once:
             break
         before, noise = noise, medians * noise_widenings(board, target - predict(centre[None, columns])[0])

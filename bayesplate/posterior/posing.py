@@ -23,10 +23,10 @@ from bayesplate.frequencies.laws import LawName
 from bayesplate.plate.board import Board
 from bayesplate.plate.sessions import with_discrepancies
 from bayesplate.posterior.contradictions import require_possible_noise, require_reachable
-from bayesplate.posterior.doubts import Remarks, is_too_wide, noise_remarks, reading_remarks
 from bayesplate.posterior.first_labels import Proposed, propose_labels
 from bayesplate.posterior.laplace import LaplaceApproximation, laplace_approximation, linearisation_errors
 from bayesplate.posterior.parameters import Parameters
+from bayesplate.posterior.slips import Remarks, is_too_wide, noise_remarks, reading_remarks
 from bayesplate.posterior.target import Posterior, linear_suffices
 from bayesplate.posterior.veerings import veering_remarks, with_doubts
 

@@ -1,8 +1,13 @@
-"""One reading or two that a slip explains far better than noise: an octave, a decimal place, exchanged labels.
+"""What to doubt about readings before anything is sampled: an octave, a decimal place, exchanged labels, much scatter.
 
-Each slip is a hypothesis about the readings: one was taken of something else, or is off by a known factor, or two stand
-for each other. The constants are left open, uncertain inputs keep their priors, and the noise is averaged over its own
-prior, so that a slip has to explain what a larger noise would not.
+A reading is compared with what the others predict for it, a Student distribution: the plate is fitted without it, and
+the scatter of the others tells the noise, to which the prior of the noise adds no more than one reading would, because
+an effect that the plate lacks looks like noise. A slip is a hypothesis about one reading, or two that stand for each
+other; its odds are the predictive density of what would have been read, over that of what was.
+
+References
+----------
+R. D. Cook and S. Weisberg, Residuals and Influence in Regression, 1982, section 2.2: deleted residuals.
 """
 
 from __future__ import annotations
@@ -10,14 +15,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
-from bayesplate.estimates.marginal import log_probability
-from bayesplate.estimates.refit import Bounds, most_likely, normal_misfit, sensitivities
+from bayesplate.estimates.refit import most_likely, normal_misfit, sensitivities
+from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.system import system_of
@@ -30,26 +35,22 @@ Floats = NDArray[np.float64]
 
 RARITY = 1000.0
 """A slip is told where the readings are this many times as probable with it as without."""
-
 FEWEST_TO_SPARE = 2
 """Readings beyond as many as there are constants that it takes to see a slip in one of them."""
-
-_LEAST_LOG_SD = 0.7
-"""What is left of ln noise at least: an effect that the plate lacks adds to the noise, however well that is known."""
+LARGE_NOISE, LARGE_NOISE_SDS = 3.0, 3.0
+"""Noise that the residuals want, over the median of its prior, and in standard deviations of its logarithm, beyond
+which the reader is told."""
 
 OCTAVES, DECIMALS = (2.0, 0.5), (10.0, 0.1)
 _ANYWHERE = np.log(16.0)
 """Width in ln f over which a reading of something else may lie: two octaves either way."""
+_READINGS_OF_PRIOR = 1.0
+"""How many readings the prior of the noise counts for."""
 _OPEN = 1e-6
 """Sensitivity of ln f to the logarithm of a constant, in its best combination of readings, below which it is open."""
-_REACH = np.log(1000.0)
-"""How far a refit may take ln of a constant: much farther than any slip, and numbers still."""
 _STEPS, _NEAR = 15, 0.01
-"""Steps of least squares, and what ln of a constant may be off by, where slips are weighed to first order and refits
-begin. Where a wrong reading is still among those that are fitted, steps may never settle."""
-_N_REFITTED = 3
-"""Slips, the likeliest to first order, whose odds after a refit are compared."""
-_NOISE_SDS = np.linspace(-3.0, 14.0, 69)
+"""Steps of least squares from a start of their own, and what ln of a constant may be off by after them."""
+_LOG_MILLION = np.log(1e6)
 
 
 @dataclass(frozen=True)
@@ -59,80 +60,68 @@ class Slip:
     Attributes
     ----------
     readings : tuple of int
-        Position of the reading, or of the two that are exchanged; none where all is as it was read.
+        Position of the reading, or of the two that are exchanged.
     factor : float
-        What the reading is, over what it should be; 1 where it belongs to another mode, or two are exchanged.
+        What the reading is, over what it should be; 1 where it is of something else, or two are exchanged.
     log_odds : float
         ln of how many times as probable the readings are with it.
+    gap : float
+        ln of the reading over what the others predict for it.
     """
 
     readings: tuple[int, ...]
     factor: float = 1.0
     log_odds: float = 0.0
+    gap: float = 0.0
 
     @property
     def is_exchange(self) -> bool:
         """Whether two readings stand for each other."""
         return len(self.readings) == 2
 
-    @property
-    def left_out(self) -> tuple[int, ...]:
-        """Readings that say nothing of the plate."""
-        return self.readings if not self.is_exchange and self.factor == 1.0 else ()
 
-    def mended(self, target: Floats) -> Floats:
-        """ln of the frequencies as they would have been read: (n_modes,) array."""
-        found = target.copy()
-        if self.is_exchange:
-            found[list(self.readings)] = target[list(reversed(self.readings))]
-        elif self.readings:
-            found[self.readings[0]] -= np.log(self.factor)
-        return found
+class Remarks(NamedTuple):
+    """What a reader of the constants must know of the readings, a sentence each.
 
-    def mended_board(self, board: Board) -> Board:
-        """The board with its readings as they would have been read; without those that say nothing of the plate."""
-        frequencies = [reading.frequency for setup in board.setups for reading in setup.readings]
-        if self.is_exchange:
-            one, other = self.readings
-            frequencies[one], frequencies[other] = frequencies[other], frequencies[one]
-        elif self.readings:
-            frequencies[self.readings[0]] = frequencies[self.readings[0]].scaled(1.0 / self.factor)
-        at, setups = 0, []
-        for setup in board.setups:
-            rows = range(at, at + len(setup.readings))
-            read = [replace(one, frequency=frequencies[i]) for i, one in zip(rows, setup.readings, strict=True)]
-            kept = tuple(one for i, one in zip(rows, read, strict=True) if i not in self.left_out)
-            setups += [replace(setup, readings=kept)] if kept else []
-            at = rows.stop
-        return replace(board, setups=tuple(setups))
+    Attributes
+    ----------
+    slips : tuple of str
+        The likeliest slip, if one explains the readings.
+    others : tuple of str
+        Otherwise the two readings whose order is least like the plate's, unless no plate fits; and whether the noise
+        that the residuals want is far above its prior.
+    """
+
+    slips: tuple[str, ...]
+    others: tuple[str, ...]
 
 
-AS_READ = Slip(())
-"""None at all."""
+def reading_remarks(posterior: Posterior, centre: Floats) -> Remarks:
+    """What is to be said of the readings of a posterior.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        Its models hold the exact law.
+    centre : (n_dim,) array
+        Where the readings are most likely.
+
+    Returns
+    -------
+    Remarks
+    """
+    readings = Readings(posterior, centre)
+    is_lost = is_too_wide(posterior.board, readings.log_widening)
+    noise = noise_remarks(posterior.board, readings.log_widening)
+    slip = readings.likeliest(anywhere=is_lost)
+    if slip is not None:
+        return Remarks((_exchange(readings, slip) if slip.is_exchange else _stray(readings, slip),), noise)
+    pair = None if is_lost else readings.disordered()
+    return Remarks((), noise if pair is None else (_disorder(readings, pair), *noise))
 
 
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """Residuals and sensitivities of all readings at one point of the fitted columns, under a law that serves there."""
-
-    predict: Predictor
-    x: Floats
-    residuals: Floats
-    slopes: Floats
-
-    @classmethod
-    def at(cls, predict: Predictor, x: Floats, target: Floats) -> _Fit:
-        """Beside readings, (n_modes,) array of ln f."""
-        return cls(predict, x, target - predict(x[None, :])[0], sensitivities(predict, x))
-
-    @property
-    def inputs(self) -> Floats:
-        """Standard coordinates of the uncertain inputs."""
-        return self.x[self.predict.n_constants :]
-
-
-class SlipSearch:
-    """The readings of a posterior beside its exact law, and how probable they are with each slip.
+class Readings:
+    """The readings of a posterior, and what some of them lead to expect of the others.
 
     Parameters
     ----------
@@ -143,143 +132,232 @@ class SlipSearch:
     """
 
     def __init__(self, posterior: Posterior, centre: Floats) -> None:
-        self.board = posterior.board
-        self.is_robust = posterior.robust
+        self.board, self.is_robust = posterior.board, posterior.robust
         self.target = log_measured(self.board)
         self._parameters = posterior.parameters
-        self._n = posterior.parameters.n_constants
         self._medians = np.array([setup.noise.median for setup in self.board.setups])
-        self._log_sd = max(_LEAST_LOG_SD, *(setup.noise.log_sd for setup in self.board.setups))
-        self._variances = np.stack(
-            [reading_sd(self.board.setups, self._medians * np.exp(self._log_sd * z)) ** 2 for z in _NOISE_SDS]
-        )
+        self._scales = reading_sd(self.board.setups, self._medians)
         predict = predictor(self.board, posterior.models, "exact", centre)
-        self.as_read = _Fit.at(predict, centre[self._parameters.fitted_columns], self.target)
-        if not np.isfinite(self.as_read.slopes).all():  # so far off that the exact law made there is of no plate
-            self.as_read = self._elsewhere(AS_READ) or self.as_read
-        self.log_widening = self._log_sd * self._wanted_noise(posterior)
-        if self.is_robust:  # there the centre is not where normal errors would have it
-            self.as_read = self.refitted(AS_READ, self.as_read)
+        self._whole = _Fit(predict, centre[self._parameters.fitted_columns], self.target, self._scales)
+        if self.is_robust or not self._whole.is_plate:
+            self._whole = self._refitted(self._whole, ())
+        self._starts = [self._whole]
+        self.log_widening = 0.5 * float(np.log(self._whole.variance(())[0]))
+        """ln of the noise that the residuals want, over the median of its prior."""
+        if self.is_robust:  # which a reading far off does not widen
+            self.log_widening = float(np.max(self._parameters.log_noise(centre[None])[0] - np.log(self._medians)))
 
-    def _wanted_noise(self, posterior: Posterior) -> float:
-        """How far above the middle of its prior the noise lies that the residuals want, in steps of `_log_sd`."""
-        if not self.is_robust:
-            return float(_NOISE_SDS[np.argmax(self._by_noise(self.as_read, ()))])
-        ends = np.cumsum([len(setup.readings) for setup in self.board.setups])[:-1]
-        parts = np.split(self.target - self.as_read.residuals, ends)
-        log_density = -0.5 * _NOISE_SDS**2
-        for errors, predicted, median in zip(posterior.readings, parts, self._medians, strict=True):
-            levels = median * np.exp(self._log_sd * _NOISE_SDS)
-            log_density += errors.log_likelihood(np.tile(predicted, (levels.size, 1)), levels).sum(axis=1)
-        return float(_NOISE_SDS[np.argmax(log_density)])
+    @property
+    def rms_cents(self) -> float:
+        """Of the residuals of all readings."""
+        return _rms_cents(self._whole.residuals)
 
     def likeliest(self, anywhere: bool = False) -> Slip | None:
-        """The slip that explains the readings best, if it does so far better than noise and after a refit.
+        """The slip that explains the readings best, if it does so far better than noise.
 
         Parameters
         ----------
         anywhere : bool
-            Whether the plate may be quite another one than the readings as they are lead to. Each reading is left out
-            then in turn, and slips are weighed at what least squares finds without it, too.
+            Whether the plate may be quite another one than the readings as they are lead to: then fits begin as well
+            where least squares without each reading lead.
 
         Returns
         -------
         Slip or None
         """
-        n_modes = self.target.size
-        if n_modes < self._n + FEWEST_TO_SPARE:
+        n = self.target.size
+        if n < self._parameters.n_constants + FEWEST_TO_SPARE:
             return None
-        strays = [Slip((i,)) for i in range(n_modes)]
-        off = [Slip((i,), factor) for i in range(n_modes) for factor in (*OCTAVES, *DECIMALS)]
-        best = self._refitted_best([*strays, *off, *self._pairs()], anywhere)
+        if anywhere:
+            elsewhere = (self._elsewhere(i) for i in range(n))
+            self._starts = [self._whole, *(one for one in elsewhere if one is not None)]
+        single = [slip for i in range(n) for slip in self._of_one(i)]
+        best = max((*single, *self._of_pairs(self._pairs())), key=lambda one: one.log_odds, default=None)
         return best if best is not None and best.log_odds > np.log(RARITY) else None
 
     def disordered(self) -> Slip | None:
         """The two readings in the other order than the modes of the fitted plate that are likeliest exchanged."""
-        predicted = self.target - self.as_read.residuals
+        predicted = self.target - self._whole.residuals
         pairs = [
-            slip
-            for slip in self._pairs()
-            if np.prod([values[slip.readings[0]] - values[slip.readings[1]] for values in (self.target, predicted)]) < 0
+            (i, j) for i, j in self._pairs() if (self.target[i] - self.target[j]) * (predicted[i] - predicted[j]) < 0.0
         ]
-        return self._refitted_best(pairs)
+        return max(self._of_pairs(pairs), key=lambda one: one.log_odds, default=None)
 
-    def _pairs(self) -> list[Slip]:
-        """Exchanges of two readings of one setup."""
+    def exchanged_rms_cents(self, slip: Slip) -> float:
+        """Of the residuals once two readings have each other's label."""
+        one, other = slip.readings
+        frequencies = [reading.frequency for setup in self.board.setups for reading in setup.readings]
+        frequencies[one], frequencies[other] = frequencies[other], frequencies[one]
+        rest = iter(frequencies)
+        setups = tuple(
+            replace(setup, readings=tuple(replace(one, frequency=next(rest)) for one in setup.readings))
+            for setup in self.board.setups
+        )
+        return _rms_cents(weighted_least_squares(replace(self.board, setups=setups)).residuals)
+
+    def _pairs(self) -> list[tuple[int, int]]:
+        """Two readings of one setup each."""
         ends = np.cumsum([0, *(len(setup.readings) for setup in self.board.setups)])
-        return [Slip(pair) for first, last in pairwise(ends.tolist()) for pair in combinations(range(first, last), 2)]
+        return [pair for first, last in pairwise(ends.tolist()) for pair in combinations(range(first, last), 2)]
 
-    def _refitted_best(self, slips: Sequence[Slip], anywhere: bool = False) -> Slip | None:
-        """The likeliest of some slips, with its odds after a refit; None if none can be weighed."""
-        places = [self.as_read, *(self._elsewhere(Slip((i,))) for i in range(self.target.size) if anywhere)]
-        to_first_order = np.max([self._first_order(slips, place) for place in places if place is not None], axis=0)
-        tried = [slips[i] for i in np.argsort(-to_first_order, kind="stable")[: _N_REFITTED if anywhere else 1]]
-        weighed = [self._weighed(slip, anywhere) for slip in tried]
-        return max((slip for slip in weighed if np.isfinite(slip.log_odds)), key=lambda one: one.log_odds, default=None)
+    def _of_one(self, i: int) -> list[Slip]:
+        """What may be wrong with one reading."""
+        fit = self._without((i,))
+        if fit is None:
+            return []
+        gap = float(fit.residuals[i])
+        factors = (*OCTAVES, *DECIMALS)
+        as_read, *off = fit.log_predictive((i,), np.array([[gap], *([gap - np.log(factor)] for factor in factors)]))
+        stray = Slip((i,), 1.0, -np.log(_ANYWHERE) - as_read, gap)
+        return [stray, *(Slip((i,), factor, one - as_read, gap) for factor, one in zip(factors, off, strict=True))]
 
-    def _first_order(self, slips: Sequence[Slip], place: _Fit) -> Floats:
-        """ln of the probability of the readings with each slip, a fit to them moved by its slopes: (n_slips,) array."""
-        found = np.empty(len(slips))
-        keeping = [i for i, slip in enumerate(slips) if not slip.left_out]
-        shifts = np.array([slips[i].mended(self.target) for i in keeping]).reshape(-1, self.target.size) - self.target
-        found[keeping] = self._log_evidence(place, (), shifts)
-        for i, slip in enumerate(slips):
-            if slip.left_out:
-                found[i] = self._log_evidence(place, slip.left_out)
+    def _of_pairs(self, pairs: Sequence[tuple[int, int]]) -> list[Slip]:
+        """Exchanges, with their odds."""
+        found = []
+        for i, j in pairs:
+            fit = self._without((i, j))
+            if fit is not None:
+                apart = self.target[j] - self.target[i]
+                gaps = fit.residuals[[i, j]]
+                as_read, exchanged = fit.log_predictive((i, j), np.array([gaps, gaps + np.array([apart, -apart])]))
+                found.append(Slip((i, j), 1.0, exchanged - as_read))
         return found
 
-    def _weighed(self, slip: Slip, anywhere: bool) -> Slip:
-        """A slip with its odds after a refit."""
-        starts = [self.as_read, *([self._elsewhere(slip)] if anywhere else [])]
-        fits = [self.refitted(slip, one) for one in starts if one is not None]
-        evidence = max(float(self._log_evidence(fit, slip.left_out)) for fit in fits)
-        return replace(slip, log_odds=evidence - float(self._log_evidence(self.as_read, ())))
+    def _without(self, left_out: tuple[int, ...]) -> _Fit | None:
+        """The plate fitted without some readings; None if they leave a constant open."""
+        start = min(self._starts, key=lambda one: one.variance(left_out)[0])
+        fit = self._refitted(start, left_out)
+        return fit if fit.tells_constants(left_out) else None
 
-    def refitted(self, slip: Slip, start: _Fit) -> _Fit:
-        """Residuals of the most likely constants where a slip is mended."""
-        target = slip.mended(self.target)
-        scales = reading_sd(self.board.setups, self._medians * np.exp(self.log_widening))
-        x = most_likely(start.predict, normal_misfit(target, scales), start.x, self._within(start.x), slip.left_out)
-        return _Fit.at(start.predict, x, target)
+    def _refitted(self, start: _Fit, left_out: tuple[int, ...]) -> _Fit:
+        misfit = normal_misfit(self.target, self._scales)
+        x = most_likely(start.predict, misfit, start.x, self._parameters.fitted_bounds, left_out)
+        return _Fit(start.predict, x, self.target, self._scales)
 
-    def _within(self, x: Floats) -> Bounds:
-        """Limits of the fitted columns: constants stay within reach, for a slip may leave one of them open."""
-        bounds = self._parameters.fitted_bounds
-        reach = np.full(x.size, np.inf)
-        reach[: self._n] = _REACH
-        return Bounds(np.maximum(bounds.lower, x - reach), np.minimum(bounds.upper, x + reach))
-
-    def _elsewhere(self, slip: Slip) -> _Fit | None:
-        """The readings beside the plate that least squares finds where a slip is mended, from a start of its own.
-
-        None where the readings lead to no plate at all.
-        """
+    def _elsewhere(self, left_out: int) -> _Fit | None:
+        """Where least squares without a reading lead from a start of their own; None if to no plate at all."""
+        at, setups = 0, []
+        for setup in self.board.setups:
+            kept = tuple(one for i, one in enumerate(setup.readings, start=at) if i != left_out)
+            setups += [replace(setup, readings=kept)] if kept else []
+            at += len(setup.readings)
         try:
-            values = weighted_least_squares(slip.mended_board(self.board), _STEPS, accepted=_NEAR).values
+            values = weighted_least_squares(replace(self.board, setups=tuple(setups)), _STEPS, accepted=_NEAR).values
             models = [setup_model(system_of(self.board, setup), values) for setup in self.board.setups]
         except (ValueError, KeyError):
             return None
         there = self._parameters.theta(values, self._medians)
-        return _Fit.at(
-            predictor(self.board, models, "linear", there), there[self._parameters.fitted_columns], self.target
-        )
+        predict = predictor(self.board, models, "linear", there)
+        return _Fit(predict, there[self._parameters.fitted_columns], self.target, self._scales)
 
-    def _log_evidence(self, fit: _Fit, left_out: tuple[int, ...], shifts: Floats | float = 0.0) -> Floats:
-        """ln of the probability of the readings over all noise levels; one per row of shifts of the residuals.
 
-        Minus infinity where they leave a constant open, or lead to no plate: then a slip cannot be weighed.
-        """
-        kept = np.setdiff1d(np.arange(self.target.size), left_out)
-        is_plate = np.isfinite(fit.residuals).all() and np.isfinite(fit.slopes).all()
-        if not is_plate or np.linalg.matrix_rank(fit.slopes[kept, : self._n], tol=_OPEN) < self._n:
-            return np.full(np.shape(shifts)[:-1], -np.inf)
-        return np.asarray(logsumexp(self._by_noise(fit, left_out, shifts), axis=0) - len(left_out) * np.log(_ANYWHERE))
+class _Fit:
+    """Residuals and slopes of all readings at one plate, in units of ln f."""
 
-    def _by_noise(self, fit: _Fit, left_out: tuple[int, ...], shifts: Floats | float = 0.0) -> Floats:
-        """ln of the same at each noise level, times its prior: (n_levels, ...) array."""
-        kept = np.setdiff1d(np.arange(self.target.size), left_out)
-        inputs = fit.slopes[kept, self._n :]
-        # measured from the middle of the inputs' priors, so that their own departure counts
-        residuals = (fit.residuals + shifts)[..., kept] + inputs @ fit.inputs
-        found = log_probability(residuals, fit.slopes[kept, : self._n], self._variances[:, kept], inputs)
-        return found - 0.5 * (_NOISE_SDS**2).reshape(-1, *[1] * (found.ndim - 1))
+    def __init__(self, predict: Predictor, x: Floats, target: Floats, scales: Floats) -> None:
+        self.predict, self.x, self.scales = predict, x, scales
+        self.residuals = target - predict(x[None, :])[0]
+        self.slopes = sensitivities(predict, x)
+        self.inputs = x[predict.n_constants :]
+
+    @property
+    def is_plate(self) -> bool:
+        """Whether it has frequencies, there and nearby."""
+        return bool(np.isfinite(self.residuals).all() and np.isfinite(self.slopes).all())
+
+    def tells_constants(self, left_out: tuple[int, ...]) -> bool:
+        """Whether the other readings leave no constant open."""
+        constants = np.delete(self.slopes, left_out, axis=0)[:, : self.predict.n_constants]
+        return self.is_plate and bool(np.linalg.matrix_rank(constants, tol=_OPEN) == constants.shape[1])
+
+    def variance(self, left_out: tuple[int, ...]) -> tuple[float, float]:
+        """Of the other readings over the square of their scales, that prior among them; and its degrees of freedom."""
+        z = np.delete(self.residuals / self.scales, left_out)
+        spare = max(z.size - self.predict.n_constants, 0) + _READINGS_OF_PRIOR
+        return float((z @ z + self.inputs @ self.inputs + _READINGS_OF_PRIOR) / spare), spare
+
+    def log_predictive(self, left_out: tuple[int, ...], gaps: Floats) -> Floats:
+        """ln of the density of readings so far from what the others predict: (n_sets,) array, of (n_sets, n_left)."""
+        from scipy.stats import multivariate_t
+
+        variance, spare = self.variance(left_out)
+        weighted = np.delete(self.slopes / self.scales[:, None], left_out, axis=0)
+        own = np.diag((np.arange(self.x.size) >= self.predict.n_constants).astype(np.float64))
+        covariance = np.linalg.inv(weighted.T @ weighted + own)
+        here = list(left_out)
+        spread = np.diag(self.scales[here] ** 2) + self.slopes[here] @ covariance @ self.slopes[here].T
+        return np.atleast_1d(multivariate_t(np.zeros(len(here)), variance * spread, df=spare).logpdf(gaps))
+
+
+def _rms_cents(residuals: Floats) -> float:
+    return float(cents(np.sqrt(np.mean(residuals**2))))
+
+
+def noise_remarks(board: Board, log_widening: float) -> tuple[str, ...]:
+    """That the readings scatter far more than the prior of the noise lets expect, if they do; a sentence.
+
+    Parameters
+    ----------
+    board : Board
+    log_widening : float
+        ln of the noise that the residuals want, over the median of its prior.
+    """
+    if not is_too_wide(board, log_widening):
+        return ()
+    levels = ", ".join(
+        f"{100.0 * setup.noise.median * np.exp(log_widening):.2g} % where about {100.0 * setup.noise.median:.2g} % is "
+        "expected" + (f" in setup {setup.name}" if len(board.setups) > 1 else "")
+        for setup in board.setups
+    )
+    return (
+        f"the readings scatter about the fitted plate by {levels}: no plate of these sizes and edges fits them, so do "
+        "not trust the constants before a label, a size or an edge is corrected, or an effect is found (bayesplate "
+        "diagnose)",
+    )
+
+
+def is_too_wide(board: Board, log_widening: float) -> bool:
+    """Whether a noise of so many times its prior's median, by the logarithm, is far above what is expected."""
+    widest = max(setup.noise.log_sd for setup in board.setups)
+    return bool(log_widening >= max(np.log(LARGE_NOISE), LARGE_NOISE_SDS * widest))
+
+
+def _stray(readings: Readings, slip: Slip) -> str:
+    (i,) = slip.readings
+    apart = f"{abs(1200.0 * slip.gap / np.log(2.0)):.0f} cents {'above' if slip.gap > 0 else 'below'}"
+    measured = float(np.exp(readings.target[i]))
+    kind = "an octave" if slip.factor in OCTAVES else "a decimal place" if slip.factor in DECIMALS else "misread"
+    advice = "" if readings.is_robust else " --robust gives it less say"
+    return (
+        f"{readings.board.short_reading_names[i]} at {measured:.5g} Hz is {apart} what the other modes expect, "
+        f"{measured * np.exp(-slip.gap):.4g} Hz: {kind}, or another mode?{advice}"
+    )
+
+
+def _exchange(readings: Readings, slip: Slip) -> str:
+    before, after = readings.rms_cents, readings.exchanged_rms_cents(slip)
+    return (
+        f"{_pair(readings, slip)} fit far better exchanged, {after:.1f} cents rms in place of {before:.1f} "
+        f"({times(slip.log_odds)} as probable): have they each other's label?"
+    )
+
+
+def _disorder(readings: Readings, slip: Slip) -> str:
+    likelier = "exchanged" if slip.log_odds > 0 else "as they are"
+    return (
+        f"{_pair(readings, slip)} stand in the other order than the modes of the fitted plate; {likelier} they are "
+        f"{times(abs(slip.log_odds))} as probable: their figures tell which is which"
+    )
+
+
+def times(log_odds: float) -> str:
+    """How many times as probable, in words; from the logarithm."""
+    if log_odds > _LOG_MILLION:
+        return "more than a million times"
+    odds = float(np.exp(log_odds))
+    return f"{odds:.2g} times" if odds < 100 else f"{float(f'{odds:.1g}'):,.0f} times"
+
+
+def _pair(readings: Readings, slip: Slip) -> str:
+    names, hertz = readings.board.short_reading_names, np.exp(readings.target)
+    return " and ".join(f"{names[i]} at {hertz[i]:.5g} Hz" for i in slip.readings)

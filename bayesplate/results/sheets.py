@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from bayesplate.estimates.proposals import Proposal, probabilities
 from bayesplate.estimates.sheet import Sheet, SheetMode
 from bayesplate.plate.board import Board
+from bayesplate.posterior.first_labels import Way
 
 
 @dataclass(frozen=True)
@@ -120,20 +120,28 @@ class ModesReport:
         return f"<ModesReport of {self.name}: {told}>"
 
 
-def proposed_labels(board: Board, found: Sequence[Proposal]) -> tuple[ProposedLabel, ...]:
-    """What each peak of a board with one setup may be; empty without proposals."""
-    if not found:
+def proposed_labels(board: Board, ways: Sequence[tuple[Way, float]]) -> tuple[ProposedLabel, ...]:
+    """What each peak of a board without a label may be, by the ways to label all of them; empty without any."""
+    if not ways:
         return ()
-    (setup,) = board.setups
     return tuple(
-        ProposedLabel(
-            setup.name,
-            hertz,
-            None if found[0].labels[i] is None else str(found[0].labels[i]),
-            {"none" if label is None else str(label): share for label, share in probabilities(found, i).items()},
-        )
-        for i, hertz in enumerate(sorted(setup.unlabelled))
+        _proposed(setup.name, hertz, [(_label(way, setup.name, hertz), share) for way, share in ways])
+        for setup in board.setups
+        for hertz in sorted(setup.unlabelled)
     )
+
+
+def _proposed(setup: str, hertz: float, found: Sequence[tuple[str | None, float]]) -> ProposedLabel:
+    total: dict[str, float] = {}
+    for label, share in found:
+        total[label or "none"] = total.get(label or "none", 0.0) + share
+    return ProposedLabel(setup, hertz, found[0][0], dict(sorted(total.items(), key=lambda item: -item[1])))
+
+
+def _label(way: Way, setup: str, hertz: float) -> str | None:
+    """Of a peak in one way to label them; None where it is no mode."""
+    readings = (one for each in way.board.setups if each.name == setup for one in each.readings)
+    return next((str(one.label) for one in readings if one.frequency.mean == hertz), None)
 
 
 def sheet_report(sheet: Sheet) -> SheetReport:

@@ -23,8 +23,8 @@ from bayesplate.quantities import Quantity
 from bayesplate.recordings.contract import sign_of, spurious_share
 
 if TYPE_CHECKING:
-    from bayesplate.estimates.proposals import Proposal
     from bayesplate.frequencies.model import SetupModel
+    from bayesplate.posterior.first_labels import Way
     from bayesplate.recordings.picking import Picked, PickedMode
 
 Floats = NDArray[np.float64]
@@ -155,12 +155,12 @@ class MostlyKnown:
         return np.asarray(self._modes.displacement(x, y)[self._columns, 0, 0])
 
 
-def mostly_known(way: Proposal, bare: Board) -> MostlyKnown:
-    """The modes about the constants that a proposal gives.
+def mostly_known(way: Way, bare: Board) -> MostlyKnown:
+    """The modes about the constants of one way to label the peaks.
 
     Parameters
     ----------
-    way : Proposal
+    way : Way
     bare : Board
         With all the peaks, bare.
 

@@ -12,13 +12,13 @@ import numpy as np
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.identifiability import identifiability, require_identifiable, require_labels
 from bayesplate.estimates.least_squares import weighted_least_squares
-from bayesplate.estimates.proposals import proposals
 from bayesplate.estimates.sheet import NUMBERS_OF_MODES, Precision, Sheet, sheet
 from bayesplate.files import make_folder, require_new
 from bayesplate.frequencies.prior_bands import prior_bands, prior_medians
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board, Values
+from bayesplate.posterior.first_labels import probable_ways
 from bayesplate.posterior.laplace import noise_widenings
 from bayesplate.report.plots import ModesPlots
 from bayesplate.results.sheets import ModesReport, proposed_labels, sheet_report
@@ -111,11 +111,11 @@ def modes(
     names = [f"{stem}.{ending}" for stem in stems for ending in ("png", "svg")]
     files = () if out is None else require_new(Path(out), names, force=force)
     rng = np.random.default_rng(seed)
-    found = proposals(board, prepared.prior, rng)
-    if found:
-        prepared = replace(prepared, board=found[0].board)
+    ways = probable_ways(board, prepared.prior)
+    if ways:
+        prepared = replace(prepared, board=ways[0][0].board)
     values, precision, why = _constants(prepared)
-    basis = _AT_PRIOR if precision is None else _AT_PROPOSED if found else _AT_ESTIMATE
+    basis = _AT_PRIOR if precision is None else _AT_PROPOSED if ways else _AT_ESTIMATE
     sheets = tuple(_sheets(prepared, values, precision, rng, basis))
     if out is not None:
         _draw(sheets, Path(out), files)
@@ -124,7 +124,7 @@ def modes(
         title=board.title,
         basis=basis,
         setups=tuple(sheet_report(one) for one in sheets),
-        proposed=proposed_labels(board, found),
+        proposed=proposed_labels(board, ways),
         notes=(*why, *board.notes),
         files=tuple(str(path) for path in files),
     )

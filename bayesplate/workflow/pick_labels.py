@@ -1,6 +1,6 @@
 """Labels of picked peaks: the assignment likelihood of the spectrum, residues between known places, and sand.
 
-Ways to label the lower peaks come from `bayesplate.estimates.proposals`; about the constants of each, all peaks are
+Ways to label the lower peaks come from `bayesplate.posterior.first_labels`; about the constants of each, all peaks are
 assigned to modes by the likelihood that the fit uses, with what residues and sand say of each pair added to it.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.errors import NotIdentifiableError
-from bayesplate.estimates.proposals import FEWEST_PEAKS, proposals
+from bayesplate.posterior.first_labels import FEWEST_PEAKS, probable_ways
 from bayesplate.recordings.patterns import residue_evidence, sign_odds
 from bayesplate.recordings.sand import sand_evidence
 from bayesplate.workflow.assigned import MostlyKnown, bare_board, mostly_known
@@ -28,8 +28,6 @@ Floats = NDArray[np.float64]
 
 MOST_PROPOSING = 12
 """Lowest peaks whose labels are proposed: higher ones lie where a thin plate is less and less like a real one."""
-SURE, FEWEST_SURE = 0.05, 6
-"""Probability of being no mode below which a peak is taken for one, and how many such peaks are enough to begin."""
 _LEAST_SHARE, _MOST_WAYS = 0.01, 3
 _POLARITY_SURE = float(np.log(20.0))
 _STATED, _BEYOND_DOUBT = 0.5, 0.99
@@ -111,12 +109,12 @@ def label_peaks(
     if len(likely) < FEWEST_PEAKS:
         raise NotIdentifiableError(f"{FEWEST_PEAKS} peaks or more are needed to tell modes by their frequencies")
     unsigned = bare_board(board, likely, picked, None)
-    ways = proposals(bare_board(board, proposing(likely), picked, None), prior, np.random.default_rng(0))
-    ways = [way for way in ways if way.probability > _LEAST_SHARE][:_MOST_WAYS]
+    ways = probable_ways(bare_board(board, likely[:MOST_PROPOSING], picked, None), prior)
+    ways = [(way, share) for way, share in ways if share > _LEAST_SHARE][:_MOST_WAYS]
     if not ways:
         raise NotIdentifiableError("no plate of these sizes and edges has such peaks")
-    known = [mostly_known(way, unsigned) for way in ways]
-    shares = np.array([way.probability for way in ways])
+    known = [mostly_known(way, unsigned) for way, _ in ways]
+    shares = np.array([share for _, share in ways])
     if flips is None and picked.spectra.force is not None and _residues(known[0], picked) is not None:
         flips = _flips(known, shares, picked)
     if flips is not None:
@@ -133,12 +131,6 @@ def label_peaks(
         _add(totals, one.probabilities(own), one.names, share)
         _add(alone, _alone(own, one, likely), one.names, share)
     return Labels(tuple(map(_sorted, totals)), tuple(map(_sorted, alone)), flips, doubts)
-
-
-def proposing(likely: Sequence[PickedMode]) -> Sequence[PickedMode]:
-    """The lowest of the peaks that are surely modes, or of all where there are few: one that is none leads astray."""
-    sure = [one for one in likely if one.spurious < SURE]
-    return (sure if len(sure) >= FEWEST_SURE else likely)[:MOST_PROPOSING]
 
 
 def _add(totals: list[dict[str, float]], probabilities: Floats, names: Sequence[str], share: float) -> None:

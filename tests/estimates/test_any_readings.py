@@ -23,7 +23,6 @@ from bayesplate.estimates.refit import (
     normal_misfit,
     refit,
 )
-from bayesplate.estimates.side_by_side import most_likely_of_each
 from bayesplate.modes.terms import Weights
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.posterior.laplace import predictor
@@ -124,11 +123,11 @@ def test_a_law_without_frequencies_gives_no_numbers_where_it_starts_and_is_kept_
 
     target = pencil(shares)(np.array([[0.8, 0.0, 0.0]]))[0]
     misfit = normal_misfit(target, np.full(7, 0.01))
-    (found,) = most_likely_of_each(walled, misfit, np.zeros((1, 3)), [()], bounds)
+    found = most_likely(walled, misfit, np.zeros(3), bounds)
     assert np.isfinite(found).all()
     assert 0.3 < found[0] <= 0.5
-    beside = np.array([[0.499999, 0.0, 0.0]])  # slopes by differences reach over the wall
-    assert np.isfinite(most_likely_of_each(walled, misfit, beside, [()], bounds)).all()
+    beside = np.array([0.499999, 0.0, 0.0])  # slopes by differences reach over the wall
+    assert np.isfinite(most_likely(walled, misfit, beside, bounds)).all()
     assert np.isnan(most_likely(walled, misfit, np.ones(3), bounds)).all()
     assert not has_come_to_rest(np.full(3, np.nan), np.zeros(3), 3)
     errors = prediction_errors(walled, target, misfit, np.ones((1, 3)), bounds)

@@ -153,7 +153,10 @@ def loss(x, slopes, hertz, step, robust, left_out):
 @pytest.mark.parametrize("robust", [False, True], ids=["normal", "student"])
 @pytest.mark.parametrize("step", [0.0, 1.0, 4.0])
 def test_the_fit_with_deviances_is_the_most_likely_point(problem, step, robust):
-    """All modes and without one, against a simplex on probabilities by scipy; 4 Hz at 150 Hz is 3.3 noises."""
+    """All modes and without one, against a simplex on probabilities by scipy; 4 Hz at 150 Hz is 3.3 noises.
+
+    To a ten-thousandth of the noise, where the least squares of scipy stop.
+    """
     slopes, _, target = problem
     hertz = np.round(np.exp(target) / step) * step if step else np.exp(target)
     errors = ReadingErrors(hertz, np.zeros(N_MODES), np.full(N_MODES, step), robust)
@@ -177,7 +180,7 @@ def test_the_fit_with_deviances_is_the_most_likely_point(problem, step, robust):
 
         missed = np.log(hertz) - 5.0 - slopes @ optimize.root(uphill, fitted, tol=1e-14).x
         assert (found.left_out[left_out] if left_out else found.in_sample) == pytest.approx(
-            missed[left_out] if left_out else missed, abs=1e-9
+            missed[left_out] if left_out else missed, abs=1e-4 * NOISE
         )
 
 

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import ritz
-from made_boards import board_of, setup_of
+from made_boards import board_of, setup_of, with_noise
 
 from bayesplate.cards import load_prior
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.labels import Label
 from bayesplate.plate.setup import Peak
 from bayesplate.posterior import first_labels
-from bayesplate.posterior.first_labels import Way, only_way, propose_labels
+from bayesplate.posterior.first_labels import Way, only_way, probable_ways, propose_labels
 from bayesplate.quantities import Quantity
 
 LABELS = ((1, 1), (2, 0), (2, 1), (0, 2), (1, 2), (3, 0), (3, 1), (2, 2), (3, 2), (4, 0))
@@ -123,9 +123,38 @@ def test_a_fit_begins_with_the_way_that_is_probable_whatever_the_plate_lacks(mon
     """Not with one far off that a small noise would favour."""
     ways = iter([HERE, way((0, 2), [6.1, 0.7, 3.2], 100.0, -10.0)])
     monkeypatch.setattr(first_labels, "_guesses", lambda *_: [None, None])
+    monkeypatch.setattr(first_labels, "_judged", lambda *_: [*ways])
     monkeypatch.setattr(first_labels, "_settled", lambda board, *_: (board, np.ones(3)))
-    monkeypatch.setattr(first_labels, "_judged", lambda *_: next(ways))
     proposed = propose_labels(board_with([(2, 0)], ALL[3:]), PRIOR)
 
     assert proposed.rigidities == pytest.approx(np.exp(HERE.log_rigidities))
     assert proposed.spread == pytest.approx(0.0)
+
+
+def test_bare_peaks_of_which_one_is_missing_are_labelled_with_probabilities():
+    """Seven of the lowest eight modes, with noise, in no order, under the prior of the wood."""
+    hertz = with_noise(
+        {beams: HERTZ[beams] for beams in LABELS[:8] if beams != (0, 2)}, 0.003, np.random.default_rng(5)
+    )
+    ways = probable_ways(board_with((), hertz.values()), PRIOR)
+    (best, share), *others = ways
+
+    assert labels_of(best.board) == {round(each, 3): beams for beams, each in hertz.items()}
+    assert best.board.setups[0].peaks == ()
+    assert share > 0.9
+    assert share + sum(one for _, one in others) == pytest.approx(1.0)
+    assert [one for _, one in ways] == sorted((one for _, one in ways), reverse=True)
+
+
+def test_a_plate_stiffer_across_its_grain_is_an_unlikely_way(monkeypatch):
+    """Peaks that fit a plate either way round, under a prior of any solid: all probable unless cards mean the grain."""
+    board = board_with((), ALL[:7])
+    shares = {way.is_usual: share for way, share in reversed(probable_ways(board, WIDE))}
+    assert shares[True] > 0.9 > 10 * shares[False]
+    monkeypatch.setattr(first_labels, "_UNUSUAL", 1.0)
+    assert {way.is_usual: share for way, share in reversed(probable_ways(board, WIDE))}[False] > 0.1
+
+
+def test_three_peaks_and_boards_with_a_label_are_left_alone():
+    assert probable_ways(board_with((), ALL[:3]), PRIOR) == []
+    assert probable_ways(board_with([(1, 1)], ALL[1:8]), PRIOR) == []

@@ -136,8 +136,8 @@ def test_the_short_form_is_that_of_the_summary():
     shown = json.loads((root / "trial.json").read_text(encoding="utf-8"))
     assert in_short(shown) == (root / "trial-short.md").read_text(encoding="utf-8").strip()
     few = in_short(shown | {"cells": {}})
-    assert "intervals hold E_y" in in_short(shown)
-    assert "intervals hold E_y" not in few
+    assert "does not know they hold E_y" in in_short(shown)
+    assert "they hold E_y" not in few
 
 
 def test_the_readme_says_in_short_what_the_trial_found():
