@@ -17,8 +17,7 @@ import click
 from bayesplate.errors import BayesplateError, Fault, UnwritableError, plain
 
 if TYPE_CHECKING:
-    from bayesplate.posterior.sampling import Progress
-    from bayesplate.workflow.shown import Shown
+    from bayesplate.workflow.shown import Progress, Shown
 
 INTERRUPTED = 130
 INTERNAL = 70
@@ -38,7 +37,7 @@ def print_shown(shown: Shown) -> None:
 
 def print_json(content: Any) -> None:
     """What a command found, for other programs."""
-    from bayesplate.results.contract import json_text
+    from bayesplate.workflow.shown import json_text
 
     _write(json_text(content))
 

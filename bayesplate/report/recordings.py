@@ -241,7 +241,7 @@ def modes_table(report: PickReport) -> Table:
 def aside_table(aside: list[PickedRow]) -> Table:
     """What was set aside, and why."""
     rows = tuple(
-        (f"{peak.hz:.2f}", peak.kind or f"{peak.amplitude:.3f}", percent(peak.spurious_probability, 1))
+        (f"{peak.hz:.2f}", peak.kind or None, f"{peak.amplitude:.3f}", percent(peak.spurious_probability, 1))
         for peak in aside
     )
     return Table("Set aside", ("Hz", "taken for", "strength", "no mode"), rows)

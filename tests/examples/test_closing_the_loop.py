@@ -67,7 +67,13 @@ def test_a_hidden_effect_is_named_and_the_error_falls(computed):
 
 
 def test_the_row_is_the_one_that_is_shown(example, computed):
-    assert example.rows(computed)[0] == shown_rows()[0]
+    """Word for word; the last digit of a number is the draws', which differ from machine to machine."""
+    found, shown = (
+        [re.split(r"([-+]?\d+\.\d+)", cell) for cell in row] for row in (example.rows(computed)[0], shown_rows()[0])
+    )
+    for one, other in zip(found, shown, strict=True):
+        assert one[::2] == other[::2]
+        assert list(map(float, one[1::2])) == pytest.approx(list(map(float, other[1::2])), abs=0.101)
 
 
 def test_the_readme_begins_with_measured_boards(example):

@@ -14,7 +14,6 @@ from bayesplate.board.parameter import Owner
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.sessions import shared_share
 from bayesplate.board.setup import DEFAULT_NOISE
-from bayesplate.diagnosis.hypotheses import Swap
 from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.planning.beliefs import AtHand, Explanation
 from bayesplate.planning.explained import _at_hand
@@ -124,21 +123,21 @@ def test_a_reading_that_is_no_mode_or_an_unread_one_says_nothing_of_another_day(
     assert read_as(None)[0][0] == pytest.approx(np.arange(2.0 * (N + 1)))
 
 
-def at_hand(rows, swap=None):
+def at_hand(rows):
     """Of eight readings, which are the modes 2 to 9 by their labels, what an explanation with other labels expects."""
     of_label, taken = np.arange(2, 10), np.asarray(rows)
     base, own = SimpleNamespace(rows=of_label), SimpleNamespace(n_modes=8, rows=taken, is_mode=taken >= 0)
     shift, slopes = 10.0 + np.arange(8.0)[None], np.arange(8.0)[None, :, None]
-    return _at_hand(SimpleNamespace(swap=swap), own, base, shift, slopes)
+    return _at_hand(own, base, shift, slopes)
 
 
-def test_an_exchange_of_two_labels_expects_each_peak_where_the_other_mode_is():
-    found = at_hand(range(2, 10), Swap(3, 5))
+def test_an_exchange_of_two_labels_takes_each_peak_for_the_other_mode():
+    """The arrays are those of the labels of the explanation already."""
+    found = at_hand([2, 3, 4, 7, 6, 5, 8, 9])
 
-    exchanged = [0, 1, 2, 5, 4, 3, 6, 7]
-    assert found.taken.tolist() == exchanged
-    assert found.shift[0] == pytest.approx(10.0 + np.array(exchanged))
-    assert found.slopes[0, :, 0] == pytest.approx(exchanged)
+    assert found.taken.tolist() == [0, 1, 2, 5, 4, 3, 6, 7]
+    assert found.shift[0] == pytest.approx(10.0 + np.arange(8.0))
+    assert found.slopes[0, :, 0] == pytest.approx(np.arange(8.0))
 
 
 def test_a_reading_taken_for_an_unread_mode_has_no_label_and_one_taken_for_none_is_not_expected():

@@ -34,15 +34,19 @@ def boards():
 def found_of(whole, directions, residual, n):
     """A search of the first n modes. Cells of both boards leave the constants where they are, so that they agree."""
     (setup,) = whole.board.setups
+    every = replace(
+        whole.every, log_frequency=whole.every.log_frequency[:n], slopes=whole.every.slopes[:n],
+        input_slopes=whole.every.input_slopes[:n], places=(whole.every.places[0][:n],),
+        predict=lambda x: whole.every.predict(x)[:, :n],
+    )  # fmt: skip
     base = replace(
         whole, board=replace(whole.board, setups=(replace(setup, readings=setup.readings[:n]),)),
-        log_frequency=whole.log_frequency[:n], residual=residual[:n], slopes=whole.slopes[:n],
-        input_slopes=whole.input_slopes[:n], places=whole.places[:n],
+        log_readings=(whole.middle + residual)[:n], every=every, rows=np.arange(n),
     )  # fmt: skip
     candidates = {name: unmoved(made.candidate(base, name, d[:n]), d[:n]) for name, d in directions.items()}
     levels = noise_grid(base.board)
     tables = [(name, one.fine) for name, one in candidates.items()]
-    hypotheses = (made.bare(base, levels), *(Hypothesis((name,), 0.25, table, levels) for name, table in tables))
+    hypotheses = (made.bare(base, levels), *(Hypothesis((name,), 0.25, table, levels, base) for name, table in tables))
     return search(made.ground_of(base, *hypotheses, candidates=candidates))
 
 

@@ -219,6 +219,9 @@ CHILD = """
 import sys, time
 from pathlib import Path
 import numpy as np
+from bayesplate.posterior import checkpoint
+from bayesplate.posterior.convergence import Gate
+from bayesplate.posterior.sampling import SamplerSettings, sample
 
 def log_posterior(theta):
     time.sleep(0.0005)

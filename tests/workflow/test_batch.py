@@ -253,6 +253,7 @@ def test_a_worker_that_dies_takes_no_other_board_with_it():
 
 
 SCRIPT = """
+from bayesplate.workflow.batch_pool import Call, computed, processes
 print([future.result() for _, future in computed(processes(2), [(0, Call(abs, (-1,)))])])
 """
 

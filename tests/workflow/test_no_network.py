@@ -36,6 +36,7 @@ import json, sys
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from killed_runs import quickly
+from bayesplate.cli import main
 quickly()
 ended = {}
 for command, *given in json.loads(sys.argv[1]):
