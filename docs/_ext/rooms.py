@@ -15,9 +15,8 @@ import bayesplate
 
 PACKAGE = Path(bayesplate.__file__).parent
 ROAD = (
-    "cards", "plate", "modes", "effects", "frequencies", "estimates", "posterior", "results", "diagnosis", "campaigns",
-    "planning",
-    "recordings", "report", "workflow",
+    "board", "modes", "effects", "frequencies", "estimates", "posterior", "results", "grading", "diagnosis", "campaigns",
+    "planning", "recordings", "report", "workflow",
 )  # fmt: skip
 """In the order in which a card passes through them; what is not there yet gets no page."""
 
@@ -25,14 +24,14 @@ LONGEST = 300
 """Characters of a table that is still shown as the value of its name."""
 
 SENTENCES = {
-    "cards": "Cards in TOML, read with every fault at once.",
-    "plate": "What lies on the bench: the board, its material, its setups.",
+    "board": "What lies on the bench, in SI units, read from cards with every fault at once and written to them.",
     "modes": "How an ideal plate rings.",
     "effects": "What an ideal plate lacks.",
     "frequencies": "From constants, sizes and effects to frequencies.",
     "estimates": "Least squares, the paper's methods, and what can be identified.",
     "posterior": "Likelihood, sampling and the convergence gate.",
     "results": "Summaries, tables, the archive of draws, references.",
+    "grading": "Many boards: rows, sorting, matching.",
     "diagnosis": "Which effect a residual speaks of.",
     "campaigns": "What several boards share.",
     "planning": "What to measure next.",
@@ -106,8 +105,8 @@ def _page(room: str) -> str:
 
 
 def _base() -> str:
-    title = "errors, quantities, labels"
-    modules = [PACKAGE / f"{name}.py" for name in ("errors", "quantities", "labels")]
+    title = "errors, labels"
+    modules = [PACKAGE / f"{name}.py" for name in ("errors", "labels")]
     return "\n".join([title, "=" * len(title), "", *(_module(path) for path in modules)])
 
 
