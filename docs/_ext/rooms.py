@@ -15,8 +15,8 @@ import bayesplate
 
 PACKAGE = Path(bayesplate.__file__).parent
 ROAD = (
-    "board", "modes", "effects", "frequencies", "estimates", "posterior", "results", "grading", "diagnosis", "campaigns",
-    "planning", "recordings", "report", "workflow",
+    "board", "modes", "effects", "frequencies", "estimates", "posterior", "results", "grading", "diagnosis",
+    "campaigns", "planning", "recordings", "report", "workflow",
 )  # fmt: skip
 """In the order in which a card passes through them; what is not there yet gets no page."""
 
