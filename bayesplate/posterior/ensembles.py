@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.posterior.checkpoint import Snapshot
-from bayesplate.posterior.mixture import FEW_PARAMETERS, Mixture
+from bayesplate.posterior.mixture import Mixture
 from bayesplate.posterior.moves import moves
 from bayesplate.posterior.starts import LogDensity, finite_starts
 from bayesplate.streams import stream
@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 _PILOT_STEPS = 40
 FEWEST_ROUNDS, _MOST_ROUNDS = 3, 60
 _PAIRS_A_ROUND = 8
-"""One that teaches proposals makes a round for each parameter; of more than ten parameters one for so many pairs."""
+"""One that teaches proposals makes a round for so many pairs of parameters."""
 _RISE = 1.0
 """Of the mean log density from one round of the pilot to the next, from which on it is still on its way."""
 
@@ -113,10 +113,6 @@ def walk(log_density: LogDensity, mixture: Mixture, backend: Any, start: Any, n_
     )
     sampler.log_prob_fn = log_density  # emcee's own wrapper prints what it raises
     sampler.run_mcmc(start, n_steps, skip_initial_state_check=True)
-
-
-def _rounds(n_dim: int) -> int:
-    return n_dim if n_dim <= FEW_PARAMETERS else n_dim**2 // _PAIRS_A_ROUND
 
 
 def random_state(rng: np.random.Generator) -> Any:
