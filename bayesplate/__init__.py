@@ -44,9 +44,24 @@ if TYPE_CHECKING:
     from bayesplate.board.quantity import Quantity
     from bayesplate.board.reading import Peak, Reading
     from bayesplate.board.setup import Setup
-    from bayesplate.campaigns.checking import CampaignCheck
-    from bayesplate.campaigns.diagnosis import CampaignDiagnosis
-    from bayesplate.campaigns.summary import CampaignSummary
+    from bayesplate.campaign.checking import CampaignCheck
+    from bayesplate.campaign.diagnosis import CampaignDiagnosis
+    from bayesplate.campaign.summary import CampaignSummary
+    from bayesplate.commands.batch import BatchResult, batch
+    from bayesplate.commands.campaign import Campaign
+    from bayesplate.commands.campaign_diagnose import CampaignDiagnoseResult
+    from bayesplate.commands.campaign_result import CampaignFitResult
+    from bayesplate.commands.check import CheckResult, check
+    from bayesplate.commands.cite import cite
+    from bayesplate.commands.compare import CompareResult, compare
+    from bayesplate.commands.diagnose import DiagnoseResult, diagnose
+    from bayesplate.commands.fit import FitResult, fit
+    from bayesplate.commands.fit_board import FitRequest, fit_board
+    from bayesplate.commands.modes import ModesResult, modes
+    from bayesplate.commands.new import new
+    from bayesplate.commands.pick import PickResult, pick
+    from bayesplate.commands.plan import PlanResult, plan
+    from bayesplate.commands.problem import Problem
     from bayesplate.diagnosis.result import Diagnosis
     from bayesplate.errors import (
         BatchError,
@@ -65,21 +80,6 @@ if TYPE_CHECKING:
     from bayesplate.results.comparison import Comparison
     from bayesplate.results.sheets import ModesReport
     from bayesplate.results.summary import Summary
-    from bayesplate.workflow.batch import BatchResult, batch
-    from bayesplate.workflow.campaign import Campaign
-    from bayesplate.workflow.campaign_diagnose import CampaignDiagnoseResult
-    from bayesplate.workflow.campaign_result import CampaignFitResult
-    from bayesplate.workflow.check import CheckResult, check
-    from bayesplate.workflow.cite import cite
-    from bayesplate.workflow.compare import CompareResult, compare
-    from bayesplate.workflow.diagnose import DiagnoseResult, diagnose
-    from bayesplate.workflow.fit import FitResult, fit
-    from bayesplate.workflow.fit_board import FitRequest, fit_board
-    from bayesplate.workflow.modes import ModesResult, modes
-    from bayesplate.workflow.new import new
-    from bayesplate.workflow.pick import PickResult, pick
-    from bayesplate.workflow.plan import PlanResult, plan
-    from bayesplate.workflow.problem import Problem
 
 __all__ = [
     "AttachedItem",
@@ -139,63 +139,62 @@ __all__ = [
 _HOMES = {
     "AttachedItem": "bayesplate.board.attached",
     "BatchError": "bayesplate.errors",
-    "BatchResult": "bayesplate.workflow.batch",
+    "BatchResult": "bayesplate.commands.batch",
     "BayesplateError": "bayesplate.errors",
     "Board": "bayesplate.board.board",
-    "Campaign": "bayesplate.workflow.campaign",
-    "CampaignCheck": "bayesplate.campaigns.checking",
-    "CampaignDiagnoseResult": "bayesplate.workflow.campaign_diagnose",
-    "CampaignDiagnosis": "bayesplate.campaigns.diagnosis",
-    "CampaignFitResult": "bayesplate.workflow.campaign_result",
-    "CampaignSummary": "bayesplate.campaigns.summary",
+    "Campaign": "bayesplate.commands.campaign",
+    "CampaignCheck": "bayesplate.campaign.checking",
+    "CampaignDiagnoseResult": "bayesplate.commands.campaign_diagnose",
+    "CampaignDiagnosis": "bayesplate.campaign.diagnosis",
+    "CampaignFitResult": "bayesplate.commands.campaign_result",
+    "CampaignSummary": "bayesplate.campaign.summary",
     "CheckReport": "bayesplate.results.checking",
-    "CheckResult": "bayesplate.workflow.check",
+    "CheckResult": "bayesplate.commands.check",
     "CheckpointError": "bayesplate.errors",
-    "CompareResult": "bayesplate.workflow.compare",
+    "CompareResult": "bayesplate.commands.compare",
     "Comparison": "bayesplate.results.comparison",
     "DeclaredFluid": "bayesplate.board.attached",
-    "DiagnoseResult": "bayesplate.workflow.diagnose",
+    "DiagnoseResult": "bayesplate.commands.diagnose",
     "Diagnosis": "bayesplate.diagnosis.result",
     "Fault": "bayesplate.errors",
-    "FitRequest": "bayesplate.workflow.fit_board",
-    "FitResult": "bayesplate.workflow.fit",
+    "FitRequest": "bayesplate.commands.fit_board",
+    "FitResult": "bayesplate.commands.fit",
     "Grading": "bayesplate.grading.matching",
     "GradingRequest": "bayesplate.grading.matching",
     "InputError": "bayesplate.errors",
     "Label": "bayesplate.labels",
     "ModesReport": "bayesplate.results.sheets",
-    "ModesResult": "bayesplate.workflow.modes",
+    "ModesResult": "bayesplate.commands.modes",
     "NotConvergedError": "bayesplate.errors",
     "NotIdentifiableError": "bayesplate.errors",
     "Peak": "bayesplate.board.reading",
     "PickReport": "bayesplate.recordings.contract",
-    "PickResult": "bayesplate.workflow.pick",
+    "PickResult": "bayesplate.commands.pick",
     "Plan": "bayesplate.planning.plan",
-    "PlanResult": "bayesplate.workflow.plan",
+    "PlanResult": "bayesplate.commands.plan",
     "PriorCard": "bayesplate.board.prior",
-    "Problem": "bayesplate.workflow.problem",
+    "Problem": "bayesplate.commands.problem",
     "Quantity": "bayesplate.board.quantity",
     "Reading": "bayesplate.board.reading",
     "Setup": "bayesplate.board.setup",
     "Summary": "bayesplate.results.summary",
-    "batch": "bayesplate.workflow.batch",
-    "check": "bayesplate.workflow.check",
-    "cite": "bayesplate.workflow.cite",
-    "compare": "bayesplate.workflow.compare",
-    "diagnose": "bayesplate.workflow.diagnose",
-    "fit": "bayesplate.workflow.fit",
-    "fit_board": "bayesplate.workflow.fit_board",
-    "new": "bayesplate.workflow.new",
-    "pick": "bayesplate.workflow.pick",
-    "plan": "bayesplate.workflow.plan",
+    "batch": "bayesplate.commands.batch",
+    "check": "bayesplate.commands.check",
+    "cite": "bayesplate.commands.cite",
+    "compare": "bayesplate.commands.compare",
+    "diagnose": "bayesplate.commands.diagnose",
+    "fit": "bayesplate.commands.fit",
+    "fit_board": "bayesplate.commands.fit_board",
+    "modes": "bayesplate.commands.modes",
+    "new": "bayesplate.commands.new",
+    "pick": "bayesplate.commands.pick",
+    "plan": "bayesplate.commands.plan",
 }
-"""Where each name is defined. `modes` is the folder of that name, which can be called: see `bayesplate.modes`."""
+"""Where each name is defined."""
 
 
 def __getattr__(name: str) -> object:
     """Import a public name when it is first used, so that `import bayesplate` costs nothing."""
     if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)
-    if name == "modes":
-        return import_module("bayesplate.modes")
     raise AttributeError(f"module 'bayesplate' has no attribute {name!r}")

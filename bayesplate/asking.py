@@ -18,14 +18,14 @@ SIZES = {
 
 
 def answers(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Arguments of `bayesplate.workflow.new.new` from options that were given."""
+    """Arguments of `bayesplate.commands.new.new` from options that were given."""
     told = {name: value for name, value in options.items() if name not in SIZES}
     return {"frequencies": {}, **told, "sizes": {name: options[name] for name in SIZES if name in options}}
 
 
 def asked_answers(path: str | None) -> dict[str, Any]:
     """The same from questions on the terminal, a name too where there is none; an empty answer leaves a matter open."""
-    from bayesplate.workflow.new import example_labels, require_edges, require_path
+    from bayesplate.commands.new import example_labels, require_edges, require_path
 
     if path is not None:
         require_path(path)  # before anything is asked in vain

@@ -26,7 +26,7 @@ from bayesplate.options import (
 from bayesplate.terminal import print_json, print_shown, progress_line, reporting, say
 
 if TYPE_CHECKING:
-    from bayesplate.workflow.shown import Shown
+    from bayesplate.commands.shown import Shown
 
 
 class Commands(click.Group):
@@ -111,7 +111,7 @@ def command(
                     if has_progress:
                         asked["progress"] = tell
                     if "out" in options and "card" in asked and asked["out"] is None:
-                        from bayesplate.workflow.prepare import default_folder
+                        from bayesplate.commands.prepare import default_folder
 
                         asked["out"] = default_folder(asked["card"])
                     answer = run(**asked)
@@ -133,8 +133,8 @@ def command(
 @command("effects", "setup")
 def check(card: str, **asked: Any) -> Answer:
     """Every fault of CARD, or what a fit of it can identify."""
-    from bayesplate.workflow.check import check as run
-    from bayesplate.workflow.shown import show_check
+    from bayesplate.commands.check import check as run
+    from bayesplate.commands.shown import show_check
 
     report = run(card, **asked)
     return Answer(report, lambda: show_check(report))
@@ -146,8 +146,8 @@ def fit(card: str, **asked: Any) -> Answer:
 
     Writes report.html, summary.json and posterior.nc.
     """
-    from bayesplate.workflow.fit import fit as run
-    from bayesplate.workflow.shown import show_fit
+    from bayesplate.commands.fit import fit as run
+    from bayesplate.commands.shown import show_fit
 
     result = run(card, **asked)
     return Answer(result.summary, lambda: show_fit(result.summary), f"written to {result.folder}")
@@ -156,8 +156,8 @@ def fit(card: str, **asked: Any) -> Answer:
 @command("out", "seed", "effects", "setup", "force")
 def modes(card: str, **asked: Any) -> Answer:
     """Lowest modes of CARD, and a sheet of their Chladni figures."""
-    from bayesplate.workflow.modes import modes as run
-    from bayesplate.workflow.shown import show_modes
+    from bayesplate.commands.modes import modes as run
+    from bayesplate.commands.shown import show_modes
 
     result = run(card, **asked)
     return Answer(result.summary, lambda: show_modes(result.summary))
@@ -169,8 +169,8 @@ def compare(card: str, **asked: Any) -> Answer:
 
     Each as a thin and as a shear-flexible plate.
     """
-    from bayesplate.workflow.compare import compare as run
-    from bayesplate.workflow.shown import show_compare
+    from bayesplate.commands.compare import compare as run
+    from bayesplate.commands.shown import show_compare
 
     result = run(card, **asked)
     return Answer(result, lambda: show_compare(result))
@@ -182,8 +182,8 @@ def diagnose(card: str, **asked: Any) -> Answer:
 
     Adds the effect, and reports the error before and after.
     """
-    from bayesplate.workflow.diagnose import diagnose as run
-    from bayesplate.workflow.shown import show_diagnosis
+    from bayesplate.commands.diagnose import diagnose as run
+    from bayesplate.commands.shown import show_diagnosis
 
     result = run(card, **asked)
     return Answer(result.to_json(), lambda: show_diagnosis(result.diagnosis), f"written to {result.folder}")
@@ -205,8 +205,8 @@ def plan(card: str, **asked: Any) -> Answer:
 
     Ranks measurements by what they are expected to give and what they cost.
     """
-    from bayesplate.workflow.plan import plan as run
-    from bayesplate.workflow.shown import show_plan
+    from bayesplate.commands.plan import plan as run
+    from bayesplate.commands.shown import show_plan
 
     result = run(card, **asked)
     closing = f"written to {asked['out']}: {', '.join(path.name for path in result.files)}"
@@ -235,7 +235,7 @@ def new(path: str | None, **options: Any) -> Answer:
 
     It asks, or takes the options where there are any.
     """
-    from bayesplate.workflow.new import new as run
+    from bayesplate.commands.new import new as run
 
     given = {name: value for name, value in options.items() if value}
     asked = click.get_current_context().params
@@ -285,9 +285,9 @@ def pick(files: tuple[str, ...], **asked: Any) -> Answer:
 
     Writes the [setup] that a card takes, too.
     """
-    from bayesplate.workflow.pick import FRAGMENT, PAGE
-    from bayesplate.workflow.pick import pick as run
-    from bayesplate.workflow.pick_words import show_pick
+    from bayesplate.commands.pick import FRAGMENT, PAGE
+    from bayesplate.commands.pick import pick as run
+    from bayesplate.commands.pick_words import show_pick
 
     out = asked["out"]
     result = run(files, **asked)
@@ -299,8 +299,8 @@ def pick(files: tuple[str, ...], **asked: Any) -> Answer:
 @command("effects")
 def cite(card: str, **asked: Any) -> Answer:
     """References of exactly what a fit of CARD uses."""
-    from bayesplate.workflow.cite import cite as run
-    from bayesplate.workflow.cite import cite_text
+    from bayesplate.commands.cite import cite as run
+    from bayesplate.commands.cite import cite_text
 
     sections = run(card, **asked)
     content = {section.title.lower(): list(section.entries) for section in sections}
@@ -329,10 +329,10 @@ def batch(source: str, *, match: str | None, limit: tuple[str, ...], rigidity: f
 
     One table of all, and a page that grades them. SOURCE is the folder or the table.
     """
-    from bayesplate.workflow.batch import batch as run
-    from bayesplate.workflow.batch import default_batch_folder
-    from bayesplate.workflow.batch_grading import grading_request
-    from bayesplate.workflow.shown import show_batch
+    from bayesplate.commands.batch import batch as run
+    from bayesplate.commands.batch import default_batch_folder
+    from bayesplate.commands.batch_grading import grading_request
+    from bayesplate.commands.shown import show_batch
 
     out = asked.pop("out") or default_batch_folder(source)
     result = run(source, out, grading=grading_request(match, limit, rigidity), **asked)

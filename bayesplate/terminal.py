@@ -17,7 +17,7 @@ import click
 from bayesplate.errors import BayesplateError, Fault, UnwritableError, plain
 
 if TYPE_CHECKING:
-    from bayesplate.workflow.shown import Progress, Shown
+    from bayesplate.commands.shown import Progress, Shown
 
 INTERRUPTED = 130
 INTERNAL = 70
@@ -37,7 +37,7 @@ def print_shown(shown: Shown) -> None:
 
 def print_json(content: Any) -> None:
     """What a command found, for other programs."""
-    from bayesplate.workflow.shown import json_text
+    from bayesplate.commands.shown import json_text
 
     _write(json_text(content))
 
@@ -106,7 +106,7 @@ def progress_line(*, shown: bool) -> Iterator[Callable[[Progress], None] | None]
     with console.status("reading the card and solving the plate") as status:
         # Now, and not when first told: Python gives another exit code to a run that is interrupted while it defines
         # classes of an import by executing text.
-        from bayesplate.workflow.shown import progress_text
+        from bayesplate.commands.shown import progress_text
 
         def tell(progress: Progress) -> None:
             nonlocal stage

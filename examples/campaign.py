@@ -18,8 +18,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import bayesplate
-from bayesplate.campaigns.diagnosis import claim_sentence
-from bayesplate.campaigns.tables import boards_table, common_table, searched_tables, shared_table, taught_table
+from bayesplate.campaign.diagnosis import claim_sentence
+from bayesplate.campaign.tables import boards_table, common_table, searched_tables, shared_table, taught_table
 from bayesplate.results.tables import Table
 
 CAMPAIGN = "spruce-half-tops"

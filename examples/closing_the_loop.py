@@ -21,10 +21,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bayesplate
+from bayesplate.commands.diagnose import diagnose
 from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.diagnosis.words import MERITS
 from bayesplate.effects.words import effect_names
-from bayesplate.workflow.diagnose import diagnose
 
 BOARDS = (
     "paper-cantilever-fe",

@@ -20,9 +20,9 @@ from pathlib import Path
 
 from bayesplate.board.material import MODULI
 from bayesplate.board.shelf import card_names
+from bayesplate.commands.problem import Problem
 from bayesplate.diagnosis.known import known_fits
 from bayesplate.diagnosis.known_words import KnownModel, known_models, known_titles
-from bayesplate.workflow.problem import Problem
 
 COMPUTED = "paper-"
 """Beginning of the names of boards whose frequencies were computed and not measured."""

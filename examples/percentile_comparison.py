@@ -26,19 +26,19 @@ import bayesplate
 from bayesplate.board.board import Board
 from bayesplate.board.material import MODULI, moduli, rigidities
 from bayesplate.board.quantity import Quantity
+from bayesplate.commands.prepare import prepare
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.paper import PaperSystem, paper_system
 from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.estimates.refit import design, refit
 from bayesplate.frequencies.columns import inverse_lambda
 from bayesplate.frequencies.system import system_of
-from bayesplate.modes.naming import find
-from bayesplate.modes.shear import shear_flexible_plate
-from bayesplate.modes.thin import thin_plate
+from bayesplate.plate.naming import find
+from bayesplate.plate.shear import shear_flexible_plate
+from bayesplate.plate.thin import thin_plate
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.target import Posterior
-from bayesplate.workflow.prepare import prepare
 
 BOARDS = ("finnish-spruce-cantilever", "fiemme-spruce-clamped")
 TRUTH = {"E_x": 10.7e9, "E_y": 0.716e9, "G_xy": 0.50e9}

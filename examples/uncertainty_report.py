@@ -28,11 +28,11 @@ import numpy as np
 import bayesplate
 from bayesplate.board.board import Board
 from bayesplate.board.quantity import Quantity
+from bayesplate.commands.prepare import prepare
 from bayesplate.posterior.draws import named_draws
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import pose
 from bayesplate.posterior.sampling import SamplerSettings
-from bayesplate.workflow.prepare import prepare
 
 CARD = "spruce-free-2R"
 UNIFORM: tuple[str, ...] = ()

@@ -17,7 +17,7 @@ def pytest_collection_finish():
     gc.set_threshold(20_000, 20, 50)
 
 
-TOGETHER = ("tests/campaigns",)
+TOGETHER = ("tests/campaign",)
 """Folders whose files share what takes long to make."""
 
 

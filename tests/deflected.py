@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from bayesplate.modes.terms import Deflections, Parity
+from bayesplate.plate.terms import Deflections, Parity
 
 
 def unknowns(side, value, slope):

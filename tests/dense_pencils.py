@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import eigh
 
-from bayesplate.modes.terms import Weights
+from bayesplate.plate.terms import Weights
 
 
 def dense(own, weights):

@@ -16,13 +16,13 @@ from bayesplate.board.attached import AttachedItem
 from bayesplate.board.parameter import Owner, shown_name
 from bayesplate.board.reading import Reading
 from bayesplate.board.setup import Setup
+from bayesplate.commands.prepare import prepare
 from bayesplate.effects import EFFECTS, Effect, declare
 from bayesplate.effects.transverse_shear import TransverseShear
 from bayesplate.frequencies.system import System
-from bayesplate.modes.naming import find
-from bayesplate.modes.solve import Modes, solve
+from bayesplate.plate.naming import find
+from bayesplate.plate.solve import Modes, solve
 from bayesplate.posterior.posing import PosedProblem, pose
-from bayesplate.workflow.prepare import prepare
 
 SETUP = "made"
 MADE = Owner("setup", SETUP)

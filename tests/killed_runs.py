@@ -25,22 +25,22 @@ TRIED = ("transverse_shear", "clamp_rotation")
 
 
 SAMPLING = ("compare", "fitting", "campaign_fit")
-"""Modules of the workflow that sample."""
+"""Modules of the command that sample."""
 
 
 def quickly() -> None:
     """A sampler whose first judgement passes and that saves every chunk, and a search among two candidates."""
+    from bayesplate.commands import diagnose
     from bayesplate.diagnosis.joint import full_search
     from bayesplate.posterior import checkpoint
     from bayesplate.posterior.convergence import Gate
     from bayesplate.posterior.sampling import SamplerSettings
-    from bayesplate.workflow import diagnose
 
     checkpoint.EVERY_SECONDS = checkpoint._LEAST_PAUSE = 0.0
     loose = Gate(rhat_max=10.0, tau_count_min=1.0, ess_min=1.0)
     for name in SAMPLING:
-        workflow = import_module(f"bayesplate.workflow.{name}")
-        workflow.SamplerSettings = partial(SamplerSettings, gate=loose)  # type: ignore[attr-defined]
+        command = import_module(f"bayesplate.commands.{name}")
+        command.SamplerSettings = partial(SamplerSettings, gate=loose)  # type: ignore[attr-defined]
     diagnose.full_search = partial(full_search, tried=TRIED)  # type: ignore[assignment]
 
 

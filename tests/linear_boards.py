@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.campaigns.pulls import Pull
-from bayesplate.campaigns.shared import Shared
-from bayesplate.campaigns.together import Together
+from bayesplate.campaign.pulls import Pull
+from bayesplate.campaign.shared import Shared
+from bayesplate.campaign.together import Together
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from bayesplate.board.board import Board
+from bayesplate.commands.fit import fit
+from bayesplate.commands.prepare import prepare
 from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws
@@ -16,8 +18,6 @@ from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.report.page import fit_page, write_report
 from bayesplate.results.summary import Summary
-from bayesplate.workflow.fit import fit
-from bayesplate.workflow.prepare import prepare
 
 LOOSE_GATE = Gate(rhat_max=10.0, tau_count_min=1.0, ess_min=1.0)
 """Passes at its first judgement: these are tests of a page, not of constants."""
@@ -48,6 +48,6 @@ class Fit:
 def fitted(card: str) -> Fit:
     """Fit a board as far as the loose gate lets it, in memory."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("bayesplate.workflow.fitting.SamplerSettings", partial(SamplerSettings, gate=LOOSE_GATE))
+        patched.setattr("bayesplate.commands.fitting.SamplerSettings", partial(SamplerSettings, gate=LOOSE_GATE))
         result = fit(card)
     return Fit(prepare(card).card, result.inference, result.draws, result.summary)

@@ -25,7 +25,7 @@ from bayesplate.diagnosis.signatures import signature
 from bayesplate.diagnosis.verdict import Verdict, decide
 from bayesplate.frequencies.laws import cents
 from bayesplate.labels import Label
-from bayesplate.modes.naming import Place
+from bayesplate.plate.naming import Place
 
 FREE = {"x0": "free", "x1": "free", "y0": "free", "y1": "free"}
 NOISE = 0.005

@@ -248,7 +248,7 @@ def test_an_internal_error_is_one_line_without_debug(monkeypatch):
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("of a test")
 
-    monkeypatch.setattr("bayesplate.workflow.problem.prepare", broken)
+    monkeypatch.setattr("bayesplate.commands.problem.prepare", broken)
     plain, debug = invoke("fit", "fiemme-spruce-clamped"), invoke("fit", "fiemme-spruce-clamped", "--debug", "--json")
 
     assert plain.exit_code == debug.exit_code == 70

@@ -39,23 +39,6 @@ def test_the_public_names_are_those_that_can_be_imported():
             assert (item.__name__, item.__module__) == (name, bayesplate._HOMES[name])
 
 
-AS_FOLDER_AND_COMMAND = """
-import bayesplate
-{first}
-import inspect
-from bayesplate.modes.plate import plate_of
-from bayesplate.workflow.modes import modes
-assert inspect.signature(bayesplate.modes) == inspect.signature(modes)
-assert bayesplate.modes.plate.plate_of is plate_of
-assert repr(bayesplate.modes("fiemme-spruce-clamped")).startswith("<ModesResult of fiemme-spruce-clamped: clamped: 12")
-"""
-
-
-@pytest.mark.parametrize("first", ["", "bayesplate.modes", "import bayesplate.modes.plate", "import bayesplate.modes"])
-def test_modes_is_the_folder_and_the_command_whatever_is_imported_first(first):
-    roots_after(AS_FOLDER_AND_COMMAND.format(first=first))
-
-
 def test_a_name_that_is_not_public_is_refused():
     with pytest.raises(AttributeError, match="module 'bayesplate' has no attribute 'fitt'"):
         _ = bayesplate.fitt

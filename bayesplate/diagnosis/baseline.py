@@ -27,7 +27,7 @@ from bayesplate.frequencies.model import SetupModel
 from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.reading_errors import ReadingErrors
-from bayesplate.modes.naming import Place
+from bayesplate.plate.naming import Place
 from bayesplate.posterior.laplace import every_predictor
 from bayesplate.posterior.posing import PosedProblem
 

@@ -22,9 +22,9 @@ from bayesplate.diagnosis.forms import Form
 from bayesplate.frequencies.laws import ExactLaw
 from bayesplate.frequencies.model import OtherMode, SetupModel, setup_model
 from bayesplate.frequencies.system import system_of
-from bayesplate.modes.naming import Place
-from bayesplate.modes.reduced import ReducedClass, ReducedOrderModel
-from bayesplate.modes.terms import Parity, Weights
+from bayesplate.plate.naming import Place
+from bayesplate.plate.reduced import ReducedClass, ReducedOrderModel
+from bayesplate.plate.terms import Parity, Weights
 from bayesplate.posterior.laplace import exact_models
 from bayesplate.posterior.parameters import Parameters
 

@@ -28,7 +28,7 @@ from bayesplate.effects.attached_items import (
     rotary_inertia,
 )
 from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, Mass, Scope
-from bayesplate.modes.terms import Amount, AtPlaces
+from bayesplate.plate.terms import Amount, AtPlaces
 
 HEAVIEST_ROVING = 0.02
 """Share of the board's mass up to which a roving item is computed; see `AttachedMass`."""

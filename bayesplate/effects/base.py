@@ -22,8 +22,8 @@ from bayesplate.board.board import Board, Values
 from bayesplate.board.parameter import BOARD, Owner, Parameter, shown_name
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
-from bayesplate.modes.fields import EdgeStrip, Field, Group, Outline
-from bayesplate.modes.terms import Term, Weights
+from bayesplate.plate.fields import EdgeStrip, Field, Group, Outline
+from bayesplate.plate.terms import Term, Weights
 
 Scope = Literal["board", "setup"]
 Theory = Literal["thin", "shear-flexible"]

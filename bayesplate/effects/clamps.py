@@ -11,7 +11,7 @@ import numpy as np
 from bayesplate.board.board import Board, Values, density, vibrating_lengths
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Contribution, Effect, Floats, Scope, Stiffness
-from bayesplate.modes.terms import AlongEdges
+from bayesplate.plate.terms import AlongEdges
 
 ClampedEnds = tuple[tuple[bool, bool], tuple[bool, bool]]
 """Whether x0 and x1, y0 and y1 are clamped."""

@@ -10,7 +10,7 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.effects.base import Variation
 from bayesplate.effects.gradients import GradientAlongX
 from bayesplate.effects.part import growing_along_x
-from bayesplate.modes.fields import Group
+from bayesplate.plate.fields import Group
 
 
 @dataclass(frozen=True)

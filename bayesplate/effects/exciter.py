@@ -25,7 +25,7 @@ from bayesplate.effects.drives import (
     range_of,
     with_known_coil,
 )
-from bayesplate.modes.terms import Amount, AtPlaces
+from bayesplate.plate.terms import Amount, AtPlaces
 
 _ANYWHERE = "nearly uniform over the board, mirror places once"
 _LEAST_MAGNET = 0.05

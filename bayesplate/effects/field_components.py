@@ -22,7 +22,7 @@ from bayesplate.board.setup import Ends
 from bayesplate.effects.base import Effect
 from bayesplate.effects.field_looks import look
 from bayesplate.effects.part import Part, vibrating_part
-from bayesplate.modes.beams import beam_functions
+from bayesplate.plate.beams import beam_functions
 
 Floats = NDArray[np.float64]
 

@@ -13,9 +13,9 @@ from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Contribution, Effect, Floats, Mass, Scope
-from bayesplate.modes.air import air_mass
-from bayesplate.modes.fields import Outline
-from bayesplate.modes.terms import OnDeflections
+from bayesplate.plate.air import air_mass
+from bayesplate.plate.fields import Outline
+from bayesplate.plate.terms import OnDeflections
 
 DEFAULT_DENSITY = Quantity.exact(1.2)
 UNKNOWN_BAFFLE = Quantity.from_mean(0.5, 1.0, "normal", lower=0.0, upper=1.0)

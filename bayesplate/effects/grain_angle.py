@@ -13,8 +13,8 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.effects.attached_mass import AttachedMass
 from bayesplate.effects.base import Effect, Scope
-from bayesplate.modes.terms import Weights
-from bayesplate.modes.thin import THIN_TERMS
+from bayesplate.plate.terms import Weights
+from bayesplate.plate.thin import THIN_TERMS
 
 DEGREE = np.pi / 180.0
 DEFAULT_ANGLE = Quantity.from_mean(0.0, 3.0 * DEGREE, "normal", lower=0.0, upper=6.0 * DEGREE)

@@ -11,8 +11,8 @@ from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Ends, Setup
 from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, Scope, Stiffness
-from bayesplate.modes.fields import Outline
-from bayesplate.modes.terms import OverPlate
+from bayesplate.plate.fields import Outline
+from bayesplate.plate.terms import OverPlate
 
 Axis = Literal["both", "x", "y"]
 

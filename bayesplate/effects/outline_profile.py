@@ -16,7 +16,7 @@ from bayesplate.board.setup import Ends, Setup
 from bayesplate.effects.base import Effect, Floats, Scope, Variation
 from bayesplate.effects.field_components import FieldProfile, field_parameters, field_profile, held_in
 from bayesplate.effects.part import WHOLE, Part, vibrating_part
-from bayesplate.modes.fields import EdgeStrip, Group, Outline
+from bayesplate.plate.fields import EdgeStrip, Group, Outline
 
 _SOURCE = "normal: what the readings leave open of a smooth width, in standard deviations"
 _GROUPS: tuple[Group, ...] = ("bending", "shear", "mass", "rotary")

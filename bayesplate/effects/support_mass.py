@@ -13,8 +13,8 @@ from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Contribution, Effect, Floats, Mass, Scope
-from bayesplate.modes.fields import Outline
-from bayesplate.modes.terms import Deflections, OnDeflections
+from bayesplate.plate.fields import Outline
+from bayesplate.plate.terms import Deflections, OnDeflections
 
 _PRIOR = Quantity.from_median(8.0, 3.0)
 _SOURCE = "log-normal: frames of wood or steel for boards of this size weigh 3-25 kg"

@@ -12,8 +12,8 @@ from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Contribution, Effect, Floats, Scope, Stiffness
-from bayesplate.modes.fields import Outline
-from bayesplate.modes.terms import OverPlate
+from bayesplate.plate.fields import Outline
+from bayesplate.plate.terms import OverPlate
 
 _PRIOR = Quantity.from_mean(0.0, 2e4, "normal", lower=0.0)
 _SOURCE = "half-normal: a board of 1-2 kg/m2 bounces at 5 Hz on soft bands (2e3 N/m3), at 15-25 Hz on foam (2e4)"

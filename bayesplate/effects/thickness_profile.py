@@ -19,7 +19,7 @@ from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Effect, Floats, Scope, Variation
 from bayesplate.effects.field_components import FieldProfile, coordinates, field_parameters, field_profile, held_in
 from bayesplate.effects.part import WHOLE, Part, vibrating_part
-from bayesplate.modes.fields import Field, Group
+from bayesplate.plate.fields import Field, Group
 
 DEFAULT_TAPER = Quantity.from_mean(0.0, 0.05, "normal")
 _SOURCE = "normal: hand-planed and belt-sanded boards of 3-5 mm differ by 0.1-0.2 mm from end to end, either way"

@@ -14,9 +14,9 @@ from bayesplate.board.parameter import BOARD, Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, Scope, Stiffness
-from bayesplate.modes.fields import Field
-from bayesplate.modes.membrane import MODULI, Curvature, curvature_pairs, membrane_terms
-from bayesplate.modes.terms import OnDeflections, Term
+from bayesplate.plate.fields import Field
+from bayesplate.plate.membrane import MODULI, Curvature, curvature_pairs, membrane_terms
+from bayesplate.plate.terms import OnDeflections, Term
 
 RISES: tuple[Curvature, ...] = ("cup", "bow", "twist")
 """The rises that a maker reads: across the width, along the length, of the fourth corner."""
@@ -37,7 +37,7 @@ class Warp(Effect):
 
     Cup, the rise across the width, makes k_y = 8 cup / L_y^2; bow, the rise along the length, k_x = 8 bow / L_x^2;
     twist, the lift of the fourth corner off a table, k_xy = twist / (L_x L_y), the sides of the whole board. All of a
-    plate's membrane is in `bayesplate.modes.membrane`: the in-plane fields are those of the moduli where the plate is
+    plate's membrane is in `bayesplate.plate.membrane`: the in-plane fields are those of the moduli where the plate is
     solved. Edges that are clamped hold the board in its plane, others do not; inertia in the plane is left out, so is
     an angle of the grain there.
 

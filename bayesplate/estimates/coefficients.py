@@ -20,9 +20,9 @@ from bayesplate.frequencies.columns import columns
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.frequencies.terms import shear_moduli
 from bayesplate.labels import Label
-from bayesplate.modes.beams import Beams
-from bayesplate.modes.naming import find
-from bayesplate.modes.training import FACTORS, Theory, TrainingConstants, train, training_matrices, training_weights
+from bayesplate.plate.beams import Beams
+from bayesplate.plate.naming import find
+from bayesplate.plate.training import FACTORS, Theory, TrainingConstants, train, training_matrices, training_weights
 
 CoefficientSource = Literal["sensitivity", "training", "published"]
 SAME_ASPECT = 0.01

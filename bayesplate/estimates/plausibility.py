@@ -18,7 +18,7 @@ from bayesplate.estimates.least_squares import log_measured, starting_rigidities
 from bayesplate.frequencies.prior_bands import prior_draws, with_rigidities
 from bayesplate.frequencies.terms import rayleigh_coefficients, term_weights
 from bayesplate.labels import Label
-from bayesplate.modes.beams import N_BEAMS
+from bayesplate.plate.beams import N_BEAMS
 
 Floats = NDArray[np.float64]
 

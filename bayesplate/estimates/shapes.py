@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from bayesplate.board.board import Values
 from bayesplate.estimates.sheet import points, sampled
 from bayesplate.frequencies.model import SetupModel
-from bayesplate.modes.solve import collect, solve_classes
-from bayesplate.modes.terms import Parity
+from bayesplate.plate.solve import collect, solve_classes
+from bayesplate.plate.terms import Parity
 
 N_POINTS = 61
 """Along each side: half a sheet's, for panels of half its size."""

@@ -15,7 +15,7 @@ from bayesplate.frequencies.columns import columns
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.spectrum import NamedMode, spectrum
 from bayesplate.frequencies.system import Limits, System
-from bayesplate.modes.solve import Modes
+from bayesplate.plate.solve import Modes
 
 NUMBERS_OF_MODES = (12, 16, 20)
 """The first that holds every measured label; beyond the last the highest are not shown."""

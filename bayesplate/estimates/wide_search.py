@@ -32,10 +32,10 @@ from bayesplate.frequencies.model import OtherMode, SetupModel, setup_model
 from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.frequencies.prior_bands import prior_draws
 from bayesplate.frequencies.system import System, system_of
-from bayesplate.modes.naming import Place
-from bayesplate.modes.reduced import ReducedOrderModel
-from bayesplate.modes.reduction import reduced_order_model
-from bayesplate.modes.terms import Parity
+from bayesplate.plate.naming import Place
+from bayesplate.plate.reduced import ReducedOrderModel
+from bayesplate.plate.reduction import reduced_order_model
+from bayesplate.plate.terms import Parity
 
 if TYPE_CHECKING:
     from scipy.interpolate import RegularGridInterpolator

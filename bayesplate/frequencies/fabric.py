@@ -14,10 +14,10 @@ from bayesplate.board.board import Values
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Effect, Theory, Variation
 from bayesplate.frequencies.terms import along_grain
-from bayesplate.modes.fields import EdgeStrip, Fabric, Field, Group, layout
-from bayesplate.modes.shear import SHEAR_FLEXIBLE
-from bayesplate.modes.terms import Weights
-from bayesplate.modes.thin import THIN
+from bayesplate.plate.fields import EdgeStrip, Fabric, Field, Group, layout
+from bayesplate.plate.shear import SHEAR_FLEXIBLE
+from bayesplate.plate.terms import Weights
+from bayesplate.plate.thin import THIN
 
 Floats = NDArray[np.float64]
 
@@ -99,7 +99,7 @@ def over_fields(base: Weights, effects: Sequence[Effect], theory: Theory, values
     Returns
     -------
     Weights
-        In the order of `bayesplate.modes.fields.layout`.
+        In the order of `bayesplate.plate.fields.layout`.
     """
     varying = _joined(tuple(effects))
     whole = _reweighed(base, effects, values, setup)

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from bayesplate.board.board import Values
 from bayesplate.frequencies.laws import log_frequency, mean_log_frequency
 from bayesplate.frequencies.model import SetupModel
-from bayesplate.modes.solve import solve_classes
-from bayesplate.modes.terms import Parity
+from bayesplate.plate.solve import solve_classes
+from bayesplate.plate.terms import Parity
 
 
 def full_log_frequencies(model: SetupModel, values: Values) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ from bayesplate.board.reading import NO_OFFSET
 from bayesplate.board.setup import Ends, Setup
 from bayesplate.errors import Fault
 from bayesplate.labels import HIGHEST_ORDER, Label
-from bayesplate.modes.beams import is_rigid
+from bayesplate.plate.beams import is_rigid
 
 
 def label_faults(board: Board) -> list[Fault]:

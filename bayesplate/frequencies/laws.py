@@ -9,8 +9,8 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.reduced import ReducedOrderModel
-from bayesplate.modes.terms import Weights
+from bayesplate.plate.reduced import ReducedOrderModel
+from bayesplate.plate.terms import Weights
 
 LawName = Literal["linear", "exact"]
 

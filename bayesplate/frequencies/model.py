@@ -16,12 +16,12 @@ from bayesplate.frequencies.laws import ExactLaw, Law, LawName, LinearLaw, log_f
 from bayesplate.frequencies.residues import residues_of
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
-from bayesplate.modes.beams import Beams
-from bayesplate.modes.naming import CERTAIN, Place, find, name_modes
-from bayesplate.modes.plate import Plate
-from bayesplate.modes.reduction import reduced_order_model
-from bayesplate.modes.solve import Modes, solve_classes, solve_up_to
-from bayesplate.modes.terms import Parity
+from bayesplate.plate.beams import Beams
+from bayesplate.plate.naming import CERTAIN, Place, find, name_modes
+from bayesplate.plate.plate import Plate
+from bayesplate.plate.reduction import reduced_order_model
+from bayesplate.plate.solve import Modes, solve_classes, solve_up_to
+from bayesplate.plate.terms import Parity
 
 _ABOVE = 1.15
 """Frequency up to which modes are looked for, over the highest peak: what lies higher will not come down to it."""

@@ -13,7 +13,7 @@ from bayesplate.board.prior import PriorCard
 from bayesplate.board.setup import Setup
 from bayesplate.frequencies.terms import rayleigh_coefficients, term_weights
 from bayesplate.labels import Label
-from bayesplate.modes.beams import N_BEAMS
+from bayesplate.plate.beams import N_BEAMS
 
 WITHIN = (1 / 6, 5 / 6)
 """Two times in three."""

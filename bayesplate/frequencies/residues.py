@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bayesplate.board.board import Values, vibrating_lengths
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Effect
-from bayesplate.modes.solve import Modes
+from bayesplate.plate.solve import Modes
 
 NODAL_LINE = 0.05
 """Residue over the largest that a shape could give, below which a place counts as lying on a nodal line.

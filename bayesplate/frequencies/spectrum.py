@@ -14,9 +14,9 @@ from bayesplate.frequencies.model import SetupModel
 from bayesplate.frequencies.residues import NODAL_LINE, residues_of
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
-from bayesplate.modes.naming import CERTAIN, name_modes
-from bayesplate.modes.plate import Plate
-from bayesplate.modes.solve import Modes, solve
+from bayesplate.plate.naming import CERTAIN, name_modes
+from bayesplate.plate.plate import Plate
+from bayesplate.plate.solve import Modes, solve
 
 _FEWEST_MODES = 12
 

@@ -15,12 +15,12 @@ from bayesplate.effects import effects_of
 from bayesplate.effects.base import Contribution, Effect, Mass, Stiffness, Theory
 from bayesplate.frequencies.fabric import fabric_of, in_plane, over_fields
 from bayesplate.frequencies.terms import shear_term_weights, term_weights
-from bayesplate.modes.line import N_POINTS, N_POINTS_CUT, Hold, Holds, Line, line
-from bayesplate.modes.mesh import ELEMENTS_PER_SIDE, mesh
-from bayesplate.modes.plate import Plate, plate_of
-from bayesplate.modes.shear import SHEAR_ELEMENTS_PER_SIDE, SHEAR_FLEXIBLE
-from bayesplate.modes.terms import Weights
-from bayesplate.modes.thin import THIN
+from bayesplate.plate.line import N_POINTS, N_POINTS_CUT, Hold, Holds, Line, line
+from bayesplate.plate.mesh import ELEMENTS_PER_SIDE, mesh
+from bayesplate.plate.plate import Plate, plate_of
+from bayesplate.plate.shear import SHEAR_ELEMENTS_PER_SIDE, SHEAR_FLEXIBLE
+from bayesplate.plate.terms import Weights
+from bayesplate.plate.thin import THIN
 
 Limits = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Where a plate begins and ends along y at some points of its length, (n,) arrays, as fractions of its widest width."""

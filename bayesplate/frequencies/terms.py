@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from bayesplate.board.board import Values, density, vibrating_lengths
 from bayesplate.board.setup import Setup
-from bayesplate.modes.beams import product_coefficients
-from bayesplate.modes.shear import SHEAR_CORRECTION
-from bayesplate.modes.terms import Weights
+from bayesplate.plate.beams import product_coefficients
+from bayesplate.plate.shear import SHEAR_CORRECTION
+from bayesplate.plate.terms import Weights
 
 
 def term_weights(values: Values, setup: Setup) -> Weights:
@@ -24,7 +24,7 @@ def term_weights(values: Values, setup: Setup) -> Weights:
     Returns
     -------
     Weights
-        (n_draws, 4) stiffness weights in the order of `bayesplate.modes.thin.THIN_TERMS`, and 1 for the mass.
+        (n_draws, 4) stiffness weights in the order of `bayesplate.plate.thin.THIN_TERMS`, and 1 for the mass.
 
     References
     ----------
@@ -65,7 +65,7 @@ def shear_term_weights(values: Values, setup: Setup) -> Weights:
     Returns
     -------
     Weights
-        (n_draws, 6) stiffness weights in the order of `bayesplate.modes.shear.SHEAR_TERMS`, and (n_draws, 3) mass
+        (n_draws, 6) stiffness weights in the order of `bayesplate.plate.shear.SHEAR_TERMS`, and (n_draws, 3) mass
         weights in that of `SHEAR_MASSES`.
 
     References

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from bayesplate.board.prior import PriorCard
-from bayesplate.campaigns.shared import Shared
+from bayesplate.campaign.shared import Shared
 from bayesplate.planning.beliefs import Beliefs
 from bayesplate.planning.bench import Bench, benches
 from bayesplate.planning.plan import FORMAT, ExplanationEntry, Plan

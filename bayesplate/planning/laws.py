@@ -16,8 +16,8 @@ from bayesplate.estimates.refit import sensitivities
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.spectrum import spectrum
-from bayesplate.modes.solve import Modes
 from bayesplate.planning.stations import SEARCHED, Station
+from bayesplate.plate.solve import Modes
 from bayesplate.posterior.parameters import Parameters
 
 Floats = NDArray[np.float64]

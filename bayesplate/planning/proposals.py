@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 
 from bayesplate.board.prior import PriorCard
-from bayesplate.campaigns.shared import Shared
+from bayesplate.campaign.shared import Shared
 from bayesplate.planning.beliefs import Beliefs, KnownBoard
 from bayesplate.planning.gains import N_DRAWS, Readings, expected_gain, together
 from bayesplate.planning.laws import known_mass

@@ -13,9 +13,9 @@ from bayesplate.board.attached import AttachedItem
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.board.prior import PriorCard
-from bayesplate.campaigns.given import GivenShared
-from bayesplate.campaigns.scatter import expected_width
-from bayesplate.campaigns.shared import Shared
+from bayesplate.campaign.given import GivenShared
+from bayesplate.campaign.scatter import expected_width
+from bayesplate.campaign.shared import Shared
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.planning.beliefs import NOTHING_LACKS, Beliefs, Explanation, KnownBoard, laws_of, log_moduli

@@ -23,8 +23,8 @@ from bayesplate.board.board import Board, Values
 from bayesplate.board.setup import Setup
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.labels import Label
-from bayesplate.modes.beams import Beams
-from bayesplate.modes.naming import CERTAIN
+from bayesplate.plate.beams import Beams
+from bayesplate.plate.naming import CERTAIN
 
 _CONTRADICTED = 0.95
 """Share of a fit's plates on which a label's mode certainly has another name, from which on it contradicts that."""

@@ -10,10 +10,10 @@ import numpy as np
 
 from bayesplate.board.material import MODULI
 from bayesplate.board.parameter import unit_of_people
-from bayesplate.campaigns.common import CommonResidual, clear_of_zero
-from bayesplate.campaigns.diagnosis import CampaignDiagnosis, claim_sentence
-from bayesplate.campaigns.summary import CampaignSummary
-from bayesplate.campaigns.tables import (
+from bayesplate.campaign.common import CommonResidual, clear_of_zero
+from bayesplate.campaign.diagnosis import CampaignDiagnosis, claim_sentence
+from bayesplate.campaign.summary import CampaignSummary
+from bayesplate.campaign.tables import (
     boards_table,
     common_table,
     population_table,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bayesplate.board.material import MODULI
-from bayesplate.campaigns.diagnosis import CampaignDiagnosis
-from bayesplate.campaigns.summary import CampaignSummary
+from bayesplate.campaign.diagnosis import CampaignDiagnosis
+from bayesplate.campaign.summary import CampaignSummary
 from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.sheet import Sheet

@@ -13,9 +13,9 @@ import numpy as np
 
 from bayesplate.board.board import Board
 from bayesplate.board.material import rigidities
+from bayesplate.commands.prepare import prepare
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import system_of
-from bayesplate.workflow.prepare import prepare
 
 E_X, E_Y, G_XY = 10.7e9, 0.716e9, 0.50e9
 """The paper's simulation inputs, Pa."""

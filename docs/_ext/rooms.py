@@ -15,8 +15,8 @@ import bayesplate
 
 PACKAGE = Path(bayesplate.__file__).parent
 ROAD = (
-    "board", "modes", "effects", "frequencies", "estimates", "posterior", "results", "grading", "diagnosis",
-    "campaigns", "planning", "recordings", "report", "workflow",
+    "board", "plate", "effects", "frequencies", "estimates", "posterior", "results", "grading", "diagnosis",
+    "campaign", "planning", "recordings", "report", "commands",
 )  # fmt: skip
 """In the order in which a card passes through them; what is not there yet gets no page."""
 
@@ -25,7 +25,7 @@ LONGEST = 300
 
 SENTENCES = {
     "board": "What lies on the bench, in SI units, read from cards with every fault at once and written to them.",
-    "modes": "How an ideal plate rings.",
+    "plate": "How an ideal plate rings.",
     "effects": "What an ideal plate lacks.",
     "frequencies": "From constants, sizes and effects to frequencies.",
     "estimates": "Least squares, the paper's methods, and what can be identified.",
@@ -33,11 +33,11 @@ SENTENCES = {
     "results": "Summaries, tables, the archive of draws, references.",
     "grading": "Many boards: rows, sorting, matching.",
     "diagnosis": "Which effect a residual speaks of.",
-    "campaigns": "What several boards share.",
+    "campaign": "What several boards share.",
     "planning": "What to measure next.",
     "recordings": "Recordings to frequencies.",
     "report": "Figures and the page of a report.",
-    "workflow": "One file a command, from the card to the files.",
+    "commands": "One file a command, from the card to the files.",
 }
 
 
@@ -77,8 +77,7 @@ class PublicNames(SphinxDirective):
 def _entry(name: str, item: object) -> list[str]:
     """The directive of a name; of a class with what belongs to it."""
     if not isinstance(item, type):
-        # a folder that can be called is documented as the command it hands the call to
-        return [f".. autofunction:: bayesplate.{'workflow.modes.modes' if name == 'modes' else name}", "   :no-index:"]
+        return [f".. autofunction:: bayesplate.{name}", "   :no-index:"]
     if issubclass(item, Exception):
         return [f".. autoexception:: bayesplate.{name}"]
     return [f".. autoclass:: bayesplate.{name}", "   :members:", "   :inherited-members: BaseModel"]

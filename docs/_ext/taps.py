@@ -15,10 +15,10 @@ from PIL import Image
 from scipy.io import wavfile
 
 from bayesplate.board.material import rigidities
+from bayesplate.commands.prepare import prepare
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
-from bayesplate.modes.solve import Modes
-from bayesplate.workflow.prepare import prepare
+from bayesplate.plate.solve import Modes
 
 Floats = NDArray[np.float64]
 

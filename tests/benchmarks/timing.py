@@ -19,21 +19,21 @@ from numpy.typing import NDArray
 from bayesplate.board.board import Board
 from bayesplate.board.named import load_named
 from bayesplate.board.setup import Ends
+from bayesplate.commands.prepare import prepare, prepared_card
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.joint import full_search
 from bayesplate.frequencies.laws import LawName
 from bayesplate.frequencies.terms import term_weights
 from bayesplate.libraries import load_arviz
-from bayesplate.modes import line
-from bayesplate.modes.mesh import mesh
-from bayesplate.modes.solve import solve, solve_classes
-from bayesplate.modes.terms import Weights
-from bayesplate.modes.thin import thin_plate
+from bayesplate.plate import line
+from bayesplate.plate.mesh import mesh
+from bayesplate.plate.solve import solve, solve_classes
+from bayesplate.plate.terms import Weights
+from bayesplate.plate.thin import thin_plate
 from bayesplate.posterior.convergence import autocorrelation_times, burn_in_steps
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.sampling import SamplerSettings
-from bayesplate.workflow.prepare import prepare, prepared_card
 
 N_MODES = 12
 PLAIN_WALKERS, PLAIN_STEPS = 32, 3000
@@ -212,8 +212,8 @@ def command(*arguments: str, repeats: int = 1) -> float:
 
 _AFTER_SAMPLING = """
 import sys, time
-from bayesplate.workflow import fitting
-from bayesplate.workflow.fit import fit
+from bayesplate.commands import fitting
+from bayesplate.commands.fit import fit
 
 infer = fitting.infer
 

@@ -10,7 +10,7 @@ import pytest
 import bayesplate
 from bayesplate.board.prior import load_prior
 from bayesplate.board.setup import CLAMPED_NOISE, DEFAULT_NOISE
-from bayesplate.workflow.prepare import prepare
+from bayesplate.commands.prepare import prepare
 
 Q = bayesplate.Quantity
 FREQUENCIES = {"(1,1)": 134.0, (2, 0): [241, 242], (0, 2): np.array([312.0, 311.0]), "(2,1)": Q.from_mean(363, 1.0)}

@@ -18,8 +18,8 @@ from bayesplate.board.fragment import merged
 from bayesplate.board.shelf import shelf_folder
 from bayesplate.board.toml import read_table
 from bayesplate.board.writing import toml_text, write_card
+from bayesplate.commands.batch_boards import boards_of
 from bayesplate.errors import InputError
-from bayesplate.workflow.batch_boards import boards_of
 
 BOARD = "finnish-spruce-cantilever"
 CARD = (shelf_folder("boards") / f"{BOARD}.toml").read_text(encoding="utf-8")

@@ -9,7 +9,7 @@ import bayesplate
 from bayesplate.board.board import Board
 from bayesplate.board.prior import load_prior, read_prior_text
 from bayesplate.board.quantity import Quantity
-from bayesplate.campaigns.population import require_moduli
+from bayesplate.campaign.population import require_moduli
 from bayesplate.errors import InputError
 
 HZ = {(2, 0): 144.5, (1, 1): 159.8, (2, 1): 358.1}

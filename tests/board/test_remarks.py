@@ -8,7 +8,7 @@ import pytest
 
 from bayesplate.board.board import Board
 from bayesplate.board.checks import remarks
-from bayesplate.workflow.prepare import prepare
+from bayesplate.commands.prepare import prepare
 
 Spoil = Callable[..., str]
 THICKNESS = "{ mean = 3.0, sd = 0.03 }"

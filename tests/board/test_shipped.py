@@ -18,8 +18,8 @@ from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup_keys import edge_letters
 from bayesplate.board.shelf import card_names, shelf_folder
+from bayesplate.commands.prepare import prepare
 from bayesplate.labels import Label
-from bayesplate.workflow.prepare import prepare
 
 FREE = tuple(f"spruce-free-{number}{side}" for number in (1, 2, 3, 4, 5) for side in "LR")
 PANELS = ("steel-air-water", "foam-panel-exciter", "acrylic-panel")

@@ -13,10 +13,10 @@ from bayesplate.board.campaign import load_campaign
 from bayesplate.board.checks import physical_faults, remarks
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.words import EFFECT_NAMES
+from bayesplate.commands.prepare import prepare
 from bayesplate.diagnosis.forms import forms
 from bayesplate.effects import implied_effects
 from bayesplate.errors import InputError
-from bayesplate.workflow.prepare import prepare
 
 FLUID = '[setup.fluid]\ndensity_kg_m3 = 1.2\nbaffle = "none"\n'
 PLATE, ITEM = "mass_g = 41.0", 'kind = "accelerometer"\nmass_g = { mean = 0.6, sd = 0.1 }\nat_mm = [200, 20]'

@@ -14,9 +14,9 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Peak, Reading
 from bayesplate.board.setup import Setup
 from bayesplate.board.shelf import card_names
+from bayesplate.commands.prepare import prepare
 from bayesplate.errors import InputError
 from bayesplate.labels import Label
-from bayesplate.workflow.prepare import prepare
 
 
 def numbers(thing):

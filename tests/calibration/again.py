@@ -27,13 +27,13 @@ from numpy.typing import NDArray
 
 from bayesplate.board.material import RIGIDITIES, moduli
 from bayesplate.board.quantity import Quantity
+from bayesplate.commands.problem import Problem
 from bayesplate.errors import BayesplateError
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.posterior.target import Posterior
-from bayesplate.workflow.problem import Problem
 
 BOARDS = ("finnish-spruce-cantilever", "fiemme-spruce-clamped")
 N_SIMULATIONS = 500

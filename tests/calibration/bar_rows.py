@@ -104,9 +104,9 @@ COMPUTATION = (
         "no file differs",
         tests=(
             "posterior/test_sampling.py::test_the_same_seed",
-            "workflow/test_resume.py::test_the_same_seed",
-            "workflow/test_batch.py::test_the_same_bytes",
-            "workflow/test_diagnose.py::test_the_same_seed",
+            "commands/test_resume.py::test_the_same_seed",
+            "commands/test_batch.py::test_the_same_bytes",
+            "commands/test_diagnose.py::test_the_same_seed",
         ),
     ),
 )
@@ -144,7 +144,7 @@ CONVERGENCE = (
         "A run that has not converged",
         "no posterior, exit code 5",
         tests=(
-            "workflow/test_resume.py::test_a_run_that_does_not_converge",
+            "commands/test_resume.py::test_a_run_that_does_not_converge",
             "posterior/test_sampling.py::test_separate_peaks",
             "posterior/test_sampling.py::test_too_few_steps",
         ),
@@ -167,8 +167,8 @@ LONG_RUNS = (
         "Runs killed at random moments and resumed",
         "final files identical to the byte",
         tests=(
-            "workflow/test_killed.py::test_killed_at_any_moment",
-            "workflow/test_resume.py::test_a_killed_fit",
+            "commands/test_killed.py::test_killed_at_any_moment",
+            "commands/test_resume.py::test_a_killed_fit",
             "posterior/test_checkpoint.py::test_kill_and_resume",
         ),
     ),
@@ -177,9 +177,9 @@ LONG_RUNS = (
         "Interrupted runs resumed",
         "exit code 130, then identical to the byte",
         tests=(
-            "workflow/test_resume.py::test_an_interrupted_fit",
-            "workflow/test_diagnose.py::test_an_interrupted_diagnosis",
-            "campaigns/test_fit.py::test_an_interrupted_campaign",
+            "commands/test_resume.py::test_an_interrupted_fit",
+            "commands/test_diagnose.py::test_an_interrupted_diagnosis",
+            "campaign/test_fit.py::test_an_interrupted_campaign",
         ),
     ),
     Row(
@@ -198,14 +198,14 @@ LONG_RUNS = (
         "disk",
         "Full disks and folders that cannot be written",
         "what was there before stays",
-        tests=("workflow/test_full_disk.py::", "posterior/test_checkpoint.py::test_a_full_disk"),
+        tests=("commands/test_full_disk.py::", "posterior/test_checkpoint.py::test_a_full_disk"),
     ),
     Row(
         "two_runs",
         "Two runs into one folder",
         "the second is refused and touches nothing",
         tests=(
-            "workflow/test_killed.py::test_a_folder_that_another_run_holds",
+            "commands/test_killed.py::test_a_folder_that_another_run_holds",
             "posterior/test_checkpoint.py::test_two_writers",
         ),
     ),
@@ -217,7 +217,7 @@ SECURITY = (
         "Pickled objects in the package or the wheel",
         "none",
         tests=(
-            "workflow/test_wheel.py::test_the_wheel_holds_nothing_else",
+            "commands/test_wheel.py::test_the_wheel_holds_nothing_else",
             "structure/test_imports.py::test_package_keeps_the_rules",
         ),
     ),
@@ -230,7 +230,7 @@ SECURITY = (
             "report/test_page.py::test_a_text_stays",
             "report/test_page.py::test_an_unescaped",
             "report/test_grading_page.py::test_names_and_messages",
-            "campaigns/test_page.py::test_a_text_stays",
+            "campaign/test_page.py::test_a_text_stays",
         ),
     ),
     Row(
@@ -256,15 +256,15 @@ SECURITY = (
         "Names that lead out of the output folder",
         "refused",
         tests=(
-            "workflow/test_batch.py::test_a_link_out",
-            "workflow/test_batch.py::test_bad_rows_are_rows",
+            "commands/test_batch.py::test_a_link_out",
+            "commands/test_batch.py::test_bad_rows_are_rows",
         ),
     ),
     Row(
         "network",
         "Connections while any command runs",
         "none",
-        tests=("workflow/test_no_network.py::test_a_command_runs",),
+        tests=("commands/test_no_network.py::test_a_command_runs",),
     ),
     Row(
         "fuzz",

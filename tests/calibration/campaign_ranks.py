@@ -16,10 +16,10 @@ from calibration.sbc import MOST_STEPS, held_out, random_lines, ranked, ranked_d
 from calibration.truths import Design, Truth, draw_truth, make_problem, reference
 
 from bayesplate.board.parameter import Parameter
-from bayesplate.campaigns.boards import Member
-from bayesplate.campaigns.learning import Learnt, learn
-from bayesplate.campaigns.shared import Shared
-from bayesplate.campaigns.together import Together, walk
+from bayesplate.campaign.boards import Member
+from bayesplate.campaign.learning import Learnt, learn
+from bayesplate.campaign.shared import Shared
+from bayesplate.campaign.together import Together, walk
 from bayesplate.errors import BayesplateError
 from bayesplate.posterior.convergence import Convergence, Gate
 from bayesplate.posterior.draws import named_draws

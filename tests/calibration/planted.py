@@ -24,6 +24,7 @@ from generator.recipes import RECIPES
 from bayesplate.board.board import Board
 from bayesplate.board.material import MODULI
 from bayesplate.board.quantity import Quantity
+from bayesplate.commands.prepare import Prepared, prepare
 from bayesplate.errors import BayesplateError
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws, named_draws
@@ -32,7 +33,6 @@ from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.reweighting import linear_is_enough
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.results.contract import Spread
-from bayesplate.workflow.prepare import Prepared, prepare
 
 NOISE = "{ median = 0.3, factor = 1.65 }"
 POISSON = "{ mean = 0.4, sd = 0.08 }"

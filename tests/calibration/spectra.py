@@ -29,12 +29,12 @@ from generator.plate import solve
 
 from bayesplate.board.board import Board
 from bayesplate.board.material import MODULI
+from bayesplate.commands.prepare import Prepared, prepare
 from bayesplate.errors import BayesplateError
 from bayesplate.estimates.labelling import with_labels
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.results.modes import assigned_peaks
-from bayesplate.workflow.prepare import Prepared, prepare
 
 N_MODES, MISSED, N_LABELLED = 16, 0.3, 2
 SPURIOUS = 1.0 / (1.0 + (1.0 - MISSED) * N_MODES)

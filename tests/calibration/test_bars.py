@@ -60,8 +60,8 @@ def test_the_page_shows_the_value_nearest_to_breaking_its_bar(noted):
 def test_the_page_says_what_is_missed(noted):
     with pytest.raises(AssertionError):
         meets("V12", "linear problem", 1e-3, at_most=1e-9)
-    tests = {"workflow/test_killed.py::test_killed_at_any_moment[fit-2]": False}
-    lines = page(read(noted), tests | {"workflow/test_killed.py::test_killed_at_any_moment[batch-20]": True})
+    tests = {"commands/test_killed.py::test_killed_at_any_moment[fit-2]": False}
+    lines = page(read(noted), tests | {"commands/test_killed.py::test_killed_at_any_moment[batch-20]": True})
 
     assert any("linear problem: 0.001 (at most 1e-09) | **missed** |" in line for line in lines)
     assert any("holds in 1 of 2 cases | **missed** |" in line for line in lines)
@@ -75,13 +75,13 @@ def test_a_note_without_a_row_is_refused(noted):
 
 def test_tests_are_read_by_file_and_name():
     text = (
-        '<testsuites><testsuite><testcase classname="tests.workflow.test_killed" name="test_a[fit-2]"/>'
-        '<testcase classname="workflow.test_killed" name="test_b"><failure/></testcase>'
-        '<testcase classname="workflow.test_killed" name="test_c"><skipped/></testcase></testsuite></testsuites>'
+        '<testsuites><testsuite><testcase classname="tests.commands.test_killed" name="test_a[fit-2]"/>'
+        '<testcase classname="commands.test_killed" name="test_b"><failure/></testcase>'
+        '<testcase classname="commands.test_killed" name="test_c"><skipped/></testcase></testsuite></testsuites>'
     )
     assert passed(ElementTree.fromstring(text)) == {
-        "workflow/test_killed.py::test_a[fit-2]": True,
-        "workflow/test_killed.py::test_b": False,
+        "commands/test_killed.py::test_a[fit-2]": True,
+        "commands/test_killed.py::test_b": False,
     }
 
 

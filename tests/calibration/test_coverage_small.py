@@ -25,9 +25,9 @@ from generator.designs import DESIGNS, MEDIANS
 from scipy import stats
 
 from bayesplate.board.quantity import Quantity
+from bayesplate.commands.prepare import prepare
 from bayesplate.effects import EFFECTS
 from bayesplate.posterior.posing import pose
-from bayesplate.workflow.prepare import prepare
 
 SHORT = Settings(n_ensembles=2, n_walkers=12, gate_taus=10.0, ess_min=100.0)
 EFFECT_NAMES = ("membrane_tension", "clamp_rotation")

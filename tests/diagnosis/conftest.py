@@ -8,11 +8,11 @@ from functools import cache
 
 import pytest
 
+from bayesplate.commands.diagnose import DiagnoseResult, diagnose
+from bayesplate.commands.problem import Problem
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.search import Ground, prepare_search
 from bayesplate.posterior.posing import PosedProblem
-from bayesplate.workflow.diagnose import DiagnoseResult, diagnose
-from bayesplate.workflow.problem import Problem
 
 N_NULL = 100
 """Data sets of the null control: enough for its files and rules, fewer than a diagnosis that is to be published."""

@@ -14,6 +14,7 @@ from made_summaries import SUMMARY, mode
 from bayesplate.board.material import RIGIDITIES, moduli
 from bayesplate.board.parameter import BOARD, Parameter
 from bayesplate.board.quantity import Quantity
+from bayesplate.commands.shown import show_diagnosis
 from bayesplate.diagnosis import constants
 from bayesplate.diagnosis.candidates import EffectEntry
 from bayesplate.diagnosis.claim import Claim, Condition
@@ -34,7 +35,6 @@ from bayesplate.effects import EFFECTS
 from bayesplate.estimates.leave_one_out import CarryingMode, indices_of
 from bayesplate.report.verdict import diagnosis_section, quoted
 from bayesplate.results.contract import Elastic, json_text
-from bayesplate.workflow.shown import show_diagnosis
 
 SHEAR, AIR, GRAIN = NAMES = ("transverse_shear", "fluid_loading", "grain_angle")
 FIGURES = replace(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bayesplate.diagnosis.laws import Following
-from bayesplate.modes.reduced import ReducedClass
-from bayesplate.modes.terms import Parity, Weights
+from bayesplate.plate.reduced import ReducedClass
+from bayesplate.plate.terms import Parity, Weights
 
 N = 8
 RAISED = 1

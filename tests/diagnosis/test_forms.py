@@ -10,10 +10,10 @@ import pytest
 from bayesplate.board.attached import AttachedItem
 from bayesplate.board.board import made_board
 from bayesplate.board.parameter import BOARD
+from bayesplate.commands.prepare import prepare
 from bayesplate.diagnosis.forms import forms, with_forms
 from bayesplate.diagnosis.shifts import COARSE, FINE, cells_along
 from bayesplate.effects import EFFECTS, effects_of
-from bayesplate.workflow.prepare import prepare
 
 
 @pytest.fixture(scope="module")

@@ -21,6 +21,7 @@ from made_searches import (
 
 from bayesplate.board.attached import AttachedItem
 from bayesplate.board.quantity import Quantity
+from bayesplate.commands.prepare import prepare
 from bayesplate.diagnosis.folds import nested
 from bayesplate.diagnosis.forms import with_labels_exchanged
 from bayesplate.diagnosis.hypotheses import (
@@ -35,7 +36,6 @@ from bayesplate.diagnosis.hypotheses import (
 )
 from bayesplate.diagnosis.noise_grid import noise_grid
 from bayesplate.diagnosis.shifts import nothing, together
-from bayesplate.workflow.prepare import prepare
 
 CLOSE_PAIR = [(0, 0), (1, 1), (0, 0), (0, 0), (1, 1), (0, 0)]
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from full_refits import full_refit
 
+from bayesplate.commands.problem import Problem
 from bayesplate.diagnosis import joint
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.draws import draw_terms
@@ -20,7 +21,6 @@ from bayesplate.frequencies.full import full_log_frequencies
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import system_of
-from bayesplate.workflow.problem import Problem
 
 PAIR = ("membrane_tension", "fluid_loading")
 CENT = 1.0

@@ -13,6 +13,8 @@ from scipy.stats import chi2
 from bayesplate.board.material import MODULI, RIGIDITIES, moduli
 from bayesplate.board.parameter import BOARD, Owner
 from bayesplate.board.quantity import Quantity
+from bayesplate.commands.check import check
+from bayesplate.commands.problem import Problem
 from bayesplate.diagnosis import known
 from bayesplate.diagnosis.known import (
     every_combination,
@@ -27,8 +29,6 @@ from bayesplate.estimates.least_squares import log_measured, weighted_least_squa
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import system_of
-from bayesplate.workflow.check import check
-from bayesplate.workflow.problem import Problem
 
 FIEMME = "fiemme-spruce-clamped"
 SHEAR, AIR, MASS = "transverse_shear", "fluid_loading", "attached_mass"
@@ -88,7 +88,7 @@ def test_the_figures_are_those_of_full_solves_with_the_effects_declared(fits, ef
 
 
 def test_they_are_the_figures_of_a_check(fits, monkeypatch):
-    monkeypatch.setattr("bayesplate.workflow.check.signatures", lambda _: [])  # of the other effects: not looked at
+    monkeypatch.setattr("bayesplate.commands.check.signatures", lambda _: [])  # of the other effects: not looked at
     checked = check(FIEMME, effects=(SHEAR,))
     assert are_alike(fits[SHEAR,], checked.in_sample_rms_cents, [checked.estimate[name] for name in MODULI])
 

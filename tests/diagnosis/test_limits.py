@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 from scipy.special import ndtr
 
 from bayesplate.board.quantity import Quantity
+from bayesplate.commands.prepare import prepare
 from bayesplate.diagnosis.entries import effect_entry
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.noise_grid import noise_grid
@@ -20,7 +21,6 @@ from bayesplate.diagnosis.sizes import at_limit
 from bayesplate.diagnosis.verdict import answers
 from bayesplate.effects import declare, effects_of
 from bayesplate.posterior.posing import pose
-from bayesplate.workflow.prepare import prepare
 
 NOISE = 0.005
 A, B = "density_gradient", "poisson_ratio"

@@ -10,6 +10,7 @@ from made_searches import with_modes
 from scipy.special import logsumexp
 from scipy.stats import t as student
 
+from bayesplate.commands.fit import fit
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.constants import draw_constants
 from bayesplate.diagnosis.null_control import null_control
@@ -17,7 +18,6 @@ from bayesplate.diagnosis.search import prepare_search, search
 from bayesplate.diagnosis.sensitivity import varied
 from bayesplate.diagnosis.sizes import at_limit
 from bayesplate.diagnosis.verdict import decide
-from bayesplate.workflow.fit import fit
 
 slow = pytest.mark.slow
 

@@ -19,8 +19,8 @@ from bayesplate.diagnosis.search import search
 from bayesplate.diagnosis.shifts import nothing
 from bayesplate.frequencies.model import OtherMode
 from bayesplate.frequencies.peaks import PeakLikelihood
-from bayesplate.modes.naming import Place
-from bayesplate.modes.terms import Parity
+from bayesplate.plate.naming import Place
+from bayesplate.plate.terms import Parity
 
 PLACE = Place(Parity(0, 0), 0, 1.0)
 N_EVERY = 9

@@ -10,6 +10,7 @@ import pytest
 from full_refits import full_refit
 from made_searches import baseline
 
+from bayesplate.commands.problem import Problem
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.forms import forms, with_forms
 from bayesplate.diagnosis.laws import FormLaw, form_law
@@ -17,7 +18,6 @@ from bayesplate.diagnosis.search import prepare_search, search
 from bayesplate.diagnosis.shifts import refitted, tabulate
 from bayesplate.diagnosis.signatures import Signature, signature, signatures
 from bayesplate.frequencies.laws import cents
-from bayesplate.workflow.problem import Problem
 
 CENT = 1.0
 FAR = 0.7

@@ -14,13 +14,13 @@ from bayesplate import Board, Setup
 from bayesplate.board.attached import DeclaredFluid
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
+from bayesplate.commands.problem import Problem
 from bayesplate.diagnosis.baseline import Baseline, Spectrum
 from bayesplate.diagnosis.known import known_fit, stated_effects
 from bayesplate.diagnosis.stated import judge_stated, scores_given, stated_claims
 from bayesplate.diagnosis.told import stated_sentences
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.posterior.posing import pose
-from bayesplate.workflow.problem import Problem
 
 CENTS = np.log(2.0) / 1200.0
 BEFORE = CENTS * np.array([10.0, -10.0, 10.0, -10.0])

@@ -12,6 +12,7 @@ import pytest
 from diagnoses import AFTER, AIR, BEFORE, DIAGNOSES, EXCHANGE, GRAIN, NEXT, TENSION, candidate
 from read_pages import Read
 
+from bayesplate.commands.shown import show_diagnosis
 from bayesplate.diagnosis.candidates import Amplitude
 from bayesplate.diagnosis.result import Errors, diagnosis_json
 from bayesplate.diagnosis.tables import (
@@ -36,7 +37,6 @@ from bayesplate.diagnosis.told import (
 from bayesplate.diagnosis.verdict import Word
 from bayesplate.diagnosis.words import MERITS, VERDICTS, claim_sentence, meaning
 from bayesplate.results.tables import render
-from bayesplate.workflow.shown import show_diagnosis
 
 KEYS = [
     "format", "name", "seed", "card_sha256", "verdict", "claim", "conditions", "effects", "refitted", "reason",

@@ -21,9 +21,9 @@ from bayesplate.board.attached import AttachedItem
 from bayesplate.board.quantity import Quantity
 from bayesplate.effects.attached_items import Item, base_diameter
 from bayesplate.effects.attached_mass import HEAVIEST_ROVING, AttachedMass
-from bayesplate.modes.line import line
-from bayesplate.modes.plate import plate_of
-from bayesplate.modes.thin import THIN
+from bayesplate.plate.line import line
+from bayesplate.plate.plate import plate_of
+from bayesplate.plate.thin import THIN
 
 MASS = "attached_mass.mass"
 AS_FREE = replace(ritz.FINNISH, edges=ALL_FREE)

@@ -13,10 +13,10 @@ import pytest
 from effect_plates import MADE, modes_of
 from generator.known_boards import FREE
 
+from bayesplate.commands.prepare import prepare
 from bayesplate.diagnosis.forms import forms
 from bayesplate.effects import EFFECTS, declare
 from bayesplate.posterior.posing import pose
-from bayesplate.workflow.prepare import prepare
 
 TEXT = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text(encoding="utf-8")
 NAME = "bracing_bar"

@@ -17,10 +17,10 @@ from generator.plate import FINE_SHEAR, Plate
 from generator.recipes import LIBRARY, RECIPES
 
 from bayesplate.board.board import Board
+from bayesplate.commands.prepare import prepare
 from bayesplate.effects import EFFECTS
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import system_of
-from bayesplate.workflow.prepare import prepare
 
 Parameters = Mapping[str, Any]
 SIZES = {1: 0.5, 3: 2.0}

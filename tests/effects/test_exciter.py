@@ -21,7 +21,7 @@ from bayesplate.frequencies.full import full_log_frequencies
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
-from bayesplate.modes.naming import find
+from bayesplate.plate.naming import find
 
 COIL, MASS = 1.6e-3, 48e-3
 QUARTER, THIRD = (0.25, 0.25), (1.0 / 3.0, 1.0 / 3.0)

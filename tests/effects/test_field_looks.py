@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from bayesplate.board.random_field import Surface
+from bayesplate.commands.prepare import prepare
 from bayesplate.effects.field_looks import look
-from bayesplate.workflow.prepare import prepare
 
 PLACES = {
     "towards x0": (0.0, 0.5), "towards x1": (1.0, 0.5), "towards y0": (0.5, 0.0), "towards y1": (0.5, 1.0),

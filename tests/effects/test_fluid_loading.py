@@ -16,8 +16,8 @@ from made_boards import board_of
 from bayesplate.board.attached import DeclaredFluid
 from bayesplate.board.quantity import Quantity
 from bayesplate.effects.fluid_loading import BAFFLES, DEFAULT_DENSITY, UNKNOWN_BAFFLE, FluidLoading
-from bayesplate.modes.air import air_mass
-from bayesplate.modes.line import line
+from bayesplate.plate.air import air_mass
+from bayesplate.plate.line import line
 from bayesplate.posterior.laplace import law_tolerance, worst_cents
 
 OPEN = {"fluid_loading.density": 1.2, "fluid_loading.baffle": 0.0}

@@ -13,14 +13,14 @@ from made_boards import board_of
 
 from bayesplate.board.attached import AttachedItem
 from bayesplate.board.quantity import Quantity
+from bayesplate.commands.prepare import prepare
 from bayesplate.effects.attached_items import Item
 from bayesplate.effects.attached_mass import AttachedMass
 from bayesplate.effects.grain_angle import GrainAngle
 from bayesplate.effects.transverse_shear import TransverseShear
 from bayesplate.frequencies.system import System
-from bayesplate.modes.naming import find
+from bayesplate.plate.naming import find
 from bayesplate.posterior.laplace import law_tolerance, worst_cents
-from bayesplate.workflow.prepare import prepare
 
 ANGLE = "grain_angle.angle"
 EXACT = [-17.6, 4.9, -8.9, -7.2, 4.5, -6.5]

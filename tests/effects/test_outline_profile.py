@@ -20,6 +20,7 @@ from bayesplate.board.board import density, vibrating_lengths
 from bayesplate.board.parameter import BOARD
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.random_field import Surface
+from bayesplate.commands.prepare import prepare
 from bayesplate.effects.attached_items import Item
 from bayesplate.effects.attached_mass import AttachedMass
 from bayesplate.effects.field_components import FieldProfile
@@ -31,7 +32,6 @@ from bayesplate.effects.support_stiffness import SupportStiffness
 from bayesplate.effects.thickness_profile import ThicknessProfile
 from bayesplate.frequencies.residues import residues_of
 from bayesplate.posterior.laplace import worst_cents
-from bayesplate.workflow.prepare import prepare
 
 BENT = ((0.0, 0.3, 0.6, 1.0), (0.97, 1.02, 1.01, 1.0))
 CUT = ((0.0, 0.25, 0.5, 0.75, 1.0), (1.0, 1.0, 1.0, 0.972, 0.899))

@@ -16,7 +16,7 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.effects import declare
 from bayesplate.effects.poisson_ratio import FREE_POISSON, PoissonRatio
 from bayesplate.frequencies.system import System
-from bayesplate.modes.naming import find
+from bayesplate.plate.naming import find
 from bayesplate.posterior.laplace import worst_cents
 
 

@@ -16,6 +16,7 @@ from made_boards import board_of
 from bayesplate.board.board import density
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.random_field import Surface
+from bayesplate.commands.prepare import prepare
 from bayesplate.effects.field_components import FieldProfile
 from bayesplate.effects.part import Part
 from bayesplate.effects.thickness_profile import ThicknessProfile
@@ -24,7 +25,6 @@ from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.system import System
 from bayesplate.posterior.laplace import law_tolerance, worst_cents
 from bayesplate.posterior.posing import pose
-from bayesplate.workflow.prepare import prepare
 
 
 def taper(x, y=0.0):

@@ -22,7 +22,7 @@ from bayesplate.board.board import Board
 from bayesplate.board.quantity import Quantity
 from bayesplate.effects import EFFECTS, declare
 from bayesplate.frequencies.system import system_of
-from bayesplate.modes.solve import solve
+from bayesplate.plate.solve import solve
 
 PLATES = {
     "CFFF": FINNISH,

@@ -17,7 +17,7 @@ from bayesplate.board.parameter import BOARD
 from bayesplate.board.quantity import Quantity
 from bayesplate.effects.thickness_profile import ThicknessProfile
 from bayesplate.effects.warp import Warp
-from bayesplate.modes.membrane import CURVATURES
+from bayesplate.plate.membrane import CURVATURES
 
 SIZES = {
     (1e-3, 0.0, 0.0): [0.1, 30.3, 1.2, 0.0, 0.8, 10.8, 1.5, 0.9, 4.7],
@@ -50,7 +50,7 @@ def test_sizes_on_a_half_top(rises):
 @pytest.mark.parametrize("rises", [(2e-3, 0.0, 0.0), (1.0e-3, -3e-3, 0.0), (0.0, 0.0, 8e-3), (1.3e-3, 2e-3, 16e-3)])
 @pytest.mark.parametrize("edges", [None, CANTILEVER, DRIVEN.edges], ids=["free", "cantilever", "clamped"])
 def test_against_the_generator(edges, rises, is_sheared):
-    """Half a cent: the production meshes are within 0.15 to 0.3 cents of converged (`bayesplate.modes.mesh`)."""
+    """Half a cent: the production meshes are within 0.15 to 0.3 cents of converged (`bayesplate.plate.mesh`)."""
     plate = HALF_TOP if edges is None else replace(HALF_TOP, edges=edges)
     shape = GeneratorWarp(*rises)
     apart = hertz_apart(plate, [warp(plate)], sizes(*rises), [shape], 8, is_sheared)

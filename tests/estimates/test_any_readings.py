@@ -13,6 +13,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from scipy import optimize
 
+from bayesplate.commands.prepare import prepare
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.leave_one_out import prediction_errors
 from bayesplate.estimates.refit import (
@@ -24,10 +25,9 @@ from bayesplate.estimates.refit import (
     refit,
 )
 from bayesplate.frequencies.reading_errors import ReadingErrors
-from bayesplate.modes.terms import Weights
+from bayesplate.plate.terms import Weights
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.posing import pose
-from bayesplate.workflow.prepare import prepare
 
 NOISE = 0.003
 POSITIVE = st.floats(1e-300, 1e300) | st.floats(1.0, 1e4)

@@ -12,6 +12,7 @@ from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Peak
 from bayesplate.board.shelf import shelf_folder
+from bayesplate.commands.prepare import prepare
 from bayesplate.errors import InputError
 from bayesplate.estimates.coefficients import coefficient_faults
 from bayesplate.estimates.least_squares import weighted_least_squares
@@ -20,7 +21,6 @@ from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.labels import Label
 from bayesplate.posterior.posing import pose
 from bayesplate.results.references import references
-from bayesplate.workflow.prepare import prepare
 
 FINNISH, FIEMME = "finnish-spruce-cantilever", "fiemme-spruce-clamped"
 

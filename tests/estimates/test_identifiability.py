@@ -13,13 +13,13 @@ from bayesplate.board.board import Board
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.board.prior import load_prior
 from bayesplate.board.setup import Setup
+from bayesplate.commands.prepare import prepare
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.identifiability import identifiability, remarks, require_identifiable, require_labels
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
 from bayesplate.posterior.posing import pose
-from bayesplate.workflow.prepare import prepare
 
 
 @pytest.fixture(scope="module")

@@ -15,11 +15,11 @@ from scipy.optimize import least_squares
 
 from bayesplate.board.material import RIGIDITIES, moduli
 from bayesplate.board.quantity import Quantity
+from bayesplate.commands.prepare import prepare
 from bayesplate.estimates import least_squares as estimates
 from bayesplate.estimates.least_squares import has_settled, log_measured, reading_scales, weighted_least_squares
-from bayesplate.modes.naming import Place
-from bayesplate.modes.terms import Parity
-from bayesplate.workflow.prepare import prepare
+from bayesplate.plate.naming import Place
+from bayesplate.plate.terms import Parity
 
 
 def misfits(board, log_rigidities):

@@ -7,6 +7,7 @@ import pytest
 from bars import meets
 from scipy import optimize, stats
 
+from bayesplate.commands.prepare import prepare
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.estimates.leave_one_out import (
     CarryingMode,
@@ -24,7 +25,6 @@ from bayesplate.frequencies.densities import DEGREES_OF_FREEDOM
 from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.posing import pose
-from bayesplate.workflow.prepare import prepare
 
 N_MODES = 7
 ORIGIN = np.zeros((1, 4))

@@ -9,11 +9,11 @@ import pytest
 
 from bayesplate.board.material import MODULI
 from bayesplate.board.quantity import Quantity
+from bayesplate.commands.prepare import prepare
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.estimates.paper import PaperSystem, paper_system
 from bayesplate.estimates.percentile import MOST_MODES, percentile_estimate
 from bayesplate.labels import Label
-from bayesplate.workflow.prepare import prepare
 
 TABULATED_NU_YX = 0.51 * 0.716 / 10.7
 """The paper's Poisson factor comes from its table of simulation inputs; ours from the fit itself."""

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bayesplate.workflow.prepare import prepare
+from bayesplate.commands.prepare import prepare
 
 ROOT = Path(__file__).parents[2]
 SHOWN = ROOT / "docs" / "validation" / "closing-the-loop.md"

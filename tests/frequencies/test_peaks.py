@@ -16,8 +16,8 @@ from bayesplate.board.setup import Setup
 from bayesplate.frequencies.model import OtherMode
 from bayesplate.frequencies.peaks import PeakLikelihood, takes_part
 from bayesplate.frequencies.residues import NODAL_LINE, share_seen, sign_probabilities
-from bayesplate.modes.naming import Place
-from bayesplate.modes.terms import Parity
+from bayesplate.plate.naming import Place
+from bayesplate.plate.terms import Parity
 
 NOISE = np.array([0.01, 0.03, 0.002])
 PLACE = Place(Parity(0, 0), 0, 1.0)

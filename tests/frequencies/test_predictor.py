@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bayesplate.commands.problem import Problem
 from bayesplate.estimates.refit import sensitivities
 from bayesplate.frequencies.laws import ExactLaw, cents
 from bayesplate.posterior.laplace import every_predictor, law_tolerance, predictor
-from bayesplate.workflow.problem import Problem
 
 EFFECTS = {"thin": (), "shear-flexible": ("transverse_shear",), "on a soft clamp": ("clamp_rotation",)}
 

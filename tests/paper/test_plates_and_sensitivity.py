@@ -13,10 +13,10 @@ import pytest
 from bayesplate.board.material import rigidities
 from bayesplate.board.setup import CLAMPED_NOISE, Setup
 from bayesplate.frequencies.terms import shear_term_weights, term_weights
-from bayesplate.modes.mesh import mesh
-from bayesplate.modes.naming import find
-from bayesplate.modes.shear import SHEAR_ELEMENTS_PER_SIDE, shear_flexible_plate
-from bayesplate.modes.thin import thin_plate
+from bayesplate.plate.mesh import mesh
+from bayesplate.plate.naming import find
+from bayesplate.plate.shear import SHEAR_ELEMENTS_PER_SIDE, shear_flexible_plate
+from bayesplate.plate.thin import thin_plate
 
 E_x, E_y, G_xy, NU, DENSITY, THICKNESS = 10.7e9, 0.716e9, 0.50e9, 0.51, 473.9, 3e-3
 SETUPS = {

@@ -9,9 +9,9 @@ import ritz
 from bayesplate.board.material import rigidities
 from bayesplate.board.setup import CLAMPED_NOISE, Setup
 from bayesplate.frequencies.terms import paper_coefficients, term_weights
-from bayesplate.modes.mesh import mesh
-from bayesplate.modes.naming import find
-from bayesplate.modes.thin import thin_plate
+from bayesplate.plate.mesh import mesh
+from bayesplate.plate.naming import find
+from bayesplate.plate.thin import thin_plate
 
 NU = 0.51
 CANTILEVER = Setup("cantilever", ("clamped", "free"), ("free", "free"), (), CLAMPED_NOISE, first_label=(1, 0))

@@ -7,10 +7,10 @@ import pytest
 
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.frequencies.terms import paper_coefficients
-from bayesplate.modes import training
-from bayesplate.modes.naming import find
-from bayesplate.modes.thin import thin_plate
-from bayesplate.modes.training import REFERENCE, TrainingConstants, train, training_weights
+from bayesplate.plate import training
+from bayesplate.plate.naming import find
+from bayesplate.plate.thin import thin_plate
+from bayesplate.plate.training import REFERENCE, TrainingConstants, train, training_weights
 
 CANTILEVER = (("clamped", "free"), ("free", "free"), 223 / 114, 3 / 223)
 CLAMPED = (("clamped", "clamped"), ("clamped", "clamped"), 150 / 103, 3 / 600)

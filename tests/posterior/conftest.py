@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bayesplate.workflow.fit import fit
+from bayesplate.commands.fit import fit
 
 
 @pytest.fixture(scope="session")

@@ -15,6 +15,7 @@ from bayesplate.board.material import MODULI, moduli
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import CLAMPED_NOISE, DEFAULT_NOISE
+from bayesplate.commands.prepare import prepare
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.estimates.leave_one_out import prediction_errors
 from bayesplate.estimates.paper import paper_system
@@ -27,7 +28,6 @@ from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.mode_errors import mode_errors
 from bayesplate.posterior.posing import pose
 from bayesplate.posterior.sampling import SamplerSettings
-from bayesplate.workflow.prepare import prepare
 
 PAPER = {
     "finnish": ((13.05e9, 0.674e9, 0.606e9), (18.1, 38.2)),

@@ -11,11 +11,11 @@ from runs import fit
 from bayesplate.board.prior import StatedPrior, load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.shelf import shelf_folder
+from bayesplate.commands.prepare import prepare
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.posterior.contradictions import require_possible_noise
 from bayesplate.posterior.posing import pose
-from bayesplate.workflow.prepare import prepare
 
 BOARD = "fiemme-spruce-clamped"
 ALMOST_EXACT = 1.000_01
@@ -105,7 +105,7 @@ def test_a_small_noise_that_may_grow_or_coarse_rounding_explain_the_residuals(bo
 )  # fmt: skip
 def test_the_command_ends_with_exit_4_before_sampling(tmp_path, old, new, said, monkeypatch):
     """And leaves no folder."""
-    monkeypatch.setattr("bayesplate.workflow.fitting.infer", lambda *_, **__: pytest.fail("sampled"))
+    monkeypatch.setattr("bayesplate.commands.fitting.infer", lambda *_, **__: pytest.fail("sampled"))
     text = (shelf_folder("boards") / f"{BOARD}.toml").read_text(encoding="utf-8")
     assert text.count(old) == 1
     flat = '[{}]\ndistribution = "log-uniform"\nlower_gpa = {}\nupper_gpa = {}\nsource = "-"\n'

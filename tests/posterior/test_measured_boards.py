@@ -13,12 +13,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bayesplate.commands.fit import fit
+from bayesplate.commands.prepare import prepare
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.laplace import law_tolerance, worst_cents
 from bayesplate.posterior.posing import pose
-from bayesplate.workflow.fit import fit
-from bayesplate.workflow.prepare import prepare
 
 pytestmark = pytest.mark.slow
 

@@ -20,7 +20,7 @@ from scipy.special import ndtr
 from statistics_checks import Truth, differences, differences_from_normal
 
 from bayesplate.board.prior import load_prior
-from bayesplate.campaigns.evidence import bridge_sampling
+from bayesplate.campaign.evidence import bridge_sampling
 from bayesplate.posterior.posing import pose
 
 THINNING_LOSS = 0.9

@@ -9,6 +9,7 @@ import pytest
 
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.board.quantity import Quantity
+from bayesplate.commands.prepare import prepare
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.estimates.refit import refit
 from bayesplate.frequencies.full import full_log_frequencies
@@ -17,7 +18,6 @@ from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.posterior import laplace
 from bayesplate.posterior.laplace import law_tolerance, linearisation_errors, noise_widenings, predictor, worst_cents
 from bayesplate.posterior.posing import pose
-from bayesplate.workflow.prepare import prepare
 
 N_FRESH = 12
 

@@ -27,8 +27,8 @@ from bayesplate.diagnosis.signatures import signatures
 from bayesplate.effects import declare
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import OtherMode
-from bayesplate.modes.naming import Place
-from bayesplate.modes.terms import Parity
+from bayesplate.plate.naming import Place
+from bayesplate.plate.terms import Parity
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.sampling import SamplerSettings

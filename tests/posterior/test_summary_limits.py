@@ -12,6 +12,7 @@ import bayesplate.frequencies.spectrum
 import bayesplate.posterior.assessment
 from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.board.prior import load_prior
+from bayesplate.commands.prepare import prepare
 from bayesplate.estimates.identifiability import Identifiability, remarks
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.spectrum import sign_conflicts, spectrum
@@ -28,7 +29,6 @@ from bayesplate.posterior.target import linear_suffices
 from bayesplate.posterior.thinning import walker_major
 from bayesplate.results.budget import input_remarks, prior_remarks
 from bayesplate.results.summarise import summarise
-from bayesplate.workflow.prepare import prepare
 
 LINEAR = "the linear law is off by more than a quarter of the noise"
 EXACT = "the exact law misses full solves"

@@ -9,6 +9,7 @@ import pytest
 from statistics_checks import furthest
 
 from bayesplate.board.material import RIGIDITIES
+from bayesplate.commands.prepare import prepare
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.draws import named_draws
@@ -27,7 +28,6 @@ from bayesplate.posterior.surrogate import (
 from bayesplate.posterior.tails import TailCoordinates
 from bayesplate.posterior.target import LINEAR_SHARE
 from bayesplate.posterior.thinning import thin_walker_major
-from bayesplate.workflow.prepare import prepare
 
 BOARD = "finnish-spruce-cantilever"
 FURTHEST = furthest(18)  # six shares or means of three constants

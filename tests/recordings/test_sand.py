@@ -8,11 +8,11 @@ import ritz
 from generator.sand import photograph
 from PIL import Image
 
+from bayesplate.commands.prepare import prepare
 from bayesplate.errors import InputError
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
 from bayesplate.recordings.sand import agreement, read_picture, sand_evidence
-from bayesplate.workflow.prepare import prepare
 
 GRID = np.linspace(0.0, 1.0, 61)
 MODES = {"finnish-spruce-cantilever": (ritz.FINNISH, (1, 5)), "fiemme-spruce-clamped": (ritz.FIEMME, (2, 5))}

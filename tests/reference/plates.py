@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from bayesplate.commands.prepare import prepare
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
-from bayesplate.workflow.prepare import prepare
 
 N_MODES = 10
 STEP = 1.1

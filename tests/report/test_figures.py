@@ -15,6 +15,8 @@ from made_summaries import spread
 
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Peak
+from bayesplate.commands.prepare import prepare
+from bayesplate.commands.problem import Problem
 from bayesplate.estimates.sheet import sheet
 from bayesplate.frequencies.system import system_of
 from bayesplate.report.board import board_picture
@@ -28,8 +30,6 @@ from bayesplate.report.page import pictures
 from bayesplate.report.posterior import Compared, compared, health_picture
 from bayesplate.report.style import BLUE, GREEN, NO_GLYPH, ORANGE, SKY, VERMILLION, drawable
 from bayesplate.results.words import MISSING
-from bayesplate.workflow.prepare import prepare
-from bayesplate.workflow.problem import Problem
 
 LONG_NAME = "a-cantilever-with-a-very-long-setup-name-beyond-all-reason"
 TWO_SETUPS = f"""\

@@ -11,8 +11,8 @@ from made_boards import CANTILEVER_LABELS, board_of, setup_of
 
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.sessions import with_discrepancies
+from bayesplate.commands.prepare import prepare
 from bayesplate.results.budget import budget, input_remarks, input_shares, row_words
-from bayesplate.workflow.prepare import prepare
 
 FIELDS = ("thickness_profile.field_1", "thickness_profile.field_2")
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from bayesplate.campaigns.checking import CampaignCheck
+from bayesplate.campaign.checking import CampaignCheck
+from bayesplate.commands.shown import show_check, show_modes
 from bayesplate.results.checking import CheckedEffect, CheckedMode, CheckedSetup, CheckReport
 from bayesplate.results.command_tables import check_tables, forward_table, methods_table, sheet_tables
 from bayesplate.results.comparison import (
@@ -21,7 +22,6 @@ from bayesplate.results.comparison import (
 )
 from bayesplate.results.contract import Constants, Elastic, as_json
 from bayesplate.results.sheets import EnergyShares, ModesReport, SheetReport, SheetRow
-from bayesplate.workflow.shown import show_check, show_modes
 
 EFFECT = CheckedEffect("fluid_loading", {}, 44.1, 10.6, True, Elastic(-7.3, -2.4, 0.1), ("clamp_rotation", "tension"))
 REPORT = CheckReport(

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from made_summaries import SUMMARY, mode, spread
 
+from bayesplate.commands.prepare import prepare
+from bayesplate.commands.shown import show_fit
 from bayesplate.report import content
 from bayesplate.results.contract import Elastic
 from bayesplate.results.fit_tables import (
@@ -23,8 +25,6 @@ from bayesplate.results.fit_tables import (
 )
 from bayesplate.results.tables import render
 from bayesplate.results.words import decimals, interval, is_isotropic, number, percent, plus_minus, rounded, two_digits
-from bayesplate.workflow.prepare import prepare
-from bayesplate.workflow.shown import show_fit
 
 
 def column(table, name):

@@ -8,10 +8,10 @@ import pytest
 from diagnoses import DIAGNOSES
 from made_summaries import SUMMARY
 
+from bayesplate.commands.shown import show_diagnosis, show_fit
 from bayesplate.diagnosis.tables import candidates_table
 from bayesplate.results.layout import column_widths
 from bayesplate.results.tables import Table, render
-from bayesplate.workflow.shown import show_diagnosis, show_fit
 
 TABLES = {
     "fit": show_fit(SUMMARY).tables,

@@ -16,11 +16,11 @@ from made_reports import fitted
 from made_summaries import SUMMARY
 
 from bayesplate.board.quantity import Quantity
+from bayesplate.commands.shown import show_fit
 from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.report.content import summary_sentences
 from bayesplate.results.contract import json_text
 from bayesplate.results.modes import mode_rows
-from bayesplate.workflow.shown import show_fit
 
 CARDS = Path(__file__).parents[2] / "models" / "boards"
 HERTZ = {(0, 0): 57.0, (0, 1): Quantity.from_mean(100.0, 0.5)}

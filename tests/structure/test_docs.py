@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from bayesplate.cli import main
+from bayesplate.commands.prepare import prepare
 from bayesplate.errors import InputError
-from bayesplate.workflow.prepare import prepare
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted(

@@ -16,7 +16,7 @@ PACKAGE = Path(bayesplate.__file__).parent
 
 ROAD = (
     "board",
-    "modes",
+    "plate",
     "effects",
     "frequencies",
     "estimates",
@@ -24,7 +24,7 @@ ROAD = (
     "results",
     "grading",
     "diagnosis",
-    "campaigns",
+    "campaign",
     "planning",
     "report",
 )
@@ -32,15 +32,15 @@ ROAD = (
 OPEN_TO_ALL = {"errors", "files", "locks", "labels", "libraries", "streams"}
 ROOMS = {
     **{room: {*ROAD[: i + 1], *OPEN_TO_ALL} for i, room in enumerate(ROAD)},
-    "recordings": {"recordings", "modes", *OPEN_TO_ALL},
+    "recordings": {"recordings", "plate", *OPEN_TO_ALL},
     "report": {*ROAD, "recordings", *OPEN_TO_ALL},
-    "workflow": {*ROAD, "recordings", "workflow", *OPEN_TO_ALL},
-    "cli": {"cli", "asking", "options", "terminal", "workflow", "errors"},
+    "commands": {*ROAD, "recordings", "commands", *OPEN_TO_ALL},
+    "cli": {"cli", "asking", "options", "terminal", "commands", "errors"},
     "options": {"options"},
-    "asking": {"asking", "workflow", "errors"},
-    "terminal": {"terminal", "workflow", "errors"},
-    "batch": {"batch", "workflow", "errors"},
-    "__init__": {*ROAD, "recordings", "workflow", *OPEN_TO_ALL},
+    "asking": {"asking", "commands", "errors"},
+    "terminal": {"terminal", "commands", "errors"},
+    "batch": {"batch", "commands", "errors"},
+    "__init__": {*ROAD, "recordings", "commands", *OPEN_TO_ALL},
     "__main__": {"cli"},
     **dict.fromkeys(OPEN_TO_ALL, OPEN_TO_ALL),
 }
@@ -58,15 +58,12 @@ WITHIN = {
 """Steps of a folder: the files of each see those of the same step and of the steps before, and every file is in one."""
 NAMES_ALONE = {
     # `system_of` says which theory is to be cited
-    "results": {"modes": set(), "frequencies": {"LawName", "PeakLikelihood", "cents", "system_of"}},
+    "results": {"plate": set(), "frequencies": {"LawName", "PeakLikelihood", "cents", "system_of"}},
 }
 """Of some rooms before it a room takes these names and no others: in results nothing is solved."""
-CALLED = {Path("modes/__init__.py"): {"workflow"}}
-"""The folder that bears the name of a command hands a call on to it, inside a function."""
-
 DOORS = {
     "emcee": "posterior",
-    "skfem": "modes",
+    "skfem": "plate",
     "arviz": "libraries",
     "xarray": "results",
     "pandas": "results",
@@ -123,8 +120,7 @@ def _import_faults(tree: ast.Module, inside: Path) -> Iterator[tuple[int, str]]:
             yield item.line, "imports relatively"
         elif parts[0] == "bayesplate":
             target = parts[1] if len(parts) > 1 else "__init__"
-            handed_on = set() if item.is_at_top else CALLED.get(inside, set())
-            if target not in ROOMS[room] | handed_on:
+            if target not in ROOMS[room]:
                 yield item.line, f"{room} imports {target}"
             elif target == room in WITHIN and len(parts) > 2 and _comes_later(parts[2], inner, WITHIN[room]):
                 yield item.line, f"{room}.{inner} imports {room}.{parts[2]}".replace(". ", " ")
@@ -238,24 +234,23 @@ def test_every_file_of_the_package_is_read():
     """The rules would hold for an empty list of files as well."""
     read = {path.relative_to(PACKAGE).parts[0] for path in PACKAGE.rglob("*.py")}
 
-    assert {"board", "modes", "frequencies", "errors.py", "labels.py"} <= read
+    assert {"board", "plate", "frequencies", "errors.py", "labels.py"} <= read
 
 
 BAD_FILES = [
-    ("board/bad.py", "from bayesplate.modes.terms import Weights", "board imports modes"),
-    ("board/bad.py", "from bayesplate import modes", "board imports modes"),
-    ("board/bad.py", "import bayesplate.modes.plate", "board imports modes"),
+    ("board/bad.py", "from bayesplate.plate.terms import Weights", "board imports plate"),
+    ("board/bad.py", "from bayesplate import plate", "board imports plate"),
+    ("board/bad.py", "import bayesplate.plate.plate", "board imports plate"),
     ("board/bad.py", "def f():\n    from bayesplate.effects import declare", "board imports effects"),
-    ("modes/bad.py", "import importlib\nimportlib.import_module('bayesplate.report.page')", "modes imports report"),
-    ("diagnosis/words.py", "from bayesplate.campaigns.shared import Shared", "diagnosis imports campaigns"),
-    ("campaigns/bad.py", "from bayesplate.report.page import policy", "campaigns imports report"),
+    ("plate/bad.py", "import importlib\nimportlib.import_module('bayesplate.report.page')", "plate imports report"),
+    ("diagnosis/words.py", "from bayesplate.campaign.shared import Shared", "diagnosis imports campaign"),
+    ("campaign/bad.py", "from bayesplate.report.page import policy", "campaign imports report"),
     ("recordings/bad.py", "from bayesplate.board.board import Board", "recordings imports board"),
-    ("posterior/bad.py", "from bayesplate.workflow.fit import fit", "posterior imports workflow"),
-    ("modes/bad.py", "def f():\n    from bayesplate.workflow.modes import modes", "modes imports workflow"),
-    ("modes/__init__.py", "from bayesplate.workflow.modes import modes", "modes imports workflow"),
-    ("cli.py", "from bayesplate.modes.terms import Weights", "cli imports modes"),
+    ("posterior/bad.py", "from bayesplate.commands.fit import fit", "posterior imports commands"),
+    ("plate/bad.py", "def f():\n    from bayesplate.commands.modes import modes", "plate imports commands"),
+    ("cli.py", "from bayesplate.plate.terms import Weights", "cli imports plate"),
     ("terminal.py", "from bayesplate.cli import main", "terminal imports cli"),
-    ("workflow/bad.py", "from bayesplate.terminal import reporting", "workflow imports terminal"),
+    ("commands/bad.py", "from bayesplate.terminal import reporting", "commands imports terminal"),
     ("batch.py", "from bayesplate.cli import main", "batch imports cli"),
     ("errors.py", "from bayesplate.board.board import Board", "errors imports board"),
     ("gadgets/bad.py", "", "stands in no known room: gadgets"),
@@ -281,10 +276,10 @@ BAD_FILES = [
         "from bayesplate.diagnosis.laws import form_law",
         "diagnosis imports diagnosis.laws",
     ),
-    ("modes/bad.py", "from . import plate", "imports relatively"),
-    ("modes/bad.py", "def f():\n    import emcee", "modes imports emcee, which belongs to posterior"),
+    ("plate/bad.py", "from . import plate", "imports relatively"),
+    ("plate/bad.py", "def f():\n    import emcee", "plate imports emcee, which belongs to posterior"),
     ("posterior/bad.py", "import emcee", "imports emcee at the top"),
-    ("modes/bad.py", "class A:\n    import skfem.helpers", "imports skfem.helpers at the top"),
+    ("plate/bad.py", "class A:\n    import skfem.helpers", "imports skfem.helpers at the top"),
     ("report/bad.py", "if True:\n    from matplotlib import pyplot", "imports matplotlib at the top"),
     ("report/bad.py", "def f():\n    from xarray import Dataset", "report imports xarray, which belongs to results"),
     ("planning/bad.py", "from scipy import stats", "imports scipy.stats at the top"),
@@ -295,8 +290,8 @@ BAD_FILES = [
         "from bayesplate.frequencies.spectrum import cents, spectra",
         "results takes spectra from frequencies",
     ),
-    ("results/bad.py", "from bayesplate.modes.terms import Weights", "results takes Weights from modes"),
-    ("results/bad.py", "import bayesplate.modes.solve", "results takes bayesplate.modes.solve from modes"),
+    ("results/bad.py", "from bayesplate.plate.terms import Weights", "results takes Weights from plate"),
+    ("results/bad.py", "import bayesplate.plate.solve", "results takes bayesplate.plate.solve from plate"),
     ("results/bad.py", "import numpy as np\nnp.load('x', allow_pickle=True)", "allows pickles"),
     *(
         ("board/bad.py", f"import os, pathlib\n{call}", "writes a file by itself: bayesplate.files does")
@@ -310,9 +305,9 @@ BAD_FILES = [
     ),
     ("board/bad.py", "x = eval('1')", "calls eval"),
     ("board/bad.py", "exec('x = 1')", "calls exec"),
-    ("modes/bad.py", "import numpy as np\nnp.random.seed(1)", "uses the global random state: seed"),
-    ("modes/bad.py", "from numpy.random import normal", "uses the global random state: normal"),
-    ("modes/bad.py", "import importlib\nimportlib.import_module('em' + 'cee')", "imports a module of a computed name"),
+    ("plate/bad.py", "import numpy as np\nnp.random.seed(1)", "uses the global random state: seed"),
+    ("plate/bad.py", "from numpy.random import normal", "uses the global random state: normal"),
+    ("plate/bad.py", "import importlib\nimportlib.import_module('em' + 'cee')", "imports a module of a computed name"),
 ]
 
 

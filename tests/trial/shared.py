@@ -22,6 +22,7 @@ from trial.cells import KINDS, SENSORS, UNKNOWN, Setting
 
 from bayesplate.board.board import Board
 from bayesplate.board.material import RIGIDITIES
+from bayesplate.commands.prepare import prepare
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.forms import Form, forms
 from bayesplate.diagnosis.laws import FormLaw, form_law
@@ -33,7 +34,6 @@ from bayesplate.frequencies.laws import ExactLaw
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.posterior.laplace import exact_models
 from bayesplate.posterior.parameters import Parameters
-from bayesplate.workflow.prepare import prepare
 
 Floats = NDArray[np.float64]
 

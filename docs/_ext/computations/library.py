@@ -13,11 +13,12 @@ import bayesplate
 from bayesplate import errors
 from bayesplate.board.setup import CLAMPED_NOISE, DEFAULT_NOISE
 from bayesplate.board.shelf import card_names
-from bayesplate.campaigns import diagnosis as of_campaigns
-from bayesplate.campaigns import evidence, likelihood, population, scatter
-from bayesplate.campaigns.agreement import p_value
-from bayesplate.campaigns.search import OF_TWO
-from bayesplate.campaigns.search import PRIOR as WAYS_BEFORE
+from bayesplate.campaign import diagnosis as of_campaigns
+from bayesplate.campaign import evidence, likelihood, population, scatter
+from bayesplate.campaign.agreement import p_value
+from bayesplate.campaign.search import OF_TWO
+from bayesplate.campaign.search import PRIOR as WAYS_BEFORE
+from bayesplate.commands.prepare import prepare
 from bayesplate.diagnosis.claim import IMPROBABLE, STANDARD_ERRORS
 from bayesplate.diagnosis.folds import NEEDED
 from bayesplate.diagnosis.hypotheses import NONE, ONE, TWO
@@ -32,7 +33,6 @@ from bayesplate.effects.words import joined
 from bayesplate.planning import gains, places
 from bayesplate.posterior.convergence import Gate
 from bayesplate.results import references as cited
-from bayesplate.workflow.prepare import prepare
 from computations.markdown import plain, table, words_table
 from computations.runs import SOURCE
 

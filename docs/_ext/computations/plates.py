@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from bayesplate.board.material import rigidities
+from bayesplate.commands.prepare import prepare
 from bayesplate.estimates.paper import paper_system
 from bayesplate.estimates.percentile import percentile_estimate
-from bayesplate.modes.solve import solve
-from bayesplate.modes.thin import thin_plate
+from bayesplate.plate.solve import solve
+from bayesplate.plate.thin import thin_plate
 from bayesplate.posterior.posing import pose
-from bayesplate.workflow.prepare import prepare
 from computations.markdown import BLUE, GREEN, VERMILLION, empty_figure, figure, signed, table
 from designs import E_X, E_Y, G_XY
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from bayesplate.commands.prepare import prepare
 from bayesplate.diagnosis.signatures import cosine, look_alikes, signatures
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.posing import pose
-from bayesplate.workflow.prepare import prepare
 from commands import bench
 from computations.markdown import BLUE, GREEN, GREY, VERMILLION, empty_figure, figure, plain, signed, table
 from computations.runs import SOURCE

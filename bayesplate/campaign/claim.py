@@ -1,0 +1,124 @@
+"""Whether a shared effect may be claimed: boards left out must be predicted better by what the others teach."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.campaign.agreement import left_out, refusing
+from bayesplate.campaign.boards import Member
+from bayesplate.campaign.learning import Learnt
+from bayesplate.campaign.together import values_of
+from bayesplate.frequencies.laws import cents
+from bayesplate.posterior.draws import Draws
+from bayesplate.posterior.inference import Inference
+from bayesplate.results.contract import Spread
+
+Floats = NDArray[np.float64]
+
+STANDARD_ERRORS = 2.0
+"""By how many of them the boards' scores have to rise in sum."""
+LEAST_GAIN = float(np.log(20.0))
+"""By how much they have to rise in any case: a few boards that gain nearly nothing scatter as little."""
+_N_DRAWS = 4000
+_LINE = 18
+
+
+@dataclass(frozen=True)
+class TaughtBoard:
+    """A board that was left out: what it gives when the others teach it the shared effect.
+
+    Attributes
+    ----------
+    log_score_gain : float
+        ln of the probability of its readings with what the others teach, over that without the effect.
+    before_rms_cents, after_rms_cents : float
+        Error of its labelled modes, its own constants fitted: without the effect, and with the others' effect.
+    p_value : float
+        Of the board against the others.
+    refuses : bool
+    others : dict of Spread
+        The shared numbers as the others teach them.
+    """
+
+    log_score_gain: float
+    before_rms_cents: float
+    after_rms_cents: float
+    p_value: float
+    refuses: bool
+    others: Mapping[str, Spread]
+
+
+@dataclass(frozen=True)
+class SharedClaim:
+    """Whether it may be said that the boards share an effect.
+
+    Attributes
+    ----------
+    gain, standard_error : float
+        Sum over the left-out boards of the gain in log score, and its standard error from their scatter.
+    refused_by : tuple of str
+        Boards that do not want what the others teach.
+    n_better : int
+        Boards whose own score rises.
+    holds : bool
+        Whether the sum rises by more than two standard errors and by ln 20, more than half of the boards gain, and none
+        refuses.
+    """
+
+    gain: float
+    standard_error: float
+    refused_by: tuple[str, ...]
+    n_better: int
+    holds: bool
+
+
+def judge(boards: Mapping[str, TaughtBoard]) -> SharedClaim:
+    """Judge a shared effect by the boards that were left out."""
+    gains = np.array([one.log_score_gain for one in boards.values()])
+    total, error = float(gains.sum()), float(np.sqrt(gains.size) * gains.std(ddof=1))
+    refused = tuple(name for name, one in boards.items() if one.refuses)
+    better = int((gains > 0.0).sum())
+    holds = total > max(STANDARD_ERRORS * error, LEAST_GAIN) and 2 * better > gains.size and not refused
+    return SharedClaim(total, error, refused, better, holds)
+
+
+def taught_boards(learnt: Learnt, before: Mapping[str, Member], seed: int) -> dict[str, TaughtBoard]:
+    """Every board left out in turn.
+
+    Parameters
+    ----------
+    learnt : Learnt
+        With the shared effect.
+    before : dict of Member
+        By board: fitted without the effect, nothing shared.
+    seed : int
+    """
+    refused = refusing(learnt.together)
+    together = learnt.together
+    found = {}
+    for i, one in enumerate(left_out(together)):
+        rng = np.random.default_rng([seed, _LINE, i])
+        without = before[one.name]
+        _, draws = learnt.board_left_out(i, rng, seed)
+        taught = values_of(together.shared, together.taught_draws(rng, _N_DRAWS, (i,)))
+        found[one.name] = TaughtBoard(
+            log_score_gain=one.log_score - without.alone.log_evidence,
+            before_rms_cents=rms_cents(without.inference, without.draws),
+            after_rms_cents=rms_cents(learnt.members[i].inference, draws),
+            p_value=one.p_value,
+            refuses=one.name in refused,
+            others={number.name: Spread.of(taught[number.name], number.unit) for number in together.shared},
+        )
+    return found
+
+
+def rms_cents(inference: Inference, draws: Draws) -> float:
+    """Error of the labelled modes: measured over the posterior mean of the prediction, root of the mean square."""
+    predicted = draws.log_frequency.reshape(-1, draws.log_frequency.shape[-1])
+    measured = np.concatenate([setup.measured for setup in inference.problem.board.setups])
+    residuals = cents(np.log(measured) - np.log(np.exp(predicted).mean(axis=0)))
+    return float(np.sqrt(np.mean(residuals**2)))

@@ -1,0 +1,243 @@
+"""summary.json of a campaign as types: what its boards share, and every board's own summary."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayesplate.board.material import MODULI
+from bayesplate.campaign.agreement import left_out, refusing
+from bayesplate.campaign.boards import Member
+from bayesplate.campaign.common import CommonResidual
+from bayesplate.campaign.learning import ASTRAY, Learnt
+from bayesplate.campaign.population import Population
+from bayesplate.campaign.scatter import scatters_of
+from bayesplate.campaign.together import FEWEST_POINTS, values_of
+from bayesplate.effects.words import joined
+from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
+from bayesplate.results.contract import Elastic, Spread
+from bayesplate.results.summary import SamplerHealth, Summary
+
+FORMAT = 1
+_LINE = 16
+_N_DRAWS = 4000
+
+
+@dataclass(frozen=True)
+class SharedNumber:
+    """A number that all boards have in common, or about which their own scatter.
+
+    Attributes
+    ----------
+    all_boards : Spread, SI
+        Under what all boards teach; where their own scatter, the median of such boards.
+    scatter : Spread or None
+        Standard deviation of the logarithm of the boards' own; None where all have the same.
+    own : dict of Spread
+        By board: from that board alone.
+    others : dict of Spread
+        By board: what all boards but that one say of its own.
+    prior_source : str
+        Where the prior comes from; empty if the boards' cards state it.
+    """
+
+    all_boards: Spread
+    scatter: Spread | None
+    own: Mapping[str, Spread]
+    others: Mapping[str, Spread]
+    prior_source: str
+
+
+@dataclass(frozen=True)
+class LeftOutBoard:
+    """A board when the others teach it what is shared.
+
+    Attributes
+    ----------
+    log_score : float
+        ln of the probability of its readings then.
+    p_value : float
+        Of the board against the others: small where it does not want what they teach.
+    refuses : bool
+        Whether it does not, as many boards as were asked being allowed for.
+    """
+
+    log_score: float
+    p_value: float
+    refuses: bool
+
+
+@dataclass(frozen=True)
+class PopulationSummary:
+    """The distribution of the boards' constants.
+
+    Attributes
+    ----------
+    prior : str
+        Name of the prior card.
+    mean : Elastic of Spread, Pa
+        Median of the population.
+    sd_percent : Elastic of Spread
+        Standard deviation of ln E in the population, per cent.
+    next_board : Elastic of Spread, Pa
+        A board that was not measured yet.
+    boards : dict of Elastic of Spread, Pa
+        Each board's constants under the population.
+    """
+
+    prior: str
+    mean: Elastic[Spread]
+    sd_percent: Elastic[Spread]
+    next_board: Elastic[Spread]
+    boards: Mapping[str, Elastic[Spread]]
+
+
+@dataclass(frozen=True, repr=False)
+class CampaignSummary:
+    """The summary of a converged fit of a campaign.
+
+    Attributes
+    ----------
+    format : int
+    name : str
+        Of the campaign.
+    seed : int
+    versions : dict of str
+    card_sha256 : str
+    converged : bool
+    shared : dict of SharedNumber
+        By name: "attached_mass.mass", "transverse_shear.G_xz / E_x".
+    left_out_boards : dict of LeftOutBoard
+        Empty where nothing is shared.
+    common_residual : dict of CommonResidual
+        By label.
+    population : PopulationSummary or None
+    boards : dict of Summary
+        Each board under what all teach.
+    sampler : SamplerHealth or None
+        Of what is shared; None where nothing is.
+    warnings : tuple of str
+    """
+
+    format: int
+    name: str
+    seed: int
+    versions: Mapping[str, str]
+    card_sha256: str
+    converged: bool
+    shared: Mapping[str, SharedNumber]
+    left_out_boards: Mapping[str, LeftOutBoard]
+    common_residual: Mapping[str, CommonResidual]
+    population: PopulationSummary | None
+    boards: Mapping[str, Summary]
+    sampler: SamplerHealth | None
+    warnings: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        shared = ", ".join(self.shared) or "nothing shared"
+        return f"<CampaignSummary of {self.name}: {len(self.boards)} boards; {shared}>"
+
+
+@dataclass(frozen=True)
+class UnconvergedCampaign:
+    """The summary of a campaign of which something failed the convergence gate: no constants."""
+
+    format: int
+    name: str
+    seed: int
+    versions: Mapping[str, str]
+    card_sha256: str
+    converged: bool
+    warnings: tuple[str, ...]
+
+
+def shared_numbers(learnt: Learnt, seed: int) -> dict[str, SharedNumber]:
+    """What is shared: from all boards, from each alone, and from all but each."""
+    rng = np.random.default_rng([seed, _LINE])
+    together, shared = learnt.together, learnt.together.shared
+    every = values_of(together.coordinates, learnt.chains.kept)
+    scatters = {one.of.name: Spread.of(every[one.name], one.unit) for one in scatters_of(shared)}
+    own = {one.name: _own(one, rng) for one in learnt.members}
+    others = {
+        name: values_of(shared, together.taught_draws(rng, _N_DRAWS, (i,))) for i, name in enumerate(together.names)
+    }
+    return {
+        one.name: SharedNumber(
+            all_boards=Spread.of(every[one.name], one.unit),
+            scatter=scatters.get(one.name),
+            own={board: Spread.of(values[one.name], one.unit) for board, values in own.items()},
+            others={board: Spread.of(values[one.name], one.unit) for board, values in others.items()},
+            prior_source=one.source,
+        )
+        for one in shared
+    }
+
+
+def _own(member: Member, rng: np.random.Generator) -> Mapping[str, np.ndarray]:
+    """The shared numbers at draws of a board's own posterior, the campaign's prior in place of the board's."""
+    picked = rng.choice(len(member.alone.z), size=_N_DRAWS, p=member.alone.weights)
+    return values_of(member.shared, member.alone.z[picked])
+
+
+def left_out_boards(learnt: Learnt) -> dict[str, LeftOutBoard]:
+    """Every board against the others."""
+    refused = refusing(learnt.together)
+    return {
+        one.name: LeftOutBoard(one.log_score, one.p_value, one.name in refused) for one in left_out(learnt.together)
+    }
+
+
+def population_summary(population: Population, prior: str, seed: int) -> PopulationSummary:
+    """What a summary says of a population."""
+    rng = np.random.default_rng([seed, _LINE, 1])
+    next_board = population.next_board(rng)
+    return PopulationSummary(
+        prior=prior,
+        mean=_by_constant(np.exp(population.means), "Pa"),
+        sd_percent=_by_constant(100.0 * population.sds, "%"),
+        next_board=_by_constant(np.exp(next_board), "Pa"),
+        boards={
+            one.name: _by_constant(np.exp(population.pooled(i, rng)), "Pa") for i, one in enumerate(population.boards)
+        },
+    )
+
+
+def _by_constant(values: np.ndarray, unit: str) -> Elastic[Spread]:
+    return Elastic(**{name: Spread.of(column, unit) for name, column in zip(MODULI, values.T, strict=True)})
+
+
+def learning_warnings(learnt: Learnt, effective: Mapping[str, float]) -> tuple[str, ...]:
+    """What a reader of the shared numbers must know, a sentence each.
+
+    Parameters
+    ----------
+    learnt : Learnt
+    effective : dict of float
+        By board: draws of equal weight that its posterior under all boards rests on.
+    """
+    told = []
+    refused = refusing(learnt.together)
+    if refused:
+        boards = "board" if len(refused) == 1 else "boards"
+        same = "so little scatter" if scatters_of(learnt.together.shared) else "one value for all"
+        told.append(
+            f"{boards} {joined(refused)} {'does' if len(refused) == 1 else 'do'} not want what the others teach: "
+            f"{same} is not what these boards say"
+        )
+    if learnt.together.fewest_points < FEWEST_POINTS:
+        told.append(
+            f"what all boards, or all but one, find likely rests on {learnt.together.fewest_points:.0f} points only: "
+            "the shared intervals are rough"
+        )
+    astray = [name for name, off in zip(learnt.together.names, learnt.astray, strict=True) if off > ASTRAY]
+    if astray:
+        told.append(
+            f"what {joined(astray)} {'says' if len(astray) == 1 else 'say'} of the shared numbers is no polynomial of "
+            f"low order in them: the shared means may be off by {max(learnt.astray):.1f} standard deviations"
+        )
+    poor = [name for name, one in effective.items() if one < FEWEST_WEIGHTED_DRAWS]
+    if poor:
+        told.append(f"few draws of {joined(poor)} stand for what all boards teach: their own intervals are rough")
+    return tuple(told)

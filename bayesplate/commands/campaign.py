@@ -1,0 +1,191 @@
+"""A campaign as a problem of inference: its boards as problems, and what they share; every fault of all at once."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from bayesplate.board.campaign import CampaignCard, is_campaign, load_campaign
+from bayesplate.board.checks import readings_sha256
+from bayesplate.board.prior import PriorCard, load_prior
+from bayesplate.campaign.population import require_moduli
+from bayesplate.campaign.shared import Shared, shared_by
+from bayesplate.commands.arguments import require_arguments
+from bayesplate.commands.prepare import Card, Prepared, prepare
+from bayesplate.commands.problem import Problem, as_problem
+from bayesplate.errors import Fault, InputError, NotIdentifiableError
+from bayesplate.frequencies.laws import LawName
+
+CampaignPath = str | os.PathLike[str]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Campaign:
+    """Boards that are fitted together: `bayesplate.fit(campaign)`.
+
+    Attributes
+    ----------
+    card : CampaignCard
+    problems : tuple of Problem
+        One per board, the shared effects declared.
+    shared : tuple of Shared
+        What the boards have in common, none for boards that are fitted side by side.
+    population : PriorCard or None
+        What is believed of the distribution of their constants, where they share one.
+    """
+
+    card: CampaignCard
+    problems: tuple[Problem, ...]
+    shared: tuple[Shared, ...]
+    population: PriorCard | None
+
+    @classmethod
+    def from_card(
+        cls,
+        card: CampaignPath,
+        effects: Sequence[str] | None = None,
+        law: LawName | None = None,
+        robust: bool = False,
+    ) -> Campaign:
+        """The campaign of a card.
+
+        Parameters
+        ----------
+        card : str or path
+            Name of a shipped campaign card, or a path.
+        effects : sequence of str, optional
+            Declared effects of every board in place of those of its card and of the campaign's; the shared ones are
+            declared in any case.
+        law : "linear" or "exact", optional
+            By default each board's own choice.
+        robust : bool
+            Student's distribution for the noise.
+
+        Returns
+        -------
+        Campaign
+
+        Raises
+        ------
+        InputError
+            With every fault of the card; if there is none, with those of all boards; if there is none, with what cannot
+            be shared.
+        """
+        require_arguments(card=card, effects=effects, law=law, robust=robust)
+        read = load_campaign(card)
+        prepared, population = _prepared(read, effects)
+        shared = shared_by(read, [one.board for one in prepared])
+        return cls(read, tuple(Problem(one, law, robust) for one in prepared), shared, population)
+
+    @property
+    def name(self) -> str:
+        """Of the campaign."""
+        return self.card.name
+
+    def pose(self) -> None:
+        """Solve every board around its estimate, so that what cannot be fitted is known before anything is sampled.
+
+        Raises
+        ------
+        NotIdentifiableError
+            With every board that leaves a constant open.
+        """
+        told = []
+        for problem in self.problems:
+            try:
+                _ = problem.posed
+            except NotIdentifiableError as error:
+                told.append(f"{problem.board.name}: {error}")
+        if told:
+            raise NotIdentifiableError("\n".join(told))
+
+    def __repr__(self) -> str:
+        shared = ", ".join(one.name for one in self.shared) or "nothing shared"
+        return f"<Campaign {self.name}: {len(self.problems)} boards; {shared}>"
+
+
+def problem_or_campaign(
+    given: Problem | Card | Campaign,
+    *,
+    effects: Sequence[str] | None = None,
+    law: LawName | None = None,
+    robust: bool = False,
+    setup: str | os.PathLike[str] | None = None,
+) -> Problem | Campaign:
+    """What a command was given, as a problem or as a campaign.
+
+    Parameters
+    ----------
+    given : Problem, str, path, Board or Campaign
+    effects, law, robust, setup
+        As of `Problem.from_card`, setup for a board only; of a problem or a campaign that is there already they may
+        not be given.
+
+    Raises
+    ------
+    InputError
+        As `Problem.from_card` and `Campaign.from_card`; also if a campaign is given beside what it states itself.
+    """
+    is_card = isinstance(given, str | os.PathLike) and is_campaign(given)
+    if setup is not None and (is_card or isinstance(given, Campaign)):
+        raise InputError(Fault("setup", "a board, whose setup it completes", "a campaign", "give it to each board"))
+    if isinstance(given, Campaign):
+        if effects is not None or law is not None or robust:
+            wanted, remedy = "nothing beside a Campaign", "Campaign.from_card takes it"
+            raise InputError(Fault("effects, law, robust", wanted, "a value", remedy))
+        return given
+    if is_card and isinstance(given, str | os.PathLike):
+        return Campaign.from_card(given, effects, law, robust)
+    return as_problem(given, effects=effects, law=law, robust=robust, setup=setup)
+
+
+def _prepared(card: CampaignCard, effects: Sequence[str] | None) -> tuple[list[Prepared], PriorCard | None]:
+    """Every board with the effects that the campaign declares or shares, and the prior of the population."""
+    file = card.path.name
+    declared = [*(card.effects if effects is None else ()), *(one.effect for one in card.shared)]
+    faults: list[Fault] = []
+    boards: list[Prepared] = []
+    for number, board in enumerate(card.boards, start=1):
+        try:
+            alone = prepare(card.board_path(board), effects)
+            every = tuple(dict.fromkeys((*alone.board.effects, *declared)))
+            boards.append(alone.with_effects(every) if declared else alone)
+        except InputError as error:
+            faults += [replace(fault, place=f"{file} boards {number} -> {fault.place}") for fault in error.faults]
+    names = [one.board.name.casefold() for one in boards]
+    faults += [
+        Fault(f"{file} boards", "boards with names of their own", f"{one.board.name} again")
+        for i, one in enumerate(boards)
+        if one.board.name.casefold() in names[:i]
+    ]
+    read = [readings_sha256(one.card) for one in boards]
+    faults += [
+        Fault(
+            f"{file} boards",
+            "each board once",
+            f"{one.board.name} with every reading of {boards[read.index(read[i])].board.name}",
+            "a board and its copy would count twice",
+        )
+        for i, one in enumerate(boards)
+        if read[i] in read[:i] and one.board.name.casefold() not in names[:i]
+    ]
+    population = None
+    if card.population is not None:
+        place = f"{file} [population] prior"
+        try:
+            population = load_prior(card.population.prior, Path(card.path).parent)
+            require_moduli(population, place)
+            alike = [one.board.name for one in boards if one.board.isotropic]
+            if alike:
+                remedy = "leave [population] out, or those boards"
+                got = f"{', '.join(alike)}, whose E_y and G_xy follow from E_x"
+                raise InputError(Fault(place, "boards of three constants", got, remedy))
+        except InputError as error:
+            known = [fault if fault.place == place else replace(fault, place=f"{place} -> {fault.place}")
+                     for fault in error.faults]  # fmt: skip
+            faults += known
+    if faults:
+        raise InputError(faults)
+    return boards, population

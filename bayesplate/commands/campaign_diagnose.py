@@ -1,0 +1,285 @@
+"""`diagnose` of a campaign: what its boards lack in common, judged by boards that were left out."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+from bayesplate.board.campaign import SharedSection
+from bayesplate.campaign.boards import Member
+from bayesplate.campaign.claim import SharedClaim, TaughtBoard, judge, taught_boards
+from bayesplate.campaign.common import common_residuals
+from bayesplate.campaign.diagnosis import (
+    FORMAT,
+    IMPROBABLE,
+    CampaignDiagnosis,
+    PooledErrors,
+    named,
+    next_step,
+    pooled_rms,
+)
+from bayesplate.campaign.search import Explanation, explanations, search_board, shown
+from bayesplate.campaign.shared import shared_by
+from bayesplate.campaign.summary import CampaignSummary
+from bayesplate.commands.campaign import Campaign
+from bayesplate.commands.campaign_fit import (
+    boards_of,
+    fit_boards,
+    fitted_together,
+    open_folder,
+    summed_up,
+    telling_failure,
+)
+from bayesplate.commands.campaign_result import CampaignFitResult, write_campaign_pages
+from bayesplate.commands.fit import write_fit
+from bayesplate.commands.fitting import Fitted
+from bayesplate.commands.shown import show_diagnosis
+from bayesplate.commands.stages import Stages
+from bayesplate.diagnosis.baseline import baseline_of
+from bayesplate.diagnosis.forms import forms
+from bayesplate.effects import EFFECTS
+from bayesplate.errors import InputError
+from bayesplate.files import make_folder, write_text
+from bayesplate.posterior.sampling import Progress
+from bayesplate.report.plots import CampaignPlots
+from bayesplate.results.contract import as_json, json_text
+from bayesplate.results.folder import BEFORE, DIAGNOSIS, OutputFolder
+
+_FIT, _SEARCH, _SHARED = 3.0, 2.0, 1.0
+"""How long the parts take beside each other."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CampaignDiagnoseResult:
+    """What a diagnosis of a campaign leaves.
+
+    Attributes
+    ----------
+    folder : Path or None
+        Where its files are; None if none were asked for.
+    diagnosis : CampaignDiagnosis
+    before : dict of Fitted
+        By board: without what is shared.
+    after : CampaignFitResult
+        With it; boards side by side where nothing is shared.
+    """
+
+    folder: Path | None
+    diagnosis: CampaignDiagnosis
+    before: Mapping[str, Fitted]
+    after: CampaignFitResult
+
+    @property
+    def summary(self) -> CampaignSummary:
+        """The summary of the model that the diagnosis ends with."""
+        return self.after.summary
+
+    @cached_property
+    def plot(self) -> CampaignPlots:
+        """The figures: `found.plot.left_out()`."""
+        return CampaignPlots(self.after.summary, self.diagnosis)
+
+    def to_arviz(self) -> Any:
+        """The draws of what is shared, as of `CampaignFitResult.to_arviz`."""
+        return self.after.to_arviz()
+
+    def to_json(self) -> dict[str, Any]:
+        """The content of diagnosis.json."""
+        content: dict[str, Any] = as_json(self.diagnosis)
+        return content
+
+    def _repr_html_(self) -> str:
+        """The verdict and its tables as a notebook shows them."""
+        return show_diagnosis(self.diagnosis).html(self.diagnosis.name)
+
+    def __repr__(self) -> str:
+        one = self.diagnosis
+        told = ", ".join(one.effects) or "nothing"
+        claim = "claimed" if one.claim else "not claimed"
+        return f"<CampaignDiagnoseResult of {one.name}: {one.verdict}, {told} shared, {claim}>"
+
+
+def diagnose_campaign(
+    campaign: Campaign,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    report: bool = True,
+    seed: int = 1,
+    force: bool = False,
+    resume: bool = False,
+    progress: Callable[[Progress], None] | None = None,
+) -> CampaignDiagnoseResult:
+    """Diagnose a campaign; `bayesplate.diagnose` says what the arguments mean and what is raised.
+
+    Where the card names what is shared, that is judged: each board by what the others teach it, against the same boards
+    without it. Otherwise every effect that boards may have alike is tried, and the one that stands out is judged so.
+    """
+    folder = None if out is None else OutputFolder(Path(out))
+    if folder is not None:
+        folder.require_usable(force=force, resume=resume)
+    alone = _without_shared(campaign)
+    n = len(campaign.problems)
+    stages = Stages(progress, n * (2.0 * _FIT + (0.0 if campaign.shared else _SEARCH)) + _SHARED)
+    alone.pose()
+    campaign.pose()
+    if folder is not None:
+        open_folder(folder, resume=resume)
+    with telling_failure(folder, campaign, seed):
+        found = _diagnosed(campaign, alone, None if folder is None else folder.checkpoint, seed, stages)
+    if folder is not None:
+        found = replace(found, folder=folder.path)
+        for name, one in found.before.items():
+            make_folder(folder.path / BEFORE / name)
+            write_fit(folder.path / BEFORE / name, one)
+        found.after.write(folder.path)
+        write_text(folder.path / DIAGNOSIS, json_text(found.diagnosis))
+        if report:
+            write_campaign_pages(folder.path, found.after, found.diagnosis)
+        folder.close()
+    return found
+
+
+def _diagnosed(
+    campaign: Campaign, alone: Campaign, checkpoints: Path | None, seed: int, stages: Stages
+) -> CampaignDiagnoseResult:
+    """The diagnosis of a campaign whose boards can be fitted, nothing written but checkpoints."""
+    could_share = () if campaign.shared else shareable(campaign)
+    before = fit_boards(alone, seed, None if checkpoints is None else checkpoints / BEFORE, stages)
+    if campaign.shared:
+        verdict, reason = "named", "the card names what the boards share"
+        effects = tuple(dict.fromkeys(one.effect for one in campaign.shared))
+        searched: tuple[Explanation, ...] = ()
+        with_shared = campaign
+    else:
+        searched = _searched(before, could_share, stages)
+        verdict, effects, reason = named(searched) if searched else ("none needed", (), "no effect could be shared")
+        with_shared = _sharing(campaign, searched[0].effects if effects else ())
+    if with_shared.shared:
+        after = fitted_together(with_shared, seed, checkpoints, stages)
+    else:
+        after = summed_up(with_shared, before, before, None, (), seed)
+    taught: Mapping[str, TaughtBoard] = {}
+    claim: SharedClaim | None = None
+    if after.learnt is not None:
+        members = {name: Member(one.inference, one.draws, ()) for name, one in before.items()}
+        taught = taught_boards(after.learnt, members, seed)
+        claim = judge(taught)
+    diagnosis = _diagnosis(campaign, verdict, effects, reason, searched, taught, claim, before, after, seed)
+    return CampaignDiagnoseResult(None, diagnosis, before, after)
+
+
+def _without_shared(campaign: Campaign) -> Campaign:
+    """The same boards side by side, without what they share."""
+    names = {one.effect for one in campaign.shared}
+    if not names:
+        return campaign
+    problems = tuple(
+        replace(one, prepared=one.prepared.with_effects([e for e in one.prepared.board.effects if e not in names]))
+        for one in campaign.problems
+    )
+    return replace(campaign, problems=problems, shared=())
+
+
+def _sharing(campaign: Campaign, effects: Sequence[str]) -> Campaign:
+    """The same boards with effects that they share: as ratios where an effect has such a thing."""
+    if not effects:
+        return campaign
+    problems = tuple(
+        replace(one, prepared=one.prepared.with_effects((*one.prepared.board.effects, *effects)))
+        for one in campaign.problems
+    )
+    ways = {name: "ratio" if EFFECTS[name].ratios else "value" for name in effects}
+    sections = tuple(SharedSection.model_validate({"effect": name, "as": way}) for name, way in ways.items())
+    card = campaign.card.model_copy(update={"shared": sections})
+    return replace(campaign, problems=problems, shared=shared_by(card, [one.prepared.board for one in problems]))
+
+
+def shareable(campaign: Campaign) -> tuple[tuple[str, ...], ...]:
+    """Effects that all boards may have, of one size each, and that boards of one rig, day or species may have alike.
+
+    Single ones, then pairs.
+    """
+    can_act = set.intersection(*(set(forms(one.prepared.board)) for one in campaign.problems))
+    able = [name for name, effect in EFFECTS.items() if effect.is_of_campaign and name in can_act]
+    single = [name for name in able if _has_one_size(campaign, (name,))]
+    pairs = (pair for pair in combinations(single, 2) if _has_one_size(campaign, pair))
+    return (*((name,) for name in single), *pairs)
+
+
+def _has_one_size(campaign: Campaign, effects: Sequence[str]) -> bool:
+    """Whether a fit could share these effects, and no board has one size of them per setup."""
+    try:
+        sharing = _sharing(campaign, effects)
+    except InputError:
+        return False
+    boards = [one.prepared.board for one in sharing.problems]
+    return all(len(one.parameters(board)) == 1 for one in sharing.shared for board in boards)
+
+
+def _searched(
+    before: Mapping[str, Fitted], effects: Sequence[tuple[str, ...]], stages: Stages
+) -> tuple[Explanation, ...]:
+    """What every board's tables say together."""
+    if not effects:
+        return ()
+    tried = [name for name, *others in effects if not others]
+    searches = []
+    for name, one in before.items():
+        stages.begin(f"search on board {name}", _SEARCH)
+        searches.append(search_board(name, baseline_of(one.inference.problem), tried, stages.reached))
+    return explanations(searches, shown(searches, effects))
+
+
+def _diagnosis(
+    campaign: Campaign,
+    verdict: str,
+    effects: tuple[str, ...],
+    reason: str,
+    searched: tuple[Explanation, ...],
+    taught: Mapping[str, TaughtBoard],
+    claim: SharedClaim | None,
+    before: Mapping[str, Fitted],
+    after: CampaignFitResult,
+    seed: int,
+) -> CampaignDiagnosis:
+    none = next((one.probability for one in searched if one.way == "none"), None)
+    counts = {name: len(one.summary.modes) for name, one in before.items()}
+    errors_before = {name: one.summary.error.in_sample_rms_cents for name, one in before.items()}
+    errors_after = {name: one.error.in_sample_rms_cents for name, one in after.summary.boards.items()}
+    pooled_before, pooled_after = pooled_rms(errors_before, counts), pooled_rms(errors_after, counts)
+    left_before = pooled_rms({n: t.before_rms_cents for n, t in taught.items()}, counts) if taught else pooled_before
+    left_after = pooled_rms({n: t.after_rms_cents for n, t in taught.items()}, counts) if taught else pooled_after
+    holds = claim is not None and claim.holds and verdict == "named" and (none is None or none < IMPROBABLE)
+    return CampaignDiagnosis(
+        format=FORMAT,
+        name=campaign.name,
+        seed=seed,
+        card_sha256=campaign.card.sha256,
+        verdict=verdict,
+        claim=holds,
+        effects=effects,
+        declared=bool(campaign.shared),
+        reason=reason,
+        explanations=searched,
+        probability_of_none=none,
+        conditions=claim,
+        left_out_boards=taught,
+        before=PooledErrors(pooled_before, left_before),
+        after=PooledErrors(pooled_after, left_after),
+        common_residual=after.summary.common_residual,
+        common_residual_before=common_residuals({name: one.summary for name, one in before.items()}, boards_of(before)),
+        recommendation=next_step(
+            after.summary.common_residual,
+            claim,
+            len(before),
+            is_declared=bool(campaign.shared),
+            verdict=verdict,
+            explanations=searched,
+        ),
+        notes=after.summary.warnings,
+    )

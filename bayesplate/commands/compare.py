@@ -1,0 +1,208 @@
+"""`compare`: every method side by side, on the thin and on the shear-flexible plate; nothing is written unasked."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, get_args
+
+from bayesplate.commands.arguments import require_arguments
+from bayesplate.commands.check import expected_sd
+from bayesplate.commands.fitting import not_converged
+from bayesplate.commands.one_thread import one_thread_each
+from bayesplate.commands.prepare import Card
+from bayesplate.commands.problem import Problem, as_problem
+from bayesplate.commands.shown import show_compare
+from bayesplate.effects import EFFECTS
+from bayesplate.estimates.coefficients import CoefficientSource, named_table
+from bayesplate.estimates.leave_one_out import CarryingMode, united
+from bayesplate.estimates.paper import paper_system
+from bayesplate.files import make_folder, require_new, write_text
+from bayesplate.frequencies.laws import LawName
+from bayesplate.posterior.draws import Draws
+from bayesplate.posterior.inference import Inference, infer
+from bayesplate.posterior.likely_labels import with_likely_labels
+from bayesplate.posterior.methods import Method, point_methods, posterior_method
+from bayesplate.posterior.mode_errors import carried_in_fit, mode_errors
+from bayesplate.posterior.posing import PosedProblem, pose
+from bayesplate.posterior.reweighting import law_weights
+from bayesplate.posterior.sampling import Progress, SamplerSettings
+from bayesplate.posterior.statistics import effective_draws
+from bayesplate.report.plots import ComparePlots
+from bayesplate.results.archive import posterior_tree, to_arviz
+from bayesplate.results.comparison import FORMAT, Comparison, TheoryRow, better_theory, judged_alike, theory_row
+from bayesplate.results.contract import NOT_IN_JSON, json_text
+from bayesplate.results.summary import versions
+
+COMPARISON = "compare.json"
+FEWEST_DRAWS = 1000
+"""With fewer effective draws left by the weights, the other law is sampled itself."""
+
+_SHEAR = tuple(name for name, effect in EFFECTS.items() if effect.theory == "shear-flexible")
+"""Effects that make the plate shear-flexible."""
+Tell = Callable[[Progress], None] | None
+
+
+@dataclass(frozen=True, repr=False)
+class CompareResult(Comparison):
+    """What a comparison leaves: all of `Comparison`, and the draws behind it.
+
+    Attributes
+    ----------
+    sampled : dict of (Inference, Draws)
+        The posterior under the exact law, by theory of the plate.
+    """
+
+    sampled: Mapping[str, tuple[Inference, Draws]] = field(metadata=NOT_IN_JSON, compare=False)
+
+    @property
+    def summary(self) -> Comparison:
+        """What compare.json holds: the comparison itself."""
+        return self
+
+    @property
+    def plot(self) -> ComparePlots:
+        """The figures: `comparison.plot.corner("thin")`."""
+        return ComparePlots({theory: draws for theory, (_, draws) in self.sampled.items()})
+
+    def to_arviz(self) -> dict[str, Any]:
+        """The posterior of each theory as of `bayesplate.FitResult.to_arviz`: what `arviz.compare` takes.
+
+        Returns
+        -------
+        dict of arviz.InferenceData or xarray.DataTree
+        """
+        about = {"seed": str(self.seed), "prior": self.prior, "card_sha256": self.card_sha256}
+        return {
+            theory: to_arviz(posterior_tree(inference, draws, about | {"theory": theory}))
+            for theory, (inference, draws) in self.sampled.items()
+        }
+
+    def __repr__(self) -> str:
+        return super().__repr__().replace("<Comparison", "<CompareResult", 1)
+
+    def _repr_html_(self) -> str:
+        """The tables as a notebook shows them."""
+        return show_compare(self).html(f"{self.name}: every method side by side")
+
+
+@one_thread_each()
+def compare(
+    card: Problem | Card,
+    *,
+    coefficients: CoefficientSource | None = None,
+    seed: int = 1,
+    effects: Sequence[str] | None = None,
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    progress: Tell = None,
+) -> CompareResult:
+    """Compare all methods on a board, as a thin and as a shear-flexible plate.
+
+    Parameters
+    ----------
+    card : Problem, str, path or Board
+        A problem, the name of a shipped board card, the path of a card, or a board made in Python. Both frequency laws
+        are compared whatever the law of a problem.
+    coefficients : "sensitivity", "training" or "published", optional
+        Source of the coefficients of the paper's least squares and percentile method; by default the published table
+        where the card names one, else the sensitivity of one solve.
+    seed : int
+        Everything random follows from it.
+    effects : sequence of str, optional
+        Declared effects in place of the card's. Transverse shear is left out of the thin plate and added to the other;
+        its moduli are the card's, or the effect's own prior.
+    out : path, optional
+        Folder for compare.json; nothing is written without it.
+    force : bool
+        Replace a compare.json that is there.
+    progress : callable, optional
+        Told after every chunk of sampling.
+
+    Returns
+    -------
+    CompareResult
+
+    Raises
+    ------
+    InputError
+        If the card, the table or the folder cannot be used; then nothing is written.
+    NotIdentifiableError
+        If the data leave a constant open.
+    NotConvergedError
+        If the sampler fails its gate.
+    """
+    require_arguments(
+        card=card, coefficients=coefficients, seed=seed, effects=effects, out=out, force=force, progress=progress
+    )
+    files = require_new(Path(out), [COMPARISON], force=force) if out is not None else ()
+    given = as_problem(card, effects=effects)
+    others = [name for name in given.prepared.board.effects if name not in _SHEAR]
+    asked = [others, [*others, *_SHEAR]]
+    prepared = [given.prepared.with_effects(names) for names in asked]
+    if coefficients == "published":
+        board = prepared[0].board
+        for setup in board.setups:
+            named_table(board.name, setup)
+    problems = [pose(one.board, one.prior, robust=given.robust).under("exact") for one in prepared]
+    for problem in problems:  # what cannot be used is told before anything is sampled
+        paper_system(problem.board, problem.estimate, coefficients, compared=False)
+    theories: list[TheoryRow] = []
+    carrying: list[CarryingMode] = []
+    sampled: dict[str, tuple[Inference, Draws]] = {}
+    for problem in problems:
+        posteriors, inference, draws = _posteriors(problem, SamplerSettings(seed=seed), progress)
+        labelled = inference.problem  # as the draws label its peaks: all methods are held against the same readings
+        system = paper_system(labelled.board, labelled.estimate, coefficients)
+        methods = [*point_methods(labelled, system, expected_sd(labelled)), *posteriors]
+        errors = mode_errors(inference, draws)
+        theories.append(theory_row(labelled, system, methods, errors))
+        carrying += carried_in_fit(inference, errors)
+        sampled[theories[-1].theory] = inference, draws
+    carrying_any = united(carrying)
+    alike = judged_alike(theories, carrying_any)
+    result = CompareResult(
+        format=FORMAT,
+        name=problems[0].board.name,
+        seed=seed,
+        versions=versions(),
+        card_sha256=prepared[0].card.sha256,
+        prior=problems[0].prior.name,
+        theories=alike,
+        verdict=better_theory(*alike),
+        carrying_modes=carrying_any,
+        sampled=sampled,
+    )
+    for path in files:
+        make_folder(path.parent)
+        write_text(path, json_text(result))
+    return result
+
+
+def _posteriors(
+    problem: PosedProblem, settings: SamplerSettings, progress: Tell
+) -> tuple[list[Method], Inference, Draws]:
+    """The posteriors of both laws: the wider, exact one sampled, the linear one by weights where these leave enough.
+
+    Of the problem as the exact draws label its peaks.
+    """
+    inference, draws = _sampled(problem, settings, progress)
+    problem = inference.problem
+    methods = []
+    for law in get_args(LawName):
+        weights = law_weights(inference, draws, law)
+        if effective_draws(weights) >= FEWEST_DRAWS:
+            methods.append(posterior_method(f"{law}_posterior", problem, draws, weights))
+        else:
+            own, own_draws = _sampled(problem.under(law), settings, progress)
+            methods.append(posterior_method(f"{law}_posterior", problem, own_draws, law_weights(own, own_draws, law)))
+    return methods, inference, draws
+
+
+def _sampled(problem: PosedProblem, settings: SamplerSettings, progress: Tell) -> tuple[Inference, Draws]:
+    inference = infer(problem, settings, progress=progress)
+    if not inference.convergence.passed:
+        raise not_converged(inference.convergence, problem.doubts, so="nothing is compared")
+    return with_likely_labels(inference, settings.seed)

@@ -1,0 +1,105 @@
+"""`fit_board`: a board, a prior and a request to the summary of its fit; pure, so that any process may compute it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bayesplate.board.board import Board
+from bayesplate.board.coefficients import CoefficientCard
+from bayesplate.board.named import NamedCards
+from bayesplate.board.prior import PriorCard
+from bayesplate.commands.arguments import require_arguments
+from bayesplate.commands.fit import fit
+from bayesplate.commands.fitting import fitted
+from bayesplate.commands.one_thread import one_thread_each
+from bayesplate.commands.prepare import Prepared, prepare, prepared_card
+from bayesplate.commands.problem import Problem
+from bayesplate.errors import Fault, NotConvergedError
+from bayesplate.frequencies.laws import LawName
+from bayesplate.posterior.inference import Inference
+from bayesplate.results.summary import Summary
+
+
+@dataclass(frozen=True)
+class FitRequest:
+    """What is asked of a fit besides its board and its prior.
+
+    Attributes
+    ----------
+    seed : int
+        Everything random follows from it.
+    effects : tuple of str or None
+        Declared effects in place of the card's.
+    law : "linear", "exact" or None
+        None: the linear law where it is good enough.
+    robust : bool
+        Student's distribution for the noise.
+    tables : dict of CoefficientCard
+        The published coefficients that the setups of a card name, by setup.
+    """
+
+    seed: int = 1
+    effects: tuple[str, ...] | None = None
+    law: LawName | None = None
+    robust: bool = False
+    tables: Mapping[str, CoefficientCard] = field(default_factory=dict)
+
+
+@one_thread_each()
+def fit_board(board: Board, prior: PriorCard, request: FitRequest | None = None) -> Summary:
+    """Fit one board; nothing is read, written or remembered, and the same arguments give the same bytes anywhere.
+
+    Parameters
+    ----------
+    board : Board
+        Made in Python, or read from a card.
+    prior : PriorCard
+        Of its constants.
+    request : FitRequest, optional
+
+    Returns
+    -------
+    Summary
+        That of `fit` with the same seed.
+
+    Raises
+    ------
+    InputError, NotIdentifiableError, NotConvergedError
+        As of `fit`.
+    """
+    request = FitRequest() if request is None else request
+    require_arguments(board=board, prior_card=prior, request=request)
+    return fitted(_problem(board, prior, request), request.seed, None, _refuse).summary
+
+
+def fit_board_into(folder: Path, report: bool, board: Board, prior: PriorCard, request: FitRequest) -> Summary:
+    """The same with the files of a fit in a folder, in place of what is there; raises as `fit`."""
+    done = fit(_problem(board, prior, request), out=folder, report=report, seed=request.seed, force=True)
+    return done.summary  # type: ignore[return-value]  # a problem is no campaign
+
+
+def _problem(board: Board, prior: PriorCard, request: FitRequest) -> Problem:
+    return Problem(_prepared(board, prior, request), request.law, request.robust)
+
+
+def _prepared(board: Board, prior: PriorCard, request: FitRequest) -> Prepared:
+    if board.card is None or board != Board.from_card(board.card):
+        return prepare(board, request.effects, prior=prior)
+    lacking = tuple(
+        Fault(
+            f"request tables {setup.name}",
+            "the published coefficients that the card names",
+            "none",
+            f'tables={{"{setup.name}": ...}} of the FitRequest',
+        )
+        for setup in board.setups
+        if setup.table_name and setup.name not in request.tables
+    )
+    return prepared_card(board, NamedCards(prior, request.tables, lacking), request.effects)
+
+
+def _refuse(inference: Inference) -> None:
+    reasons = "\n".join(inference.convergence.reasons)
+    raise NotConvergedError(f"the sampler did not converge, so no constants are given:\n{reasons}")

@@ -1,0 +1,185 @@
+"""`modes`: the lowest modes of a board, as a table and as a sheet of Chladni figures to print."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from bayesplate.board.board import Board, Values
+from bayesplate.commands.arguments import require_arguments
+from bayesplate.commands.one_thread import one_thread_each
+from bayesplate.commands.prepare import Card, Prepared, prepare
+from bayesplate.commands.problem import Problem, as_problem
+from bayesplate.commands.shown import show_modes
+from bayesplate.errors import NotIdentifiableError
+from bayesplate.estimates.identifiability import identifiability, require_identifiable, require_labels
+from bayesplate.estimates.least_squares import weighted_least_squares
+from bayesplate.estimates.sheet import NUMBERS_OF_MODES, Precision, Sheet, sheet
+from bayesplate.files import make_folder, require_new
+from bayesplate.frequencies.prior_bands import prior_bands, prior_medians
+from bayesplate.frequencies.spectrum import spectrum
+from bayesplate.frequencies.system import system_of
+from bayesplate.posterior.first_labels import probable_ways
+from bayesplate.posterior.laplace import noise_widenings
+from bayesplate.report.plots import ModesPlots
+from bayesplate.results.sheets import ModesReport, proposed_labels, sheet_report
+
+_AT_ESTIMATE = "at the weighted least-squares estimate"
+_AT_PROPOSED = "at the weighted least-squares estimate with the labels proposed"
+_AT_PRIOR = "at the median of the prior"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ModesResult:
+    """What `modes` leaves.
+
+    Attributes
+    ----------
+    summary : ModesReport
+        Frequencies, energy shares, the paper's coefficients.
+    sheets : tuple of Sheet
+        The same with the shapes of the modes, one per setup.
+    files : tuple of Path
+        Those that were written.
+    """
+
+    summary: ModesReport
+    sheets: tuple[Sheet, ...]
+    files: tuple[Path, ...]
+
+    @property
+    def plot(self) -> ModesPlots:
+        """The sheets of Chladni figures: `result.plot.modes()`."""
+        return ModesPlots(self.sheets)
+
+    def __repr__(self) -> str:
+        return repr(self.summary).replace("<ModesReport", "<ModesResult", 1)
+
+    def _repr_html_(self) -> str:
+        """The table as a notebook shows it."""
+        return show_modes(self.summary).html(self.summary.title or self.summary.name)
+
+
+@one_thread_each()
+def modes(
+    card: Problem | Card,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    effects: Sequence[str] | None = None,
+    setup: str | os.PathLike[str] | None = None,
+    seed: int = 1,
+    force: bool = False,
+) -> ModesResult:
+    """Compute the lowest modes of a board and draw them.
+
+    Parameters
+    ----------
+    card : Problem, str, path or Board
+        A problem, the name of a shipped board card, the path of a card, or a board made in Python. A card or a board
+        may be without frequencies: then the modes are those of the prior's median, with the range in which the prior
+        expects each. Modes that were not measured have the range that the measured ones foretell. Peaks alone,
+        without a label, are given the most probable labels.
+    out : path, optional
+        Folder of modes.png and modes.svg (modes-SETUP.png where there are several setups); nothing is written without
+        it.
+    effects : sequence of str, optional
+        Declared effects in place of the card's.
+    setup : path, optional
+        A file with a table [setup] that takes the place of the card's, key by key: what `pick` writes.
+    seed : int
+        Of the draws from the prior.
+    force : bool
+        Replace sheets that are there.
+
+    Returns
+    -------
+    ModesResult
+
+    Raises
+    ------
+    InputError
+        If the card or the folder cannot be used; then nothing is written.
+    """
+    require_arguments(card=card, out=out, effects=effects, setup=setup, seed=seed, force=force)
+    prepared = _prepared(card, effects, setup)
+    board = prepared.board
+    stems = ["modes"] if len(board.setups) == 1 else [f"modes-{setup.name}" for setup in board.setups]
+    names = [f"{stem}.{ending}" for stem in stems for ending in ("png", "svg")]
+    files = () if out is None else require_new(Path(out), names, force=force)
+    rng = np.random.default_rng(seed)
+    ways = probable_ways(board, prepared.prior)
+    if ways:
+        prepared = replace(prepared, board=ways[0][0].board)
+    values, precision, why = _constants(prepared)
+    basis = _AT_PRIOR if precision is None else _AT_PROPOSED if ways else _AT_ESTIMATE
+    sheets = tuple(_sheets(prepared, values, precision, rng, basis))
+    if out is not None:
+        _draw(sheets, Path(out), files)
+    report = ModesReport(
+        name=board.name,
+        title=board.title,
+        basis=basis,
+        setups=tuple(sheet_report(one) for one in sheets),
+        proposed=proposed_labels(board, ways),
+        notes=(*why, *board.notes),
+        files=tuple(str(path) for path in files),
+    )
+    return ModesResult(report, sheets, files)
+
+
+def _prepared(card: Problem | Card, effects: Sequence[str] | None, setup: str | os.PathLike[str] | None) -> Prepared:
+    """As for a fit, but a board that was not measured yet will do."""
+    if isinstance(card, Problem):
+        return as_problem(card, effects=effects, setup=setup).prepared
+    return prepare(card, effects, may_lack_frequencies=True, setup=setup)
+
+
+def _constants(prepared: Prepared) -> tuple[Values, Precision | None, list[str]]:
+    """Where to compute the modes, how well that is known, and why if not at the board's own estimate."""
+    board = prepared.board
+    try:
+        require_labels(board)
+        estimate = weighted_least_squares(board)
+        require_identifiable(board, identifiability(estimate.sensitivities, estimate.scales, board.symmetry))
+    except NotIdentifiableError as error:
+        return prior_medians(board, prepared.prior), None, [str(error)] if _has_labels(board) else []
+    widenings = noise_widenings(board, estimate.residuals)
+    scales = estimate.scales * np.repeat(widenings, [len(setup.readings) for setup in board.setups])
+    noise = {setup.name: setup.noise.median * w for setup, w in zip(board.setups, widenings.tolist(), strict=True)}
+    found = identifiability(estimate.sensitivities, scales, board.symmetry)
+    return estimate.values, Precision(found.of_rigidities, noise), []
+
+
+def _has_labels(board: Board) -> bool:
+    return any(setup.readings for setup in board.setups)
+
+
+def _sheets(
+    prepared: Prepared, values: Values, precision: Precision | None, rng: np.random.Generator, basis: str
+) -> list[Sheet]:
+    board, made = prepared.board, []
+    for setup in board.setups:
+        system = system_of(board, setup)
+        bands = None
+        if precision is None:
+            _, named = spectrum(system, values, NUMBERS_OF_MODES[-1])
+            labels = [mode.label for mode in named if mode.label is not None]
+            bands = prior_bands(board, prepared.prior, setup, labels, rng)
+        made.append(sheet(board, system, values, basis, bands, precision))
+    return made
+
+
+def _draw(sheets: Sequence[Sheet], folder: Path, files: Sequence[Path]) -> None:
+    from bayesplate.report.chladni import chladni_sheet
+    from bayesplate.report.saving import drawing, save_figure
+
+    make_folder(folder)
+    for i, one in enumerate(sheets):
+        with drawing():
+            figure = chladni_sheet(one)
+            for path in files[2 * i : 2 * i + 2]:
+                save_figure(figure, path)

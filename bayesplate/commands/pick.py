@@ -1,0 +1,271 @@
+"""`pick`: recordings to frequencies with their uncertainty, labels, and the [setup] that a card takes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bayesplate.commands.arguments import require_arguments
+from bayesplate.commands.fragment import fragment_text
+from bayesplate.commands.pick_sand import pictures_of, upright
+from bayesplate.commands.pick_words import moved_between_hits, show_pick
+from bayesplate.commands.places import given_places, require_on_board
+from bayesplate.commands.prepare import Prepared, prepare
+from bayesplate.errors import Fault, InputError, NotIdentifiableError, plain
+from bayesplate.files import make_folder, require_new, write_text
+from bayesplate.recordings.contract import PickReport, rows
+from bayesplate.recordings.picking import HIGHEST, LOWEST, Picked, pick_modes
+from bayesplate.recordings.reading import read_recordings
+from bayesplate.recordings.sand import read_picture
+from bayesplate.recordings.signals import Motion, Recording
+from bayesplate.recordings.sweeps import Sweep, impulse_response, read_sweep
+from bayesplate.recordings.taking import Heard, take, take_impulses
+from bayesplate.results.contract import json_text
+from bayesplate.results.folder import FIGURES
+
+if TYPE_CHECKING:
+    from bayesplate.commands.pick_labels import Labels
+    from bayesplate.recordings.hits import Hit
+    from bayesplate.recordings.reading import Read
+    from bayesplate.recordings.sand import Floats
+
+FRAGMENT, PAGE, SUMMARY = "setup.toml", "recordings.html", "pick.json"
+_RATE_OFF = 1e-6
+
+FilePath = str | os.PathLike[str]
+Place = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PickResult:
+    """What `pick` leaves.
+
+    Attributes
+    ----------
+    summary : PickReport
+    picked : Picked
+        With the spectra.
+    folder : Path or None
+        Where its files are; None if none were asked for.
+    """
+
+    summary: PickReport
+    picked: Picked
+    folder: Path | None
+
+    def __repr__(self) -> str:
+        found = ", ".join(f"{peak.hz:.1f}" for peak in self.summary.likely[:8])
+        return f"<PickResult of {', '.join(self.summary.files[:3])}: {len(self.summary.likely)} modes, Hz: {found}>"
+
+    def _repr_html_(self) -> str:
+        """The table as a notebook shows it."""
+        return show_pick(self.summary).html("Picked modes")
+
+
+def pick(
+    files: Sequence[FilePath],
+    *,
+    card: FilePath | None = None,
+    rate: float | None = None,
+    hammer: Sequence[Place] = (),
+    sensor: Sequence[Place] = (),
+    sensor_mass: tuple[float, float] | None = None,
+    channels: str = "force,response",
+    motion: Motion = "acceleration",
+    polarity: str | None = None,
+    sweep: str | None = None,
+    sand: Mapping[float, FilePath] | None = None,
+    lowest: float = LOWEST,
+    highest: float = HIGHEST,
+    out: FilePath | None = None,
+    force: bool = False,
+) -> PickResult:
+    """Pick the modes of a board from recordings of hits, taps or sweeps.
+
+    Parameters
+    ----------
+    files : sequence of path
+        WAV, FLAC or CSV; UFF with the extra `bayesplate[recordings]`. Files of which both places are given
+        and the same are repeats.
+    card : str or path, optional
+        A board card with sizes and edges, which may be without frequencies: labels are computed for it.
+    rate : float, optional, Hz
+        For files that do not say it.
+    hammer, sensor : sequence of (float, float), m
+        Where the board was hit and listened to, from the corner x = y = 0: none, one for all files, or one for each.
+    sensor_mass : (float, float), optional, kg
+        Of the accelerometer, and its standard deviation; it is passed on to the card.
+    channels : str
+        What two channels of a sound file are, "force,response", "response,force" or "response,response", or the number
+        of the only one that is used.
+    motion : str
+        What a response is whose file does not say it: "acceleration", "velocity", "displacement" or "pressure".
+    polarity : str, optional
+        "same" if a force towards the board and the response it causes have one sign, "opposite" if not. By default it
+        is found by the labels, if there is a card.
+    sweep : str, optional
+        For recordings of an exponential sweep: "F1,F2,SECONDS", or the path of the sweep itself.
+    sand : mapping, optional
+        Frequency in Hz to a picture of sand, cropped to the board.
+    lowest, highest : float, Hz
+        Between which modes are looked for.
+    out : path, optional
+        Folder of setup.toml, recordings.html, pick.json and figures; nothing is written without it.
+    force : bool
+        Replace what is there.
+
+    Returns
+    -------
+    PickResult
+
+    Raises
+    ------
+    InputError
+        With every fault of the arguments, then of all files, then of all hits; nothing is written then.
+    """
+    require_arguments(
+        files=files, card_or_none=card, rate=rate, places=(hammer, sensor, len(files)), sensor_mass=sensor_mass,
+        channels=channels, motion=motion, polarity=polarity, band=(lowest, highest), sand=sand, out=out, force=force,
+    )  # fmt: skip
+    targets = () if out is None else require_new(Path(out), (FRAGMENT, PAGE, SUMMARY), force=force)
+    prepared = None if card is None else _one_setup(prepare(card, may_lack_frequencies=True))
+    if prepared is not None:
+        # a microphone may be beside the board, and is nowhere on a card
+        require_on_board(prepared.card, hammer, () if motion == "pressure" else sensor, sensor_mass)
+    pictures = {hertz: read_picture(path) for hertz, path in (sand or {}).items()}
+    read = read_recordings(files, rate, channels, motion)
+    read = [
+        [one.at(*places) for one in own] for own, places in zip(read, given_places(hammer, sensor, read), strict=True)
+    ]
+    heard = take(read, highest) if sweep is None else take_impulses(_impulses(read, sweep), highest)
+    picked = pick_modes(heard.spectra, lowest, highest)
+    summary = _summary(files, heard, picked, prepared, polarity, pictures, sensor_mass)
+    if out is not None:
+        _write(Path(out), targets, summary, picked)
+    return PickResult(summary, picked, None if out is None else Path(out))
+
+
+def _one_setup(prepared: Prepared) -> Prepared:
+    """A card whose labels are meant without doubt: it has one setup."""
+    if len(prepared.board.setups) > 1:
+        names = ", ".join(setup.name for setup in prepared.board.setups)
+        raise InputError(Fault(prepared.board.name, "a card with one setup", names, "one card for the edges at hand"))
+    return prepared
+
+
+def _impulses(read: Sequence[Sequence[Read]], sweep: str) -> list[tuple[Recording, Hit]]:
+    """Impulse responses in place of recordings of a sweep, each as if the board had been hit once."""
+    recordings = [one for own in read for one in own if isinstance(one, Recording)]
+    wrong = [one.name for own in read for one in own if not isinstance(one, Recording) or one.force is not None]
+    if wrong:
+        wanted = "one channel with the response to the sweep"
+        raise InputError([Fault(name, wanted, "another kind of file", "leave --sweep out for hits") for name in wrong])
+    if not os.path.exists(sweep):
+        return _turned_back(recordings, read_sweep(sweep))
+    ((itself, *_),) = read_recordings([sweep], was_played=True)
+    if not isinstance(itself, Recording):
+        raise InputError(Fault(plain(sweep), "a recording of the sweep", "a frequency response"))
+    off = [one for one in recordings if abs(one.rate / itself.rate - 1.0) > _RATE_OFF]
+    if off:
+        raise InputError(
+            [Fault(f"{one.name} rate", f"{itself.rate:g} Hz, as the sweep", f"{one.rate:g} Hz") for one in off]
+        )
+    return _turned_back(recordings, itself.response)
+
+
+def _turned_back(recordings: Sequence[Recording], sweep: Sweep | Floats) -> list[tuple[Recording, Hit]]:
+    found, faults = [], list[Fault]()
+    for one in recordings:
+        try:
+            found.append(impulse_response(one, sweep))
+        except InputError as error:
+            faults += error.faults
+    if faults:
+        raise InputError(faults)
+    return found
+
+
+def _summary(
+    files: Sequence[FilePath],
+    heard: Heard,
+    picked: Picked,
+    prepared: Prepared | None,
+    polarity: str | None,
+    pictures: Mapping[float, Floats],
+    sensor_mass: tuple[float, float] | None,
+) -> PickReport:
+    names = tuple(plain(Path(one).name) for one in files)
+    numbers = [number for number, mode in enumerate(picked.modes) if mode.is_likely]
+    flips = None if polarity is None else polarity == "opposite"
+    remarks = [*heard.remarks, *picked.remarks]
+    labels = None
+    if prepared is not None:
+        kept, turned = upright(prepared.board, pictures)
+        shown, beside = pictures_of(picked, kept)
+        remarks += [*turned, *beside]
+        labels, told = _labelled(prepared, picked, flips, shown)
+        remarks += told
+    elif pictures:
+        remarks.append("pictures of sand need a card: they are compared with the modes of its board")
+    flips = flips if labels is None else labels.flips
+    by_mode = {} if labels is None else {number: labels.of(i) for i, number in enumerate(numbers)}
+    peaks = rows(picked, flips, by_mode)
+    remarks += moved_between_hits(peaks, picked.spectra.duration)
+    sure = {} if labels is None else {number: labels.stated(i) for i, number in enumerate(numbers)}
+    named = _each_once({number: one for number, one in sure.items() if one is not None})
+    text = fragment_text(
+        peaks,
+        named,
+        picked.spectra,
+        files=names,
+        name="" if prepared is None else prepared.board.setups[0].name,
+        sensor_mass=sensor_mass,
+    )
+    return PickReport(
+        format=1,
+        files=names,
+        n_hits=len(picked.spectra.names),
+        n_places=len(picked.spectra.between),
+        seconds=picked.spectra.duration,
+        lowest_hz=picked.lowest,
+        highest_hz=picked.highest,
+        peaks=peaks,
+        polarity="" if flips is None else "opposite" if flips else "same",
+        board="" if prepared is None else prepared.board.name,
+        fragment=text,
+        remarks=tuple(remarks),
+    )
+
+
+def _labelled(
+    prepared: Prepared, picked: Picked, flips: bool | None, shown: Mapping[int, Sequence[Floats]]
+) -> tuple[Labels | None, list[str]]:
+    from bayesplate.commands.pick_labels import label_peaks
+
+    try:
+        labels = label_peaks(prepared.board, prepared.prior, picked, flips, shown)
+        return labels, [*labels.doubts]
+    except NotIdentifiableError as error:
+        return None, [f"no labels: {error}"]
+
+
+def _each_once(named: Mapping[int, tuple[str, float]]) -> dict[int, tuple[str, float]]:
+    """Each label for the peak that it is surest of."""
+    best: dict[str, int] = {}
+    for number, (label, sure) in named.items():
+        if label not in best or sure > named[best[label]][1]:
+            best[label] = number
+    return {number: one for number, one in named.items() if best[one[0]] == number}
+
+
+def _write(folder: Path, targets: Sequence[Path], summary: PickReport, picked: Picked) -> None:
+    from bayesplate.report.recordings import write_recordings_page
+
+    make_folder(folder / FIGURES)
+    fragment, _, numbers = targets
+    write_text(fragment, summary.fragment)
+    write_text(numbers, json_text(summary))
+    write_recordings_page(folder, summary, picked)

@@ -1,0 +1,76 @@
+"""What `pick` prints: the table of modes, what was set aside and why, and what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from bayesplate.commands.shown import Shown
+from bayesplate.recordings.contract import PickedRow, PickReport
+from bayesplate.recordings.plausibility import UNLIKE
+from bayesplate.results.tables import Cell, Row, Table
+from bayesplate.results.words import chances, percent, two_digits
+
+MOST_SET_ASIDE = 8
+_LOUD, _RINGS, _MANY = 0.1, 1.0, 3
+"""Strength over the strongest, decay rate times duration, and number of peaks from which on it is likelier that hits
+were at several places than that all of these are no modes."""
+
+
+def show_pick(report: PickReport) -> Shown:
+    """The report of `bayesplate.commands.pick.pick` for a person."""
+    aside = [peak for peak in report.peaks if not peak.is_likely]
+    told = [f"set aside: {_aside(peak)}" for peak in aside[:MOST_SET_ASIDE]]
+    if len(aside) > MOST_SET_ASIDE:
+        told.append(f"and {len(aside) - MOST_SET_ASIDE} more, which the page and --json list")
+    hits = "1 ring-down" if report.n_hits == 1 else f"{report.n_hits} ring-downs"
+    places = "one pair of places" if report.n_places == 1 else f"{report.n_places} pairs of places"
+    closing = (
+        f"{len(report.likely)} modes between {report.lowest_hz:g} and {report.highest_hz:g} Hz, from {hits} of "
+        f"{report.seconds:.1f} s between {places}."
+    )
+    if not report.likely:
+        closing += " Is the board among what was recorded? --highest looks further up."
+    return Shown((picked_table(report),), tuple(told), report.remarks, closing)
+
+
+def moved_between_hits(peaks: Sequence[PickedRow], seconds: float) -> list[str]:
+    """What to ask where several loud peaks ring down and differ from hit to hit; `seconds` is the length of a decay."""
+    loud = [
+        f"{peak.hz:.1f}"
+        for peak in peaks
+        if peak.kind == UNLIKE
+        and peak.amplitude > _LOUD
+        and peak.damping_percent / 100.0 * peak.hz * seconds > _RINGS
+        and not peak.is_likely
+    ]
+    if len(loud) < _MANY:
+        return []
+    listed = ", ".join(loud[:4]) + " Hz" + " and more" * (len(loud) > 4)
+    return [
+        f"{len(loud)} loud peaks ring down but are {UNLIKE}, {listed}: were all hits of a file at one place, and heard "
+        "at one? They are set aside, and labels cannot be trusted: record one file for each place, or give the places"
+    ]
+
+
+def picked_table(report: PickReport) -> Table:
+    """Each likely mode: frequency with its standard error, damping, sign, doubt, label."""
+    has_signs = any(peak.sign for peak in report.likely)
+    has_labels = any(peak.labels for peak in report.likely)
+    rows: list[Row] = []
+    for peak in report.likely:
+        cells: list[Cell] = [
+            f"{peak.hz:.2f}",
+            f"± {two_digits(peak.sd_hz)}",
+            f"{peak.damping_percent:.2f}",
+            *([peak.sign or None] if has_signs else []),
+            percent(peak.spurious_probability),
+            *([chances(peak.may_be(2))] if has_labels else []),
+        ]
+        rows.append(tuple(cells))
+    signs, labels = (("sign",) if has_signs else ()), (("mode",) if has_labels else ())
+    return Table("Picked modes", ("Hz", "st. error", "damping, %", *signs, "no mode", *labels), tuple(rows))
+
+
+def _aside(peak: PickedRow) -> str:
+    reason = "no stronger than noise" if peak.kind == "noise" else peak.kind
+    return f"{peak.hz:.1f} Hz, {reason} (no mode: {percent(peak.spurious_probability)})"

@@ -1,0 +1,300 @@
+"""`plan`: what to measure next, by what it is expected to give and what it costs."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from bayesplate.board.board import Board
+from bayesplate.board.campaign import is_campaign
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.words import EFFECT_NAMES, effect_named
+from bayesplate.campaign.shared import Shared
+from bayesplate.commands.arguments import require_arguments
+from bayesplate.commands.campaign import Campaign, problem_or_campaign
+from bayesplate.commands.one_thread import one_thread_each
+from bayesplate.commands.prepare import Card, Prepared, prepare
+from bayesplate.commands.problem import Problem, as_problem
+from bayesplate.commands.shown import show_plan
+from bayesplate.commands.stages import Stages
+from bayesplate.diagnosis.baseline import baseline_of
+from bayesplate.diagnosis.hypotheses import RELABELLING
+from bayesplate.diagnosis.joint import full_search
+from bayesplate.diagnosis.search import Found
+from bayesplate.diagnosis.verdict import WITHIN, Answer
+from bayesplate.effects import effect_faults
+from bayesplate.errors import Fault, InputError, NotIdentifiableError
+from bayesplate.files import make_folder, require_new, write_text
+from bayesplate.planning.beliefs import Beliefs
+from bayesplate.planning.bench import Bench
+from bayesplate.planning.drawn_up import drawn_up
+from bayesplate.planning.explained import asked, believed, surviving
+from bayesplate.planning.gains import EXPLANATIONS
+from bayesplate.planning.plan import Plan
+from bayesplate.planning.proposals import BELIEFS, Costs, Planner
+from bayesplate.planning.together import beliefs_together
+from bayesplate.planning.unmeasured import prior_beliefs
+from bayesplate.posterior.sampling import Progress
+from bayesplate.report.plots import PlanPlots
+from bayesplate.results.contract import json_text
+from bayesplate.results.folder import DIAGNOSIS
+from bayesplate.streams import stream
+
+PLAN = "plan.json"
+_GAINS, _BENCH = "plan", "plan-bench"
+_POSE, _SEARCH, _PLAN = 1.0, 12.0, 4.0
+"""How long the parts take beside each other."""
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PlanResult:
+    """What `plan` leaves.
+
+    Attributes
+    ----------
+    summary : Plan
+        What plan.json holds.
+    benches : tuple of Bench
+        Figures of the modes to look for, with the places of sensor and hammer.
+    files : tuple of Path
+        Those that were written.
+    """
+
+    summary: Plan
+    benches: tuple[Bench, ...]
+    files: tuple[Path, ...]
+
+    @property
+    def plot(self) -> PlanPlots:
+        """The figures: `result.plot.gains()`, `result.plot.bench()`."""
+        return PlanPlots(self.summary, self.benches)
+
+    def __repr__(self) -> str:
+        return repr(self.summary).replace("<Plan", "<PlanResult", 1)
+
+    def _repr_html_(self) -> str:
+        """The tables as a notebook shows them."""
+        return show_plan(self.summary).html(self.summary.title or self.summary.name)
+
+
+@one_thread_each()
+def plan(
+    card: Problem | Card | Campaign,
+    *,
+    goal: str | None = None,
+    costs: Mapping[str, float] | None = None,
+    between: Sequence[str] | None = None,
+    out: str | os.PathLike[str] | None = None,
+    effects: Sequence[str] | None = None,
+    seed: int = 1,
+    force: bool = False,
+    progress: Callable[[Progress], None] | None = None,
+) -> PlanResult:
+    """Rank what could be measured next by what it is expected to give.
+
+    Parameters
+    ----------
+    card : Problem, str, path, Board or Campaign
+        A problem, the name of a shipped board or campaign card, the path of a card, or a board made in Python. A board
+        without frequencies is planned from its prior.
+    goal : str, optional
+        "E_x", "E_y", "G_xy": the interval of this constant; "constants": those of all three; "explanations": the doubt
+        between them. By default both together.
+    costs : dict of float, optional
+        Minutes of a "reading" (1), a "clamping" (10), a "board" (30).
+    between : sequence of str, optional
+        Effects that are to be told apart, no effect being one more possibility; by default those that survive the
+        search of `diagnose`. Each must be able to act on the board, and not be declared.
+    out : path, optional
+        Folder of plan.json, the figure of gains and the sheets for the bench; nothing is written without it. A
+        diagnosis of the same card that is there is not made again.
+    effects : sequence of str, optional
+        Declared effects in place of the card's.
+    seed : int
+        Everything random follows from it.
+    force : bool
+        Replace files that are there.
+    progress : callable, optional
+        Told when a part begins.
+
+    Returns
+    -------
+    PlanResult
+
+    Raises
+    ------
+    InputError
+        If the card, an argument or the folder cannot be used; then nothing is written.
+    NotIdentifiableError
+        If explanations are to be told apart on a board whose frequencies do not even tell the constants.
+    """
+    require_arguments(
+        card=card, goal=goal, costs=costs, between=between, out=out, effects=effects, seed=seed, force=force,
+        progress=progress,
+    )  # fmt: skip
+    between = None if between is None else [effect_named(name) for name in between]
+    given = _given(card, effects)
+    files = () if out is None else require_new(Path(out), _names(), force=force)
+    asked = _Asked(goal, between, seed, None if out is None else Path(out), progress)
+    beliefs = asked.of_board(given.boards[0]) if len(given.boards) == 1 else asked.of_campaign(given)
+    planner = Planner(beliefs, seed, goal, Costs(**(costs or {})))
+    made, drawn = drawn_up(planner, given.name, given.title, given.card_sha256, given.priors, given.shared)
+    if out is not None:
+        _write(made, drawn, Path(out), files)
+    return PlanResult(made, drawn, tuple(path for path in files if path.exists()))
+
+
+@dataclass(frozen=True)
+class _Given:
+    """The boards to plan for: one, or those of a campaign, with what they share."""
+
+    name: str
+    title: str
+    card_sha256: str
+    boards: tuple[Prepared, ...]
+    shared: tuple[Shared, ...] = ()
+
+    @property
+    def priors(self) -> list[PriorCard]:
+        """Of the boards."""
+        return [one.prior for one in self.boards]
+
+
+def _given(card: Problem | Card | Campaign, effects: Sequence[str] | None) -> _Given:
+    """What was given; a board that was not measured yet will do."""
+    if is_campaign(card) or isinstance(card, Campaign):
+        many = problem_or_campaign(card, effects=effects)
+        assert isinstance(many, Campaign)
+        boards = tuple(one.prepared for one in many.problems)
+        return _Given(many.name, many.card.title, many.card.sha256, boards, many.shared)
+    if isinstance(card, Problem):
+        prepared = as_problem(card, effects=effects).prepared
+    else:
+        prepared = prepare(card, effects, may_lack_frequencies=True)
+    return _Given(prepared.board.name, prepared.board.title, prepared.card.sha256, (prepared,))
+
+
+def _names() -> list[str]:
+    """Files that a plan may write."""
+    return [PLAN, *(f"{stem}.{ending}" for stem in (_GAINS, _BENCH, f"{_BENCH}-2") for ending in ("png", "svg"))]
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What a plan was asked for: see `plan`."""
+
+    goal: str | None
+    between: Sequence[str] | None
+    seed: int
+    out: Path | None
+    progress: Callable[[Progress], None] | None
+
+    def of_board(self, prepared: Prepared) -> Beliefs:
+        """What is believed of a board: from a search, from a finished one, or from the prior."""
+        board, prior, between = prepared.board, prepared.prior, self.between
+        if between is not None:
+            _require_possible(board, between)
+        rng, stages = stream(self.seed, BELIEFS), Stages(self.progress, _POSE + _SEARCH + _PLAN)
+        stages.begin("estimate", _POSE)
+        asks_of_effects = between is not None or self.goal == EXPLANATIONS
+        if not any(setup.readings or setup.peaks for setup in board.setups):
+            if asks_of_effects:
+                raise InputError(_untold("between" if between else "goal", "a board without any"))
+            return prior_beliefs(board, prior, rng)
+        try:
+            baseline = baseline_of(Problem(prepared).posed)
+        except NotIdentifiableError as error:
+            if asks_of_effects:
+                raise
+            return prior_beliefs(board, prior, rng, (f"planned from the prior alone: {error}",))
+        finished = None if self.out is None or between else _finished(self.out, prepared)
+        tried = between or (None if finished is None else sorted({name for one in finished.support for name in one}))
+        stages.begin("search for effects", _SEARCH)
+        _, searched = full_search(baseline, tried, stages.reached)
+        among = _among(searched, between, finished)
+        stages.begin("gains of further readings", _PLAN)
+        return believed(searched, prior, rng, among)
+
+    def of_campaign(self, given: _Given) -> Beliefs:
+        """What is believed of several boards and of what their card shares: effects are not searched for."""
+        if self.between is not None:
+            raise InputError(_untold("between", "a campaign"))
+        if self.goal == EXPLANATIONS:
+            wanted = "E_x, E_y, G_xy or constants for a campaign, or none for what its boards share"
+            raise InputError(Fault("goal", wanted, EXPLANATIONS, "plan one of its boards to tell explanations apart"))
+        stages = Stages(self.progress, _SEARCH + _PLAN)
+        stages.begin("boards of the campaign", _SEARCH)
+        boards = [one.board for one in given.boards]
+        beliefs = beliefs_together(boards, given.priors, given.shared, stages.reached)
+        stages.begin("gains of further readings", _PLAN)
+        return beliefs
+
+
+def _untold(place: str, got: str) -> Fault:
+    """Why explanations cannot be told apart."""
+    return Fault(place, "the frequencies of a board, by which effects are told apart", got)
+
+
+def _require_possible(board: Board, between: Sequence[str]) -> None:
+    """Refuse effects that cannot be told apart: those that cannot act on the board, and those that it declares."""
+    faults = [Fault("between", "effects that are not declared", name) for name in between if name in board.effects]
+    others = replace(board, effects=tuple(name for name in between if name not in board.effects))
+    faults += [Fault("between", one.wanted, one.got) for one in effect_faults(others)]
+    if faults:
+        raise InputError(faults)
+
+
+@dataclass(frozen=True)
+class _Finished:
+    """What a finished diagnosis says: probabilities of the answers that may survive, and that of no effect."""
+
+    support: Mapping[tuple[str, ...], float]
+    none: float
+    rivals: frozenset[tuple[str, ...]]
+
+
+def _finished(folder: Path, prepared: Prepared) -> _Finished | None:
+    """The diagnosis of the same card in a folder; None if there is none, or it explains nothing."""
+    try:
+        told: dict[str, Any] = json.loads((folder / DIAGNOSIS).read_text(encoding="utf-8"))
+        same = told["card_sha256"] == prepared.card.sha256 and tuple(told["declared"]) == prepared.board.effects
+        if not same or told["verdict"] == "unexplained":
+            return None
+        support = {tuple(one["effects"]): float(one["probability"]) for one in told["answers"]}
+        none = float(told["probability_of_none"])
+        listed = told["effects"] if told["verdict"] == "indistinguishable group" else ()
+        named = {name for one in (*support, listed) for name in one}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+    is_altered = not all(0.0 <= one <= 1.0 + _ROUNDING for one in (*support.values(), none))
+    if is_altered or not named <= {*EFFECT_NAMES, RELABELLING}:
+        return None
+    highest = max(support.values(), default=0.0)
+    rivals = frozenset(members for members in support if members and set(members) <= set(listed))
+    near = {one: p for one, p in support.items() if one and p > 0.0 and (WITHIN * p >= highest or one in rivals)}
+    return _Finished(near, none, rivals) if near else None
+
+
+def _among(found: Found, between: Sequence[str] | None, finished: _Finished | None) -> tuple[Answer, ...] | None:
+    """The explanations to tell apart, if not those that survive the search at hand."""
+    if between:
+        return asked(found, between)
+    return None if finished is None else surviving(found, finished.support, finished.none, finished.rivals)
+
+
+def _write(made: Plan, drawn: Sequence[Bench], folder: Path, files: Sequence[Path]) -> None:
+    from bayesplate.report.planning import bench_sheet, gains_picture
+    from bayesplate.report.saving import drawing, save_figure
+
+    make_folder(folder)
+    write_text(files[0], json_text(made))
+    with drawing():
+        figures = [gains_picture(made).figure, *(bench_sheet(one) for one in drawn)]
+        for i, figure in enumerate(figures):
+            for path in files[1 + 2 * i : 3 + 2 * i]:
+                save_figure(figure, path)

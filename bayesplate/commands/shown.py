@@ -1,0 +1,212 @@
+"""What a command prints: its tables, its sentences, its JSON; the command line only lays them out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bayesplate.campaign.checking import CampaignCheck
+from bayesplate.campaign.diagnosis import CampaignDiagnosis, claim_sentence
+from bayesplate.campaign.summary import CampaignSummary
+from bayesplate.campaign.tables import campaign_check_tables, campaign_tables, diagnosis_tables
+from bayesplate.diagnosis.result import Diagnosis
+from bayesplate.diagnosis.tables import every_table
+from bayesplate.diagnosis.told import (
+    alike_sentence,
+    carrying_words,
+    known_sentences,
+    verdict_sentence,
+    warnings,
+)
+from bayesplate.effects.words import effect_names
+from bayesplate.estimates.leave_one_out import carrying_sentence
+from bayesplate.grading.boards import BatchSummary
+from bayesplate.grading.matching import Grading
+from bayesplate.grading.tables import MOST_ON_TERMINAL, doubts_sentence, grading_tables
+from bayesplate.planning.plan import Plan
+from bayesplate.planning.tables import plan_tables
+from bayesplate.posterior.convergence import Gate
+from bayesplate.posterior.sampling import Progress
+from bayesplate.results.checking import CheckReport
+from bayesplate.results.command_tables import (
+    METHODS_REMARK,
+    check_tables,
+    forward_table,
+    methods_table,
+    proposal_remarks,
+    sheet_tables,
+)
+from bayesplate.results.comparison import Comparison
+from bayesplate.results.contract import json_text
+from bayesplate.results.fit_tables import fitted_constants, modes_table, peaks_table
+from bayesplate.results.sheets import ModesReport
+from bayesplate.results.summary import Summary
+from bayesplate.results.tables import Table, notebook, render
+from bayesplate.results.words import percent, two_digits
+
+__all__ = [
+    "Progress",
+    "Shown",
+    "Table",
+    "json_text",
+    "progress_text",
+    "show_batch",
+    "show_check",
+    "show_compare",
+    "show_diagnosis",
+    "show_fit",
+    "show_modes",
+    "show_plan",
+]
+
+
+PLAN_REMARK = (
+    "gain: nats, the drop of the doubt between explanations and the mean logarithm by which the intervals shrink, or "
+    "what was asked for"
+)
+SEEN_REMARK = "seen: residue of a mode between hammer and sensor, of the largest that its figure could give"
+NOTHING_HELPS = "nothing that was looked at would help by a twentieth"
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What is printed: tables, what the data tell weakly, warnings, and a closing sentence."""
+
+    tables: tuple[Table, ...]
+    remarks: tuple[str, ...]
+    warnings: tuple[str, ...]
+    closing: str
+
+    def html(self, heading: str) -> str:
+        """The same for a notebook, under a heading."""
+        return notebook(heading, (*self.remarks, *self.warnings, self.closing), self.tables)
+
+    def printed(self, width: int, *, styled: bool) -> str:
+        """The same for a terminal of so many columns, which may know bold letters."""
+        sentences = (*(f"- {text}" for text in self.remarks), *(f"! {text}" for text in self.warnings), self.closing)
+        parts: tuple[Table | str, ...] = (*self.tables, *sentences)
+        return "".join(render(one, "terminal", width=width, styled=styled) for one in parts)
+
+
+def show_check(report: CheckReport | CampaignCheck) -> Shown:
+    """The report of `bayesplate.commands.check.check` for a person."""
+    if isinstance(report, CampaignCheck):
+        return _show_campaign_check(report)
+    closing = f"{report.law} law; nothing was sampled. {_next_after_check(report.n_doubts)}"
+    return Shown(check_tables(report), (*report.identifiability, report.invisible), report.notes, closing)
+
+
+def _show_campaign_check(report: CampaignCheck) -> Shown:
+    """The report of `bayesplate.commands.check.check` on a campaign for a person."""
+    notes = tuple(f"{name}: {note}" for name, one in report.boards.items() for note in one.notes)
+    n_doubts = sum(one.n_doubts for one in report.boards.values())
+    closing = f"nothing was sampled. bayesplate check tells more of each board. {_next_after_check(n_doubts)}"
+    return Shown(campaign_check_tables(report), (), notes, closing)
+
+
+def _next_after_check(n_doubts: int) -> str:
+    """What to do once a card has no fault: what is in doubt comes first, for a fit would take it as it stands."""
+    fit = "bayesplate fit, with the same card"
+    return f"Next: settle what is in doubt above; then {fit}" if n_doubts else f"Next: {fit}"
+
+
+def show_fit(summary: Summary | CampaignSummary) -> Shown:
+    """The summary of `bayesplate.commands.fit.fit` for a person."""
+    if isinstance(summary, CampaignSummary):
+        return _show_campaign_fit(summary)
+    peaks = peaks_table(summary)
+    tables = (fitted_constants(summary), modes_table(summary), *([peaks] if peaks else []))
+    error, model = summary.error, summary.model
+    left_out = error.leave_one_out_rms_cents
+    several = len(summary.noise) > 1
+    noise = ", ".join(f"{percent(one.q50, 2)}" + f" in {setup}" * several for setup, one in summary.noise.items())
+    effects = f" with {effect_names(model.effects)}" if model.effects else ""
+    kind = "isotropic, " if model.isotropic else ""
+    closing = (
+        f"{kind}{model.theory} plate{effects}, {model.law} law. Error rms "
+        f"{error.in_sample_rms_cents:.1f} cents in sample, "
+        + (f"{left_out:.1f} left out" if left_out is not None else summary.why_no_left_out)
+        + f"; noise {noise}; the linear law is off by {two_digits(error.linearisation_rms_cents)} cents."
+    )
+    return Shown(tables, summary.identifiability, summary.warnings, closing)
+
+
+def _show_campaign_fit(summary: CampaignSummary) -> Shown:
+    told = tuple(f"{name}: {note}" for name, one in summary.boards.items() for note in one.warnings)
+    errors = [one.error.in_sample_rms_cents for one in summary.boards.values()]
+    pooled = (sum(error**2 for error in errors) / len(errors)) ** 0.5
+    closing = f"{len(errors)} boards; error rms {pooled:.1f} cents in sample, each board counted once."
+    return Shown(campaign_tables(summary), (), (*summary.warnings, *told), closing)
+
+
+def show_batch(summary: BatchSummary, grading: Grading) -> Shown:
+    """The result of `bayesplate.commands.batch.batch` for a person."""
+    aside = tuple(f"{file} is a card of another kind and was left aside" for file in summary.aside)
+    closing = f"{summary.n_fitted} of {summary.n_boards} boards fitted."
+    tables = tuple(table for name, table in grading_tables(grading, MOST_ON_TERMINAL).items() if name != "makers")
+    in_doubt = doubts_sentence(grading)
+    return Shown(tables, aside, (in_doubt,) if in_doubt else (), closing)
+
+
+def show_compare(comparison: Comparison) -> Shown:
+    """The result of `bayesplate.commands.compare.compare` for a person."""
+    theories = comparison.theories
+    tables = [table for one in theories for table in (methods_table(comparison.name, one), forward_table(one))]
+    told: dict[str, list[str]] = {}
+    for one in theories:
+        for origin in one.coefficients:
+            setup = f", setup {origin.setup}" if len(one.coefficients) > 1 else ""
+            told.setdefault(origin.sentence, []).append(one.theory + setup)
+    remarks = [f"coefficients of paper and percentile ({', '.join(where)}): {text}" for text, where in told.items()]
+    carrying = carrying_sentence(comparison.carrying_modes)
+    told_last = (METHODS_REMARK, *([carrying] if carrying else []))
+    return Shown(tuple(tables), (*remarks, *told_last), (), comparison.verdict.sentence)
+
+
+def show_diagnosis(diagnosis: Diagnosis | CampaignDiagnosis) -> Shown:
+    """The result of `bayesplate.commands.diagnose.diagnose` for a person."""
+    if isinstance(diagnosis, CampaignDiagnosis):
+        told = tuple(one for one in (diagnosis.reason, diagnosis.recommendation) if one)
+        return Shown(diagnosis_tables(diagnosis), told, diagnosis.notes, claim_sentence(diagnosis))
+    told = (
+        *known_sentences(diagnosis),
+        carrying_words(diagnosis),
+        *diagnosis.sentences,
+        alike_sentence(diagnosis),
+        diagnosis.recommendation,
+    )
+    remarks = tuple(sentence for sentence in told if sentence)
+    return Shown(every_table(diagnosis), remarks, tuple(warnings(diagnosis)), verdict_sentence(diagnosis))
+
+
+def show_modes(report: ModesReport) -> Shown:
+    """The report of `bayesplate.commands.modes.modes` for a person."""
+    files = f"; sheet to print: {', '.join(report.files)}" if report.files else ""
+    return Shown(sheet_tables(report), proposal_remarks(report), report.notes, f"Frequencies {report.basis}{files}")
+
+
+def show_plan(plan: Plan) -> Shown:
+    """The result of `bayesplate.commands.plan.plan` for a person."""
+    remarks = (PLAN_REMARK, SEEN_REMARK) if plan.bench else (PLAN_REMARK,) if plan.proposals else ()
+    return Shown(plan_tables(plan), remarks, plan.notes, plan.first or NOTHING_HELPS)
+
+
+def progress_text(progress: Progress, seconds: float = 0.0) -> str:
+    """Where a run stands after so many seconds, in one line: the share done, the time left, and the sampling."""
+    if not progress.stage:
+        return _sampling_text(progress)
+    done = progress.done or 0.0
+    left = f", about {_time_words(seconds * (1.0 - done) / done)} left" if done > 0.0 else ""
+    sampling = f"; {_sampling_text(progress)}" if progress.n_steps else ""
+    return f"{100.0 * done:.0f} % done{left}: {progress.stage}{sampling}"
+
+
+def _time_words(seconds: float) -> str:
+    """A time as people say it."""
+    return f"{max(round(seconds), 1)} s" if seconds < 90.0 else f"{seconds / 60.0:.0f} min"
+
+
+def _sampling_text(progress: Progress) -> str:
+    text = f"sampling: step {progress.n_steps} of at most {progress.max_steps}"
+    if progress.n_taus is None:
+        return text
+    return f"{text}; {progress.n_taus:.0f} of {Gate().tau_count_min:.0f} autocorrelation times"

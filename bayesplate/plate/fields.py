@@ -1,0 +1,153 @@
+"""Properties that vary over the plate: the weights of its Gauss points in integrals of fields within outlines.
+
+Where an outline cuts an element, what is left of it is integrated by Gauss points of its own. The product of two cubics
+is of degree six, so that seven numbers tell of weights anywhere in an element all that they can do: they are moved to
+the seven Gauss points of the whole element, and every integral over the plate is a sum over the same points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.plate.line import N_POINTS_CUT, Line
+
+Floats = NDArray[np.float64]
+
+Field = Callable[[Floats, Floats], Floats]
+"""A factor over the unit square: of points x and y, arrays that broadcast, to an array of their common shape."""
+
+Outline = Callable[[Floats], tuple[Floats, Floats]]
+"""Where the plate begins and ends along y, as fractions of its widest width, at points x of [0, 1]."""
+
+
+@dataclass(frozen=True)
+class EdgeStrip:
+    """A field on the strip between the plate's outline and a narrower one, and nowhere else.
+
+    Attributes
+    ----------
+    inner : Outline
+        Nowhere beyond the plate's own.
+    field : Field or None
+        None is uniform.
+    """
+
+    inner: Outline
+    field: Field | None = None
+
+
+Group = Literal["along", "bending", "shear", "mass", "rotary"]
+"""Terms of a plate that take the same field; "along" is the bending that the modulus along the grain resists."""
+
+_GHOST: dict[Group, float] = {"along": 1e-5, "bending": 1e-5, "shear": 1e-5, "mass": 1e-8, "rotary": 1e-8}
+"""What is left of the plate outside its outline: soft enough to carry nothing, far lighter still than it is soft."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fabric:
+    """How the plate's own properties spread over it, and whether its grain runs at an angle.
+
+    Attributes
+    ----------
+    fields : mapping
+        Fields that the terms of each group take, each with a weight of its own (None: uniform); absent: uniform alone.
+    outline : Outline or None
+    is_turned : bool
+        Whether terms that couple bending and twist, and the two shear strains, join the plate's own.
+    """
+
+    fields: Mapping[Group, Sequence[Field | EdgeStrip | None]] = field(default_factory=dict)
+    outline: Outline | None = None
+    is_turned: bool = False
+
+    def weights(self, groups: Iterable[Group], x: Line, y: Line) -> dict[Group, list[Floats]]:
+        """Weights of the plate's Gauss points for each field of each group: (n_x, n_y) arrays.
+
+        The plate outside its outline belongs to the first field, whose weight is above zero; that of others may not be.
+        """
+        taken = {
+            group: [(one, _GHOST[group] if k == 0 else 0.0) for k, one in enumerate(self.fields.get(group, (None,)))]
+            for group in groups
+        }
+        made = {each: self._weights(*each, x, y) for each in {each for own in taken.values() for each in own}}
+        return {group: [made[each] for each in own] for group, own in taken.items()}
+
+    def _weights(self, factor: Field | EdgeStrip | None, ghost: float, x: Line, y: Line) -> Floats:
+        if isinstance(factor, EdgeStrip):
+            if self.outline is None:
+                raise ValueError("fields: wanted an outline that a strip lies along, got none")
+            return weights_within(x, y, self.outline, factor.field) - weights_within(x, y, factor.inner, factor.field)
+        inside = weights_within(x, y, self.outline, factor)
+        if self.outline is None or not ghost:
+            return inside
+        return (1.0 - ghost) * inside + ghost * weights_within(x, y)
+
+
+UNIFORM = Fabric()
+"""The same properties everywhere, the grain along x."""
+
+
+def layout(groups: Sequence[Group], counts: Mapping[Group, int]) -> list[tuple[int, int]]:
+    """Which of the plate's own terms takes which field: every term with its first field first, then with the others.
+
+    Parameters
+    ----------
+    groups : sequence of str
+        Group of each of the plate's own terms.
+    counts : mapping
+        Number of fields of each group.
+
+    Returns
+    -------
+    list of (int, int)
+        Index of the term and of the field.
+    """
+    most = max(counts[group] for group in groups)
+    return [(term, k) for k in range(most) for term, group in enumerate(groups) if k < counts[group]]
+
+
+def weights_within(x: Line, y: Line, outline: Outline | None = None, factor: Field | None = None) -> Floats:
+    """Weights of the plate's Gauss points in integrals of a field within an outline; None: uniform, everywhere.
+
+    Returns
+    -------
+    (n_x, n_y) array
+    """
+    if outline is None:
+        uniform = np.outer(x.weights, y.weights)
+        return uniform if factor is None else uniform * factor(x.points[:, None], y.points)
+    low, high = (limit[:, None] for limit in outline(x.points))
+    starts = np.clip(y.nodes[:-1], low, high)
+    lengths = np.clip(y.nodes[1:], low, high) - starts
+    points, weights = _gauss_rule()
+    at = starts[..., None] + lengths[..., None] * points
+    across = lengths[..., None] * weights
+    if factor is not None:
+        across = across * factor(x.points[:, None, None], at)
+    whole = np.diff(y.nodes)[:, None]
+    moved = _moved((at - y.nodes[:-1, None]) / whole, across)
+    return np.asarray(x.weights[:, None] * y.share * moved.reshape(x.points.size, -1))
+
+
+def _gauss_rule() -> tuple[Floats, Floats]:
+    """Gauss points and weights on [0, 1], those of the lines that are cut."""
+    from skfem.quadrature import get_quadrature
+    from skfem.refdom import RefLine
+
+    points, weights = get_quadrature(RefLine, 2 * N_POINTS_CUT - 1)
+    return points[0], weights
+
+
+def _moved(t: Floats, weights: Floats) -> Floats:
+    """Weights at the Gauss points of an element that sum a polynomial of degree six as given ones do at points t."""
+    from numpy.polynomial.legendre import legvander
+
+    degrees = np.arange(N_POINTS_CUT)
+    points, own = _gauss_rule()
+    moments = np.einsum("...g,...gn->...n", weights, legvander(2.0 * t - 1.0, degrees[-1]))
+    return np.asarray(own * ((2 * degrees + 1) * moments @ legvander(2.0 * points - 1.0, degrees[-1]).T))

@@ -1,0 +1,220 @@
+"""One side of the plate: cubic Hermite functions on line elements, by scikit-fem.
+
+Where both ends of a side are alike each mode is even or odd about the middle, so that the first half tells the whole:
+an even function has no slope in the middle, an odd one no value. Lengths enter later, as weights of the energies.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.board.setup import Ends
+
+Floats = NDArray[np.float64]
+
+Hold = Literal["clamped", "supported", "guided", "free"]
+"""What an end holds: value and slope, the value, the slope, nothing. No card can ask for a guided end: it is a clamped
+one that an effect has released."""
+Holds = tuple[Hold, Hold]
+
+N_POINTS = 5
+"""Gauss points per element: the product of two cubics, with a field of degree three, is integrated exactly."""
+N_POINTS_CUT = 7
+"""The same where an outline cuts elements; see `bayesplate.plate.fields`."""
+
+_LAYER = (1 / 4, 1 / 16)
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """The functions of one side on [0, 1]; value and slope at node i are the unknowns 2 i and 2 i + 1.
+
+    Attributes
+    ----------
+    ends : tuple of str
+        Condition at 0 and at 1: "clamped", "supported" or "free". They name the modes and tell the rigid motions.
+    held : tuple of str
+        What the functions themselves hold there: the same, or less where an effect has put springs in place of a clamp.
+    is_split : bool
+        Whether this is the first half alone.
+    basis : skfem.Basis
+    """
+
+    ends: Ends
+    held: Holds
+    is_split: bool
+    basis: Any
+
+    @property
+    def nodes(self) -> Floats:
+        """Where the elements meet, from 0 to 1 or to the middle."""
+        return np.asarray(self.basis.mesh.p[0])
+
+    @property
+    def n_functions(self) -> int:
+        """Number of functions, those that an end holds among them."""
+        return int(self.basis.N)
+
+    @property
+    def share(self) -> float:
+        """What an integral over the whole is of one over the line's own elements."""
+        return 2.0 if self.is_split else 1.0
+
+    @cached_property
+    def points(self) -> Floats:
+        """Gauss points, element by element: (n_points,) array."""
+        return np.asarray(self.basis.global_coordinates())[0].ravel()
+
+    @cached_property
+    def weights(self) -> Floats:
+        """Their weights in an integral over the whole side: (n_points,) array."""
+        return self.share * np.asarray(self.basis.dx).ravel()
+
+    @cached_property
+    def local(self) -> Floats:
+        """Functions of each element and their two derivatives at its Gauss points: (3, n_elements, n_q, 4) array."""
+        functions = [self.basis.basis[i][0] for i in range(4)]
+        orders = [[np.asarray(f), f.grad[0], f.hess[0, 0]] for f in functions]
+        return np.moveaxis(np.array(orders), 0, -1)
+
+    @cached_property
+    def unknowns(self) -> NDArray[np.intp]:
+        """Unknowns of each element: (n_elements, 4) array."""
+        return np.asarray(self.basis.element_dofs.T, dtype=np.intp)
+
+    @cached_property
+    def derivatives(self) -> Floats:
+        """All functions and their two derivatives at all Gauss points: (3, n_points, n_functions) array."""
+        found = np.zeros((3, *self.local.shape[1:3], self.n_functions))
+        for element, own in enumerate(self.unknowns):
+            found[:, element][:, :, own] = self.local[:, element]
+        return found.reshape(3, -1, self.n_functions)
+
+    def shapes(self, points: Floats, parity: int = 0) -> Any:
+        """Values of the functions at points of [0, 1]: (n_points, n_functions) sparse array.
+
+        Of a half line the functions of one parity, 0 even and 1 odd, go on beyond the middle.
+        """
+        at = np.asarray(points, dtype=np.float64)
+        is_beyond = at > 0.5 if self.is_split else np.zeros(at.shape, dtype=bool)
+        values = self.basis.probes(np.where(is_beyond, 1.0 - at, at)[None, :]).tocsr()
+        return values.multiply(np.where(is_beyond, (-1.0) ** parity, 1.0)[:, None]).tocsr()
+
+    def at_ends(self, at: tuple[bool, bool], order: int) -> tuple[Floats, Floats]:
+        """Values (order 0) or slopes (1) at the ends asked for, and their weights in a sum: (n, n_functions), (n,).
+
+        Of a half line both ends are asked for, and its one counts twice.
+        """
+        both = [(0, at[0])] if self.is_split else [(0, at[0]), (len(self.nodes) - 1, at[1])]
+        nodes = [node for node, is_asked in both if is_asked]
+        rows = np.zeros((len(nodes), self.n_functions))
+        rows[np.arange(len(nodes)), [2 * node + order for node in nodes]] = 1.0
+        return rows, np.full(len(nodes), self.share)
+
+    def kept(self, parity: int, is_sheared: bool) -> NDArray[np.bool_]:
+        """Which functions the deflection has: (n_functions,) array.
+
+        On a shear-flexible plate it keeps its slope at a clamp, where it stands at the angle of the shear strain.
+        """
+        held = {"clamped": (True, not is_sheared), "supported": (True, False), "guided": (False, not is_sheared)}
+        return self._without([held.get(end, (False, False)) for end in self.held], parity)
+
+    def kept_strain(self, parity: int) -> NDArray[np.bool_]:
+        """Which functions the shear strain along this side has: where the turning is held, not its value."""
+        return self._without([(end in ("clamped", "guided"), False) for end in self.held], 1 - parity)
+
+    def ties(self) -> list[tuple[int, int]]:
+        """Values of the shear strain that are slopes of the deflection, where an end holds the turning."""
+        last = self.n_functions - 2
+        nodes = [(0, self.held[0])] if self.is_split else [(0, self.held[0]), (last, self.held[1])]
+        return [(value, value + 1) for value, end in nodes if end in ("clamped", "guided")]
+
+    def _without(self, held: list[tuple[bool, bool]], parity: int) -> NDArray[np.bool_]:
+        first, last = held
+        if self.is_split:
+            last = (parity == 1, parity == 0)
+        kept = np.ones(self.n_functions, dtype=bool)
+        kept[:2] = np.logical_not(first)
+        kept[-2:] = np.logical_not(last)
+        return kept
+
+
+def rigid_degrees(ends: Ends) -> tuple[int, ...]:
+    """Degrees of the rigid motions of a line, in the order of its beam functions.
+
+    A free line can shift (0) and turn (1), a line supported at one end only can turn, others cannot move.
+    """
+    if ends == ("free", "free"):
+        return (0, 1)
+    if set(ends) == {"supported", "free"}:
+        return (1,)
+    return ()
+
+
+def graded_nodes(ends: Holds, n_elements: int) -> Floats:
+    """Equal elements, save that the one at each free end is split at a quarter and at a sixteenth of its length.
+
+    Along a free edge the twist of a shear-flexible plate dies out over about a third of the thickness times
+    sqrt(G_xy / G_xz): a layer too narrow for as many equal elements, whose frequencies lie up to 3 cents too high.
+
+    Parameters
+    ----------
+    ends : tuple of str
+    n_elements : int
+        All elements, the split ones among them; too few to be split stay equal.
+
+    Returns
+    -------
+    (n_elements + 1,) array
+    """
+    n_equal = n_elements - len(_LAYER) * ends.count("free")
+    if n_equal < 3:
+        return np.linspace(0.0, 1.0, n_elements + 1)
+    first, last = (np.array(_LAYER if end == "free" else ()) / n_equal for end in ends)
+    return np.sort(np.concatenate([np.linspace(0.0, 1.0, n_equal + 1), first, 1.0 - last]))
+
+
+@lru_cache(maxsize=64)
+def line(
+    ends: Ends,
+    n_elements: int,
+    is_sheared: bool = False,
+    is_split: bool = True,
+    held: Holds | None = None,
+    n_points: int = N_POINTS,
+) -> Line:
+    """The functions of one side; the result is shared, so it must not be changed.
+
+    Parameters
+    ----------
+    ends : tuple of str
+        Condition at 0 and at 1.
+    n_elements : int
+        Number of elements of the whole side.
+    is_sheared : bool
+        A side of a shear-flexible plate, whose elements are graded towards free ends.
+    is_split : bool
+        Whether the first half will do where both ends are alike; not so if something else on the plate tells the two
+        halves apart, or if an element lies across the middle.
+    held : tuple of str, optional
+        What the ends hold where that is less than `ends` says.
+    n_points : int
+        Gauss points per element.
+
+    Returns
+    -------
+    Line
+    """
+    from skfem import Basis, ElementLineHermite, MeshLine
+
+    nodes = graded_nodes(ends, n_elements) if is_sheared else np.linspace(0.0, 1.0, n_elements + 1)
+    is_split = is_split and ends[0] == ends[1] and n_elements % 2 == 0
+    if is_split:
+        nodes = nodes[: n_elements // 2 + 1]
+    basis = Basis(MeshLine.init_tensor(nodes), ElementLineHermite(), intorder=2 * n_points - 1)
+    return Line(ends, ends if held is None else held, is_split, basis)

@@ -1,0 +1,198 @@
+"""The plate on a reduced basis: few vectors hold its modes over a whole region, thousands of times faster than a solve.
+
+The basis holds the modes at the centre and what those at points around it have beside these, in the order of their
+singular values, as many as bring the frequencies within a tolerance at points that were held out. All terms are
+projected on it, so that the exact frequencies of a draw are the eigenvalues of a small pencil; its diagonal at the
+centre is the linear law.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.plate.beams import Beams
+from bayesplate.plate.naming import Place, fits, name_parts
+from bayesplate.plate.pencils import pencil_modes, pencil_values, stepped
+from bayesplate.plate.terms import Parity, Weights
+
+Floats = NDArray[np.float64]
+
+SPARE = 4
+"""Modes above the highest wanted one of a class that the basis is made for too."""
+_BATCH = 512
+"""Draws whose small matrices are held at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedClass:
+    """One symmetry class on few vectors: its modes at the centre, mass-orthonormal there, and what completes them.
+
+    Attributes
+    ----------
+    parity : Parity
+    stiffness : (n_terms, r, r) array
+        Projected stiffness terms.
+    masses : (n_masses, r, r) array
+        Projected mass terms.
+    n_kept : int
+        How many of the vectors, the first ones, are modes at the centre from which those of a draw are found.
+    products : tuple of (int, int)
+        Orders of the products of beam functions that name its modes.
+    parts : (r, n_products) array
+        What each vector has of these.
+    squares : (r, r) array
+        Mean products of the vectors' deflections.
+    beside : (n_masses, r, r) array
+        What each mass term gives to the coordinates beside the plate.
+    n_rigid : int
+        Rigid motions in the basis: the lowest eigenvalues, which are left out.
+    """
+
+    parity: Parity
+    stiffness: Floats
+    masses: Floats
+    n_kept: int
+    products: tuple[Beams, ...]
+    parts: Floats
+    squares: Floats
+    beside: Floats
+    n_rigid: int = 0
+
+    def eigenvalues(self, weights: Weights) -> Floats:
+        """Elastic eigenvalues of many draws, increasing: (n_draws, n_kept - n_rigid) array, s^-2.
+
+        Not a number at a draw that is no plate.
+        """
+        return np.concatenate([self._eigenvalues(part) for part in _batches(weights)])
+
+    def _eigenvalues(self, weights: Weights) -> Floats:
+        step = stepped(_weighted(weights.stiffness, self.stiffness), self.mass(weights), self.n_kept, self.n_rigid)
+        values = (pencil_values(step.stiffness, step.mass) - step.shift)[:, self.n_rigid :]
+        return np.where(values[:, :1] > 0.0, values, np.nan)
+
+    def modes(self, weights: Weights, n_modes: int) -> tuple[Floats, Floats]:
+        """Lowest elastic modes of many draws: (n_draws, n) eigenvalues, s^-2, and (n_draws, r, n) vectors.
+
+        The vectors are combinations of the basis, normalised in the draw's mass. Neither is a number at a draw that is
+        no plate.
+        """
+        step = stepped(_weighted(weights.stiffness, self.stiffness), self.mass(weights), self.n_kept, self.n_rigid)
+        values, turned = pencil_modes(step.stiffness, step.mass)
+        elastic = slice(self.n_rigid, self.n_rigid + n_modes)
+        values, vectors = (values - step.shift)[:, elastic], step.vectors @ turned[:, :, elastic]
+        is_plate = values[:, 0] > 0.0
+        return np.where(is_plate[:, None], values, np.nan), np.where(is_plate[:, None, None], vectors, np.nan)
+
+    def mass(self, weights: Weights) -> Floats:
+        """Mass matrices of many draws on the basis: (n_draws, r, r) array."""
+        return _weighted(weights.mass, self.masses)
+
+    def ranks(self, weights: Weights, n_modes: int, least: float = 0.0) -> NDArray[np.intp]:
+        """Which of the lowest elastic modes each of `products` names, with at least that correlation, at many draws.
+
+        Returns
+        -------
+        (n_draws, n_products) array of int
+            From 0; `n_modes` where it names none of them, -1 at a draw that is no plate.
+        """
+        found = np.full((len(weights.stiffness), len(self.products)), -1, dtype=np.intp)
+        values, vectors = self.modes(weights, n_modes)
+        for draw in np.flatnonzero(np.isfinite(values).all(axis=1)):
+            found[draw] = n_modes
+            for mode, (product, correlation) in enumerate(name_parts(self._fits(weights.mass[draw], vectors[draw]))):
+                if correlation >= least:
+                    found[draw, product] = mode
+        return found
+
+    def _fits(self, mass: Floats, vectors: Floats) -> Floats:
+        """How well each mode of a draw fits each product: (n_modes, n_products) array."""
+        forms = np.stack([self.squares, np.tensordot(mass, self.beside, axes=1)])
+        squares, beside = np.einsum("rm,frs,sm->fm", vectors, forms, vectors, optimize=True)
+        return fits(vectors.T @ self.parts, squares, 1.0 - beside)
+
+    def energies(self, weights: Weights, n_modes: int) -> tuple[Floats, Floats]:
+        """What each term has of the lowest modes of one draw: (n_modes, n_terms) and (n_modes, n_masses) arrays.
+
+        The ratio of their weighted sums is omega^2 to second order around the draw.
+        """
+        vectors = self.modes(weights, n_modes)[1][0]
+        stiffness, mass = (
+            np.einsum("rm,trs,sm->mt", vectors, terms, vectors, optimize=True)
+            for terms in (self.stiffness, self.masses)
+        )
+        return stiffness, mass
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedOrderModel:
+    """The plate on a basis of few vectors in each class that holds wanted modes.
+
+    Attributes
+    ----------
+    places : tuple of Place
+        The wanted modes, in the caller's order.
+    classes : tuple of ReducedClass
+    worst_cents : float
+        Largest error against full solves that were held out when the basis was built.
+    """
+
+    places: tuple[Place, ...]
+    classes: tuple[ReducedClass, ...]
+    worst_cents: float
+
+    def eigenvalues(self, weights: Weights) -> Floats:
+        """Eigenvalue of each wanted mode for many draws: (n_draws, n_modes) array, s^-2."""
+        values = np.empty((weights.stiffness.shape[0], len(self.places)))
+        for own in self.classes:
+            columns, ranks = self._of(own)
+            values[:, columns] = own.eigenvalues(weights)[:, ranks]
+        return values
+
+    def ranks(self, weights: Weights, least: float = 0.0) -> dict[Beams, NDArray[np.intp]]:
+        """Rank in its class of the mode that each product of beam functions names, at many draws.
+
+        Parameters
+        ----------
+        weights : Weights
+        least : float
+            Correlation of its shape with the product from which on a mode has that name.
+
+        Returns
+        -------
+        dict of (n_draws,) array of int
+            By the orders along x and y; those that name none of the lowest modes have the highest rank of all. -1 at a
+            draw that is no plate.
+        """
+        found: dict[Beams, NDArray[np.intp]] = {}
+        for own in self.classes:
+            n_modes = max(self._of(own)[1]) + 1 + SPARE
+            found |= dict(zip(own.products, own.ranks(weights, n_modes, least).T, strict=True))
+        return found
+
+    def energies(self, weights: Weights) -> tuple[Floats, Floats]:
+        """What each term has of each wanted mode of one draw: (n_modes, n_terms) and (n_modes, n_masses) arrays."""
+        stiffness, mass = (np.empty((len(self.places), part.shape[1])) for part in weights)
+        for own in self.classes:
+            columns, ranks = self._of(own)
+            stiffness[columns], mass[columns] = (part[ranks] for part in own.energies(weights, max(ranks) + 1))
+        return stiffness, mass
+
+    def _of(self, own: ReducedClass) -> tuple[list[int], list[int]]:
+        """Which of the wanted modes are of a class, and their ranks there."""
+        both = [(i, place.rank) for i, place in enumerate(self.places) if place.parity == own.parity]
+        return [i for i, _ in both], [rank for _, rank in both]
+
+
+def _batches(weights: Weights) -> Iterator[Weights]:
+    for start in range(0, max(len(weights.stiffness), 1), _BATCH):
+        yield Weights(*(part[start : start + _BATCH] for part in weights))
+
+
+def _weighted(weights: Floats, terms: Floats) -> Floats:
+    """Weighted sums of terms, one (r, r) matrix per draw."""
+    n_terms, r, _ = terms.shape
+    return (weights @ terms.reshape(n_terms, r * r)).reshape(-1, r, r)

@@ -1,0 +1,277 @@
+"""Modes of a plate: eigenvalues and shapes of K phi = omega^2 M phi, class by class."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.plate.beams import product_coefficients
+from bayesplate.plate.classes import SymmetryClass
+from bayesplate.plate.forms import Elements
+from bayesplate.plate.plate import Plate
+from bayesplate.plate.terms import Parity, Weights
+
+Floats = NDArray[np.float64]
+
+_SPARE_FOR_PROJECTED = 8
+_FIRST_OF_CLASS = 8
+_MORE, _FEWEST_MORE = 1.15, 4
+"""What is added to an estimate of how many modes there are."""
+_MASSLESS = 1e-12
+_TOLERANCE = 1e-8
+"""Of the solver's own values; those of the modes are Ritz values on its vectors, which err by the square of it."""
+_SHIFT = -1e-2
+"""Over the lowest elastic eigenvalue."""
+
+
+@dataclass(frozen=True, eq=False)
+class ClassModes:
+    """Lowest elastic modes of one symmetry class.
+
+    Attributes
+    ----------
+    own : SymmetryClass
+    eigenvalues : (n_modes,) array
+        omega^2, s^-2, increasing; rigid motions are left out.
+    vectors : (n_dof, n_modes) array
+        Mass-normalised.
+    rigid : (n_dof, n_rigid) array
+        The class's rigid motions, mass-normalised.
+    on_plate : (n_modes,) array
+        Share of the kinetic energy of each mode that is not of coordinates beside the plate.
+    """
+
+    own: SymmetryClass
+    eigenvalues: Floats
+    vectors: Floats
+    rigid: Floats
+    on_plate: Floats
+
+    def of(self, ranks: Sequence[int] | NDArray[np.intp]) -> ClassModes:
+        """Some of the modes."""
+        own = list(ranks)
+        return replace(
+            self, eigenvalues=self.eigenvalues[own], vectors=self.vectors[:, own], on_plate=self.on_plate[own]
+        )
+
+    def coefficients(self) -> tuple[Floats, Floats]:
+        """phi' K_i phi and phi' M_j phi of each mode: (n_modes, n_terms) and (n_modes, n_masses) arrays.
+
+        Weighted with the weights of the solve they sum to the eigenvalue and to 1 (the sum rule).
+        """
+        return self.own.energies(self.vectors)
+
+
+def solve_classes(plate: Plate, weights: Weights, n_modes: Mapping[Parity, int]) -> dict[Parity, ClassModes]:
+    """Lowest elastic modes of some symmetry classes.
+
+    Parameters
+    ----------
+    plate : Plate
+    weights : Weights
+        Of one draw.
+    n_modes : dict of int
+        How many of each class.
+
+    Returns
+    -------
+    dict of ClassModes
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the weights are those of no plate.
+    """
+    elements = plate.elements(weights)
+    return {parity: _solved(plate.symmetry_class(parity), elements, weights, n) for parity, n in n_modes.items()}
+
+
+def _solved(own: SymmetryClass, elements: tuple[Elements, Elements], weights: Weights, n_modes: int) -> ClassModes:
+    from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
+
+    # The solver needs a positive mass; what is left out for that joins on the span of its vectors.
+    is_whole = elements[1].is_definite
+    whole = own.pencil(elements)
+    stiffness, mass = whole if is_whole else own.pencil((elements[0], elements[1].without_negative()))
+    shift = _shift_below(own, weights)
+    options = {"SymmetricMode": True}
+    n_wanted = min(
+        own.n_rigid + n_modes + _SPARE_FOR_PROJECTED * (own.plate.is_projected or not is_whole), own.n_dof - 1
+    )
+    try:
+        factors = splu(stiffness - shift * mass, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+        _, vectors = eigsh(
+            stiffness,
+            k=n_wanted,
+            M=mass,
+            sigma=shift,
+            OPinv=LinearOperator(stiffness.shape, matvec=factors.solve, dtype=float),
+            v0=np.random.default_rng(0).standard_normal(own.n_dof),
+            ncv=min(own.n_dof, max(2 * n_wanted + 1, 20)),
+            tol=_TOLERANCE,
+        )
+    except (ArpackError, RuntimeError) as failure:
+        raise np.linalg.LinAlgError(str(failure)) from failure
+    # The solver's own values carry the rounding of a nearly singular factorisation where the plate can move as a whole.
+    small = own.on_span([whole], Weights(*(part[None] for part in weights)), vectors)
+    values, combinations = _ritz(small[0][0], small[1][0])
+    vectors = vectors @ combinations
+    rigid, elastic = vectors[:, : own.n_rigid], vectors[:, own.n_rigid : own.n_rigid + n_modes]
+    on_plate = 1.0 - np.diagonal(np.tensordot(weights.mass, own.project_beside(elastic), axes=1))
+    return ClassModes(own, values[own.n_rigid : own.n_rigid + n_modes], elastic, rigid, on_plate)
+
+
+def _ritz(stiffness: Floats, mass: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues on some vectors, increasing, and what combines these to modes of unit mass.
+
+    Where the mass at a place is interpolated between others, the finest shapes may have a negative mass:
+    they are no modes, and left out.
+    """
+    shares, directions = np.linalg.eigh(mass)
+    kept = shares > _MASSLESS * shares[-1]
+    if not kept.any():
+        raise np.linalg.LinAlgError("no shape has a mass above zero")
+    one = directions[:, kept] / np.sqrt(shares[kept])
+    values, turned = np.linalg.eigh(one.T @ stiffness @ one)
+    return np.asarray(values), np.asarray(one @ turned)
+
+
+def _shift_below(own: SymmetryClass, weights: Weights) -> float:
+    """A shift below zero that keeps rigid motions from making the shifted matrix singular, s^-2; 0 if there are none.
+
+    It lies well below the lowest elastic mode, as products of beam functions bound it: seen from there rigid motions
+    are far from all else, so that the solver, which finds like ones by rounding, has them before it is content.
+    """
+    if not own.n_rigid:
+        return 0.0
+    values = np.tensordot(weights.stiffness[:4], product_coefficients(own.plate.x.ends, own.plate.y.ends), axes=1)
+    return _SHIFT * min(float(values[beams]) for beams in own.plate.elastic_products[own.parity])
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Modes of a plate in the order of their frequencies.
+
+    Attributes
+    ----------
+    plate : Plate
+    eigenvalues : (n_modes,) array
+        omega^2, s^-2.
+    parities : tuple of Parity
+        Symmetry class of each mode.
+    ranks : (n_modes,) array of int
+        Position of each mode among the elastic modes of its class, from 0.
+    classes : dict of ClassModes
+        The modes of each symmetry class, at least these.
+    """
+
+    plate: Plate
+    eigenvalues: Floats
+    parities: tuple[Parity, ...]
+    ranks: NDArray[np.intp]
+    classes: Mapping[Parity, ClassModes]
+
+    @property
+    def coefficients(self) -> Floats:
+        """phi' K_i phi; weighted they sum to the eigenvalue exactly (the sum rule): (n_modes, n_terms) array."""
+        return self._energies[0]
+
+    @property
+    def mass_coefficients(self) -> Floats:
+        """phi' M_j phi; weighted they sum to 1: (n_modes, n_masses) array."""
+        return self._energies[1]
+
+    @cached_property
+    def _energies(self) -> tuple[Floats, Floats]:
+        found = {parity: own.coefficients() for parity, own in self.by_class.items()}
+        stiffness, mass = (self.in_order({parity: both[i] for parity, both in found.items()}) for i in (0, 1))
+        return stiffness, mass
+
+    @cached_property
+    def by_class(self) -> dict[Parity, ClassModes]:
+        """These modes, class by class."""
+        found = {}
+        for parity in dict.fromkeys(self.parities):
+            found[parity] = self.classes[parity].of(self.ranks[self.rows(parity)])
+        return found
+
+    def in_order(self, of_class: Mapping[Parity, Any]) -> Floats:
+        """What was worked out for the modes of each class (rows), in the order of frequency."""
+        order = np.argsort(np.concatenate([self.rows(parity) for parity in self.by_class]))
+        return np.concatenate([of_class[parity] for parity in self.by_class])[order]
+
+    def rows(self, parity: Parity) -> list[int]:
+        """Which of the modes are of a class."""
+        return [i for i, one in enumerate(self.parities) if one == parity]
+
+    def displacement(self, x: Floats, y: Floats) -> Floats:
+        """Shapes on a grid: (n_modes, n_x, n_y) array; x and y are fractions of the sides in [0, 1]."""
+        return self.in_order({p: one.own.deflections(one.vectors).on(x, y) for p, one in self.by_class.items()})
+
+    def displacement_across(self, x: Floats, y: Floats) -> Floats:
+        """The same at points y, (n_x, n_y), of their own at each x, (n_x,)."""
+        return self.in_order({p: one.own.deflections(one.vectors).across(x, y) for p, one in self.by_class.items()})
+
+
+def solve(plate: Plate, weights: Weights, n_modes: int) -> Modes:
+    """Lowest `n_modes` elastic modes of a plate.
+
+    Each class is solved for a few modes more than its share, and for more again until no class can hide a mode below
+    the highest that is returned.
+
+    Parameters
+    ----------
+    plate : Plate
+    weights : Weights
+        Of one draw.
+    n_modes : int
+
+    Returns
+    -------
+    Modes
+    """
+    asked = dict.fromkeys(plate.parities, -(-n_modes // len(plate.parities)) + 2)
+    solved = solve_classes(plate, weights, asked)
+    while True:
+        values = np.sort(np.concatenate([c.eigenvalues for c in solved.values()]))
+        limit = values[min(n_modes, values.size) - 1]
+        short = [p for p, c in solved.items() if c.eigenvalues[-1] < limit]
+        if not short and values.size >= n_modes:
+            return collect(plate, solved, n_modes)
+        asked |= {p: 2 * asked[p] for p in short or asked}
+        solved |= solve_classes(plate, weights, {p: asked[p] for p in short or asked})
+
+
+def solve_up_to(plate: Plate, weights: Weights, highest: float, n_least: int = 1) -> Modes:
+    """All elastic modes of a plate up to an eigenvalue (s^-2), and at least so many; see `solve`."""
+    asked = dict.fromkeys(plate.parities, _FIRST_OF_CLASS)
+    solved = solve_classes(plate, weights, asked)
+    eigenvalues = np.sort(np.concatenate([c.eigenvalues for c in solved.values()]))
+    highest = max(highest, eigenvalues[min(n_least, eigenvalues.size) - 1])
+    while short := [p for p, c in solved.items() if c.eigenvalues[-1] < highest]:
+        # A class that came back with fewer than were asked for is asked for more all the same.
+        asked |= {p: max(_enough(solved[p].eigenvalues, highest), asked[p] + _FEWEST_MORE) for p in short}
+        solved |= solve_classes(plate, weights, {p: asked[p] for p in short})
+    n_modes = sum(int(np.sum(c.eigenvalues <= highest)) for c in solved.values())
+    return collect(plate, solved, n_modes)
+
+
+def _enough(eigenvalues: Floats, highest: float) -> int:
+    """How many modes will reach up to an eigenvalue: those of a plate are about as dense at every frequency."""
+    ratio = float(np.sqrt(highest / eigenvalues[-1]))
+    return max(eigenvalues.size + _FEWEST_MORE, math.ceil(_MORE * ratio * eigenvalues.size))
+
+
+def collect(plate: Plate, solved: Mapping[Parity, ClassModes], n_modes: int | None = None) -> Modes:
+    """Sort the modes of several classes into one list, keeping the lowest `n_modes` (all if None)."""
+    eigenvalues = np.concatenate([c.eigenvalues for c in solved.values()])
+    order = np.argsort(eigenvalues, kind="stable")[:n_modes]
+    parities = [p for p, c in solved.items() for _ in c.eigenvalues]
+    ranks = np.concatenate([np.arange(c.eigenvalues.size) for c in solved.values()])
+    return Modes(plate, eigenvalues[order], tuple(parities[i] for i in order), ranks[order], solved)

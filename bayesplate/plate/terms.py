@@ -1,0 +1,171 @@
+"""The terms of a plate: what is integrated over it, along its edges, at places, or on given deflections only.
+
+A term is a form: the product of two strains, which are derivatives of the deflection or of a shear strain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.plate.fields import Group, Outline, weights_within
+from bayesplate.plate.line import Line
+
+Floats = NDArray[np.float64]
+
+
+class Weights(NamedTuple):
+    """Weights of the stiffness terms, s^-2, and of the mass terms, as fractions of the board's mass.
+
+    Arrays of (n_terms,) and (n_masses,), or of (n_draws, n_terms) and (n_draws, n_masses).
+    """
+
+    stiffness: Floats
+    mass: Floats
+
+    def at(self, draw: int) -> Weights:
+        """The weights of one draw."""
+        return Weights(self.stiffness[draw], self.mass[draw])
+
+
+class Parity(NamedTuple):
+    """Class of functions: 0 even, 1 odd along each side; 0 where the two ends differ and there is no such class."""
+
+    x: int
+    y: int
+
+
+class Derivative(NamedTuple):
+    """A field of unknowns, differentiated so many times along x and along y, times a factor."""
+
+    factor: float
+    field: str
+    along_x: int
+    along_y: int
+
+
+Strain = tuple[Derivative, ...]
+"""A strain or a motion: a sum of derivatives."""
+
+Pair = tuple[str, str]
+"""Names of two strains whose product is integrated: twice where they differ, so that the form is symmetric."""
+
+
+class Kinematics(NamedTuple):
+    """How a plate deforms.
+
+    Attributes
+    ----------
+    fields : tuple of str
+        What is unknown: the deflection "w", then the shear strains if there are any.
+    strains : mapping
+        By name; "turn_x" and "turn_y" are how the cross-sections turn.
+    stiffnesses, masses : tuple of Pair
+        Of each of the plate's own terms, those that a turned grain adds last.
+    groups : callable
+        From whether the grain runs at an angle to the group of each of the plate's own stiffness and mass terms.
+    """
+
+    fields: tuple[str, ...]
+    strains: Mapping[str, Strain]
+    stiffnesses: tuple[Pair, ...]
+    masses: tuple[Pair, ...]
+    groups: Callable[[bool], tuple[tuple[Group, ...], tuple[Group, ...]]]
+
+
+@dataclass(frozen=True)
+class OverPlate:
+    """A term: two strains, integrated over the plate or what an outline leaves of it."""
+
+    strains: Pair
+    outline: Outline | None = None
+
+
+@dataclass(frozen=True)
+class AlongEdges:
+    """A term: the square of a strain, integrated along the edges x0 and x1 (axis 0) or y0 and y1 that are asked for."""
+
+    axis: int
+    at: tuple[bool, bool]
+    strain: str
+
+
+class Amount(NamedTuple):
+    """Deflections at places (factor, x, y), summed; or a coordinate beside the plate, such as a magnet's rise."""
+
+    places: tuple[tuple[float, float, float], ...] = ()
+    beside: int = -1
+
+
+@dataclass(frozen=True)
+class AtPlaces:
+    """A term: products of two amounts, each with its factor."""
+
+    products: tuple[tuple[float, Amount, Amount], ...]
+
+    @property
+    def is_on_plate(self) -> bool:
+        """Whether all amounts are deflections."""
+        return self.n_beside == 0
+
+    @property
+    def n_beside(self) -> int:
+        """How many coordinates beside the plate there must be."""
+        return 1 + max(one.beside for _, *both in self.products for one in both)
+
+
+@dataclass(frozen=True)
+class OnDeflections:
+    """Terms that exist on given deflections only, for they reach all over the plate.
+
+    Attributes
+    ----------
+    project : callable
+        From `Deflections` to the terms' (n_terms, n_vectors, n_vectors) matrices.
+    n_terms : int
+    """
+
+    project: Callable[[Deflections], Floats]
+    n_terms: int = 1
+
+
+Term = OverPlate | AlongEdges | AtPlaces | OnDeflections
+
+
+@dataclass(frozen=True, eq=False)
+class Deflections:
+    """Deflections of one symmetry class as functions on the plate.
+
+    Attributes
+    ----------
+    x, y : Line
+    parity : Parity
+    coefficients : (n_vectors, n_functions_x, n_functions_y) array
+    """
+
+    x: Line
+    y: Line
+    parity: Parity
+    coefficients: Floats
+
+    def on(self, x: Floats, y: Floats) -> Floats:
+        """On a lattice, x and y fractions of the sides: (n_vectors, n_x, n_y) array."""
+        along_x, along_y = self.x.shapes(x, self.parity.x).toarray(), self.y.shapes(y, self.parity.y).toarray()
+        return np.asarray(along_x @ self.coefficients @ along_y.T)
+
+    def across(self, x: Floats, y: Floats) -> Floats:
+        """At points y, (n_x, n_y), of their own at each x, (n_x,): (n_vectors, n_x, n_y) array."""
+        along_x = self.x.shapes(x, self.parity.x).toarray()
+        along_y = self.y.shapes(y.ravel(), self.parity.y).toarray().reshape(*y.shape, -1)
+        return np.einsum("xi,nij,xyj->nxy", along_x, self.coefficients, along_y, optimize=True)
+
+    def integrals(self, outline: Outline | None) -> Floats:
+        """Over the plate, or what an outline leaves of it: (n_vectors,) array; zero where they are odd."""
+        if any(self.parity[axis] and side.is_split for axis, side in enumerate((self.x, self.y))):
+            return np.zeros(len(self.coefficients))
+        grid = self.x.derivatives[0] @ self.coefficients @ self.y.derivatives[0].T
+        return np.asarray(np.einsum("nxy,xy->n", grid, weights_within(self.x, self.y, outline)))

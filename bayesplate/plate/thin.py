@@ -1,0 +1,76 @@
+"""The thin plate: four stiffness terms and a mass on the unit square.
+
+    omega^2 = phi' (theta_xx K_xx + theta_yy K_yy + theta_mix K_mix + theta_xy K_xy) phi / mu phi' M phi
+
+with K_xx = int w_xx^2, K_yy = int w_yy^2, K_mix = 2 int w_xx w_yy (the 2 is inside, once) and K_xy = int w_xy^2.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from bayesplate.board.setup import Ends
+from bayesplate.plate.fields import Group
+from bayesplate.plate.line import line
+from bayesplate.plate.plate import Plate, plate_of
+from bayesplate.plate.terms import Derivative, Kinematics
+
+THIN_TERMS = ("xx", "yy", "mix", "xy")
+
+
+def thin_groups(is_turned: bool = False) -> tuple[tuple[Group, ...], tuple[Group, ...]]:
+    """Group of each stiffness and of each mass term that is the thin plate's own.
+
+    Where the grain runs at an angle, the modulus along it has a part in every term.
+    """
+    return (("along",) * 6 if is_turned else ("along", "bending", "bending", "bending")), ("mass",)
+
+
+THIN = Kinematics(
+    fields=("w",),
+    strains={
+        "w": (Derivative(1.0, "w", 0, 0),),
+        "slope_x": (Derivative(1.0, "w", 1, 0),),
+        "slope_y": (Derivative(1.0, "w", 0, 1),),
+        "turn_x": (Derivative(1.0, "w", 1, 0),),
+        "turn_y": (Derivative(1.0, "w", 0, 1),),
+        "bend_x": (Derivative(1.0, "w", 2, 0),),
+        "bend_y": (Derivative(1.0, "w", 0, 2),),
+        "twist": (Derivative(1.0, "w", 1, 1),),
+        "twice_twist": (Derivative(2.0, "w", 1, 1),),
+    },
+    # The last two, 4 int w_xx w_xy and 4 int w_yy w_xy, are there where the grain runs at an angle.
+    stiffnesses=(
+        ("bend_x", "bend_x"),
+        ("bend_y", "bend_y"),
+        ("bend_x", "bend_y"),
+        ("twist", "twist"),
+        ("bend_x", "twice_twist"),
+        ("bend_y", "twice_twist"),
+    ),
+    masses=(("w", "w"),),
+    groups=thin_groups,
+)
+
+
+@lru_cache(maxsize=16)
+def thin_plate(ends_x: Ends, ends_y: Ends, n_x: int, n_y: int) -> Plate:
+    """The bare thin plate; the result is shared, so it must not be changed.
+
+    Parameters
+    ----------
+    ends_x, ends_y : tuple of str
+        Condition at the two ends of each side: (x0, x1) and (y0, y1).
+    n_x, n_y : int
+        Numbers of elements along x and y.
+
+    Returns
+    -------
+    Plate
+        Stiffness terms in the order of `THIN_TERMS`.
+
+    References
+    ----------
+    Ducceschi et al., eq. (1) and (2), as energies.
+    """
+    return plate_of(THIN, line(ends_x, n_x), line(ends_y, n_y))

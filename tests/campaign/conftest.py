@@ -1,0 +1,34 @@
+"""One small campaign: three simulated boards with one accelerometer, fitted once."""
+
+from __future__ import annotations
+
+import pytest
+from made_campaigns import write_campaign
+
+import bayesplate
+from bayesplate.commands import campaign_result
+
+
+@pytest.fixture(scope="package")
+def card(tmp_path_factory):
+    """The card of the campaign."""
+    return write_campaign(tmp_path_factory.mktemp("campaign"))
+
+
+@pytest.fixture(scope="package")
+def campaign(card):
+    """The campaign, its boards solved once."""
+    return bayesplate.Campaign.from_card(card)
+
+
+@pytest.fixture(scope="package")
+def fitted_campaign(card, campaign):
+    """Its fit, with files; the page of a board is that of its fit, and written whole for the first one only."""
+    whole = campaign_result.write_page
+
+    def first_whole(folder, result):
+        return whole(folder, result) if folder.name == "board-0" else (folder / "report.html").write_text("a page")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(campaign_result, "write_page", first_whole)
+        return bayesplate.fit(campaign, out=card.parent / "out")

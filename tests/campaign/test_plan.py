@@ -1,0 +1,190 @@
+"""What to measure next in a campaign: proposals in their order, and sheets for the modes to look for."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import bayesplate
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading import Peak
+from bayesplate.campaign.scatter import expected_width
+from bayesplate.planning.bench import bands, benches
+from bayesplate.planning.proposals import Costs, Planner
+from bayesplate.planning.together import _linear, beliefs_together
+
+SHARED = "attached_mass.mass"
+
+
+@pytest.fixture(scope="module")
+def planned(campaign, tmp_path_factory):
+    """A plan of three boards with one sensor, with its files."""
+    return bayesplate.plan(campaign, out=tmp_path_factory.mktemp("plan"))
+
+
+def test_what_narrows_the_shared_parameter_most_comes_first(planned):
+    listed = planned.summary.proposals
+    scores = [one.gain.score for one in listed]
+
+    assert planned.summary.basis == "campaign"
+    assert listed[0].sentence in planned.summary.first
+    assert scores == sorted(scores, reverse=True)
+    assert scores == pytest.approx([-np.log(one.gain.shared[SHARED]) for one in listed])
+    (weighing,) = [one for one in listed if "Weigh" in one.sentence]
+    assert weighing is listed[0]  # the sensor itself: a reading of what is shared, and nothing beside it
+    assert weighing.gain.E_x > 0.9
+
+
+def test_two_steps_give_more_than_one_and_three_more_than_two(planned):
+    best = planned.summary.proposals[0].gain.score
+    scores = [best, *(one.gain.score for one in planned.summary.sequences)]
+    costs = [one.cost_minutes for one in planned.summary.sequences]
+
+    assert len(scores) == 3
+    assert scores == sorted(scores)
+    assert costs == sorted(costs)
+
+
+@pytest.fixture(scope="module")
+def posed(campaign):
+    """Boards, priors and what they share."""
+    boards = [one.prepared.board for one in campaign.problems]
+    return boards, [one.prior for one in campaign.problems], campaign.shared
+
+
+@pytest.fixture(scope="module")
+def planner(posed):
+    """All boards to first order, for the sake of E_y."""
+    return Planner(beliefs_together(*posed), 1, "E_y")
+
+
+@pytest.fixture(scope="module")
+def listed(posed, planner):
+    """What could be read next."""
+    return planner.ranked(*posed[1:])
+
+
+def test_a_board_whose_number_scatters_says_less_of_the_middle(posed, planner):
+    """Its precision and the variance of the scatter, joined as of a sum; not where nothing scatters."""
+    (board, *_), (prior, *_), shared = posed
+    alone = planner.beliefs.boards[0].pull
+    scattering = tuple(replace(one, scatter=0.5) for one in shared)
+    scattered = _linear(board, prior, scattering).known.pull
+    width = expected_width(scattering)
+
+    assert scattered == pytest.approx(np.linalg.inv(np.linalg.inv(alone) + np.diag(width**2)))
+    assert scattered[0, 0] < 0.9 * alone[0, 0]
+
+
+def test_a_reading_counts_with_the_uncertainty_that_it_was_stated_with(posed):
+    """In the precision of the board: by hand, a row with its own variance in place of the noise alone."""
+    (board, *_), (prior, *_), shared = posed
+    (setup,) = board.setups
+    first = setup.readings[0]
+    rough = replace(first, frequency=Quantity.from_mean(first.frequency.mean, 0.03 * first.frequency.mean))
+    made = replace(board, setups=(replace(setup, readings=(rough, *setup.readings[1:])),))
+    known, noise, precision = _linear(made, prior, shared)
+
+    (law,) = known.laws
+    rows = law.slopes[0, : law.station.n_old] @ known.columns
+    variance = np.full(len(rows), noise[0] ** 2)
+    variance[0] += np.log1p(0.03**2)
+    n = made.symmetry.n
+    own = np.diag([*np.zeros(n), *np.ones(len(precision) - n - len(shared)), *np.zeros(len(shared))])
+    assert precision == pytest.approx(own + rows.T @ (rows / variance[:, None]), rel=1e-3)
+
+
+def test_peaks_that_stand_by_a_mode_are_taken_for_it(posed):
+    """Two labels taken from a board: their peaks tell as much, and none of the two is proposed."""
+    (board, *_), (prior, *_), shared = posed
+    (setup,) = board.setups
+    peaks = tuple(Peak(one.frequency) for one in setup.readings[-2:])
+    bare = replace(board, setups=(replace(setup, readings=setup.readings[:-2], peaks=peaks),))
+    (law,) = _linear(bare, prior, shared).known.laws
+
+    assert law.station.n_old == len(setup.readings)
+    assert set(law.station.setup.labels[: law.station.n_old]) == set(setup.labels)
+    assert set(law.station.base.labels) == set(setup.labels)
+
+
+def test_modes_to_look_for_have_a_sheet_with_the_sensor_where_it_stands(posed, planner, listed):
+    found = [one.entry for one in benches(planner.beliefs, listed)]
+
+    assert len(found) == 2
+    for bench in found:
+        (asked,) = [one.entry for one in listed if (one.entry.board, one.entry.setup) == (bench.board, bench.setup)
+                    and one.entry.what in ("modes", "edges")]  # fmt: skip
+        assert {mode.label for mode in bench.modes} == set(asked.modes)
+        (law,) = [law for one in planner.beliefs.boards for law in one.laws
+                  if (one.board.name, law.station.setup.name) == (bench.board, bench.setup)]  # fmt: skip
+        at_estimate = dict(zip(map(str, law.station.setup.labels), np.exp(law.solved[0]), strict=True))
+        assert [mode.hz for mode in bench.modes] == pytest.approx([at_estimate[mode.label] for mode in bench.modes])
+        assert all(mode.low_hz < mode.hz < mode.high_hz for mode in bench.modes)
+        if asked.what == "edges":
+            continue
+        ((x, y),) = next(one for one in posed[0] if one.name == bench.board).setups[0].attached[0].places
+        assert bench.sensor_mm == pytest.approx((1e3 * x, 1e3 * y), abs=25)  # the grid of places
+
+
+def test_boards_that_tell_most_may_be_held_another_way(planner, listed):
+    """What it leaves of the shared parameter, by a normal update by hand."""
+    other = [one for one in listed if one.entry.what == "edges"]
+    beliefs = planner.beliefs
+    order = sorted(beliefs.boards, key=lambda one: -np.trace(one.pull))
+    assert {one.entry.board for one in other} == {one.board.name for one in order[:2]}
+    for one in other:
+        assert one.entry.sentence.startswith(f"Measure board {one.entry.board} ")
+        assert one.entry.cost_minutes == Costs().clamping + len(one.entry.modes) * Costs().reading
+        assert one.read.law.station.is_new
+        assert one.read.again is None
+        noise = one.read.law.station.setup.noise.median
+        assert one.readings.variance[0][0] == pytest.approx(np.full(len(one.entry.modes), noise**2))
+    one, (now,) = other[0], beliefs.explanations
+    rows, variance = one.readings.slopes[0][0], one.readings.variance[0][0]
+    known = np.linalg.inv(now.covariance[0]) + rows.T @ (rows / variance[:, None])
+    wanted = now.wanted[0]
+    before, after = (np.diagonal(wanted @ c @ wanted.T) for c in (now.covariance[0], np.linalg.inv(known)))
+    of_shared = list(one.entry.gain.shared.values())
+    assert of_shared == pytest.approx(np.sqrt(after / before)[: len(of_shared)])
+    assert of_shared[0] < 1.0
+
+
+def test_the_sheets_are_those_of_the_steps_that_are_proposed_together(campaign, tmp_path, monkeypatch):
+    """Where modes are all that could be read, the best three are of three boards; two of them get a sheet."""
+    every = Planner.ranked
+    monkeypatch.setattr(
+        Planner, "ranked", lambda *given: tuple(one for one in every(*given) if one.entry.what in ("modes", "edges"))
+    )
+    found = bayesplate.plan(campaign, goal="E_y", out=tmp_path / "out")
+    asked = found.summary.sequences[-1].steps
+
+    assert len(asked) == 3
+    assert len(found.benches) == len(found.summary.bench) == 2
+    for bench, step in zip(found.summary.bench, asked, strict=False):
+        assert f"of board {bench.board} as well" in step
+    assert {"plan-bench.png", "plan-bench-2.svg"} <= {path.name for path in found.files}
+
+
+def test_the_band_of_a_mode_has_what_is_not_known_of_the_board_and_the_noise(planner, listed):
+    """Two times in three, so 0.967 standard deviations either way; of a board that were known, the noise alone."""
+    reading = next(one for one in listed if one.entry.what == "modes").readings
+    (now,) = planner.beliefs.explanations
+    known = replace(planner.beliefs, explanations=(replace(now, covariance=np.zeros_like(now.covariance)),))
+    of_both, of_noise = (np.diff(bands(one, reading)[:, [0, 2]])[:, 0] for one in (planner.beliefs, known))
+
+    rows, variance = reading.slopes[0][0], reading.variance[0][0]
+    assert of_noise == pytest.approx(2.0 * 0.9674 * np.sqrt(variance), rel=1e-3)
+    of_board = np.einsum("nu,uv,nv->n", rows, now.covariance[0], rows)
+    assert of_both / of_noise == pytest.approx(np.sqrt(1.0 + of_board / variance))
+
+
+def test_a_plan_without_modes_to_look_for_has_no_sheet(planned):
+    told = json.loads(next(path for path in planned.files if path.name == "plan.json").read_text())
+
+    assert told["basis"] == "campaign"
+    assert not any("as well" in step for step in told["sequences"][-1]["steps"])
+    assert told["bench"] == []
+    assert {path.name for path in planned.files} == {"plan.json", "plan.png", "plan.svg"}

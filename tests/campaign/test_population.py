@@ -1,0 +1,133 @@
+"""The distribution of boards' constants, against populations with a known truth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from bayesplate.board.prior import PriorCard, load_prior
+from bayesplate.board.quantity import Quantity
+from bayesplate.campaign.population import BoardConstants, Population, find_population, prior_of, require_moduli
+from bayesplate.errors import InputError
+from bayesplate.posterior.sampling import Chains, SamplerSettings
+
+MEAN = np.log([11e9, 0.95e9, 0.67e9])
+SD = np.array([0.12, 0.25, 0.15])
+OWN = np.array([0.01, 0.02, 0.015])
+
+
+def boards_of(rng, n, mean=MEAN, sd=SD, own=OWN):
+    """Boards of a population, and what each of them truly is."""
+    truths = mean + sd * rng.standard_normal((n, 3))
+    return [
+        (truth, BoardConstants(f"board {i}", truth + own * rng.standard_normal(3), np.diag(own**2)))
+        for i, truth in enumerate(truths)
+    ]
+
+
+def found_of(boards, seed=1):
+    return find_population([one for _, one in boards], load_prior("spruce"), SamplerSettings(seed=seed))
+
+
+def test_the_population_of_many_boards_is_found():
+    rng = np.random.default_rng(1)
+    found = found_of(boards_of(rng, 40))
+
+    assert found.convergence.passed
+    assert np.abs((found.means.mean(axis=0) - MEAN) / (SD / np.sqrt(40))).max() < 4.0
+    assert np.abs(np.log(found.sds.mean(axis=0) / SD)).max() < 4.0 / np.sqrt(80)
+
+
+def test_means_and_widths_are_covered_at_the_stated_rate():
+    """90 % intervals over 12 small populations, whose truths are drawn from what is believed of them."""
+    prior = load_prior("spruce")
+    middle = np.log([prior.constants[name].median for name in ("E_x", "E_y", "G_xy")])
+    width = np.array([prior.constants[name].log_sd for name in ("E_x", "E_y", "G_xy")])
+    hits = []
+    for seed in range(12):
+        rng = np.random.default_rng(100 + seed)
+        mean, sd = middle + width * rng.standard_normal(3), width * np.abs(rng.standard_normal(3))
+        found = found_of(boards_of(rng, 6, mean, sd), seed=seed)
+        for draws, truth in [(found.means, mean), (found.sds, sd)]:
+            low, high = np.quantile(draws, [0.05, 0.95], axis=0)
+            hits += list((low <= truth) & (truth <= high))
+
+    low, high = binom.ppf([0.0005, 0.9995], len(hits), 0.9)
+    assert low <= sum(hits) <= high
+
+
+def test_what_all_boards_are_off_by_alike_does_not_average_out():
+    """90 % intervals of the means of 8 populations whose boards share an error; without it they miss."""
+    slopes, width = np.array([[0.5], [-0.6], [0.4]]), 0.4
+    hits = {"common": [], "own": []}
+    for seed in range(8):
+        rng = np.random.default_rng(300 + seed)
+        off = slopes[:, 0] * width * rng.standard_normal()
+        boards = [one for _, one in boards_of(rng, 12, sd=0.5 * SD)]
+        common = [replace(one, mean=one.mean - off, slopes=slopes) for one in boards]
+        own = [replace(one, slopes=slopes[:, :0]) for one in common]
+        for kind, some, covariance in (("common", common, width**2 * np.eye(1)), ("own", own, None)):
+            found = find_population(some, load_prior("spruce"), SamplerSettings(seed=seed), covariance)
+            low, high = np.quantile(found.means, [0.05, 0.95], axis=0)
+            hits[kind] += list((low <= MEAN) & (high >= MEAN))
+
+    assert sum(hits["common"]) >= binom.ppf(0.0005, 8, 0.9) * 3  # three constants of one population go together
+    assert sum(hits["own"]) < sum(hits["common"]) - 6
+
+
+def test_pooling_draws_a_poorly_measured_board_to_the_others():
+    rng = np.random.default_rng(3)
+    poor = BoardConstants("poor", MEAN + 0.15, 0.15**2 * np.eye(3))
+    found = found_of([*boards_of(rng, 12, sd=0.3 * SD), (MEAN, poor)])
+    pooled = found.pooled(12, rng)
+
+    assert (np.abs(pooled.mean(axis=0) - MEAN) < 0.6 * 0.15).all()
+    assert (pooled.std(axis=0) < 0.15).all()
+
+
+def test_pooling_leaves_a_well_measured_board_where_it_is():
+    """The negative control."""
+    rng = np.random.default_rng(4)
+    boards = boards_of(rng, 8)
+    pooled = found_of(boards).pooled(0, rng)
+
+    assert np.abs(pooled.mean(axis=0) - boards[0][1].mean).max() < 0.5 * OWN.max()
+
+
+def test_a_board_given_the_population_is_the_closed_form():
+    """Where mean and standard deviation of the population are known, so is what it makes of a board."""
+    one = BoardConstants("one", MEAN + 0.1, np.array([[0.04, 0.01, 0.0], [0.01, 0.05, 0.0], [0.0, 0.0, 0.02]]))
+    draws = np.tile(np.concatenate([MEAN, np.log(SD)]), (1, 20_000, 1, 1))
+    known = Population((one,), Chains(draws, np.zeros(draws.shape[:3]), 0), None)
+    precision = np.linalg.inv(one.covariance) + np.diag(SD**-2.0)
+    covariance = np.linalg.inv(precision)
+    mean = covariance @ (np.linalg.solve(one.covariance, one.mean) + MEAN / SD**2)
+    pooled = known.pooled(0, np.random.default_rng(0))
+
+    assert np.abs((pooled.mean(axis=0) - mean) / np.sqrt(np.diagonal(covariance) / 20_000)).max() < 4.0
+    assert np.allclose(np.cov(pooled.T), covariance, atol=4.0 * covariance.max() / np.sqrt(20_000))
+
+
+def test_the_prior_card_says_what_the_next_board_will_be():
+    rng = np.random.default_rng(5)
+    found = found_of(boards_of(rng, 30))
+    card = prior_of(found, "half-tops", "thirty boards", rng)
+
+    assert card.constants["E_x"].median == pytest.approx(np.exp(MEAN[0]), rel=4 * SD[0] / np.sqrt(30))
+    assert np.log(card.constants["E_y"].factor) == pytest.approx(SD[1], rel=0.4)
+    assert card.stated_constants["E_x"].source == "thirty boards"
+    truths = np.array([truth for truth, _ in boards_of(np.random.default_rng(6), 300)])
+    inside = [
+        np.mean(np.abs(truths[:, i] - np.log(card.constants[name].median)) < np.log(card.constants[name].factor))
+        for i, name in enumerate(("E_x", "E_y", "G_xy"))
+    ]
+    assert np.abs(np.array(inside) - 0.683).max() < 0.15
+
+
+def test_a_prior_of_rigidities_is_refused():
+    rigid = {name: Quantity.from_median(10.0, 2.0) for name in ("D_x", "D_y", "D_s")}
+    with pytest.raises(InputError, match="which go with the thickness"):
+        require_moduli(PriorCard.from_quantities("rigid", rigid, source="made"), "half-tops.toml [population] prior")

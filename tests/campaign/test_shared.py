@@ -1,0 +1,262 @@
+"""What boards share: its posterior against a joint run over everything at once, and what boards teach each other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_campaigns import MASS
+from scipy.linalg import block_diag
+
+from bayesplate.campaign import boards, learning
+from bayesplate.campaign.boards import Member, _joint
+from bayesplate.campaign.claim import judge, rms_cents, taught_boards
+from bayesplate.campaign.learning import learn
+from bayesplate.campaign.likelihood import moments
+from bayesplate.campaign.scatter import scatters_of
+from bayesplate.commands.campaign_diagnose import _without_shared
+from bayesplate.commands.campaign_fit import fit_boards
+from bayesplate.commands.stages import Stages
+from bayesplate.posterior.sampling import SamplerSettings, sample
+
+SHARED = "attached_mass.mass"
+
+
+def joint_run(members, is_exact=False):
+    """Draws of every board's own parameters and the shared ones together, and the effective sizes."""
+    given = [one.given if is_exact else one.quick(one.inference.surrogate) for one in members]
+    shared = members[0].shared
+    sizes = [one.own_columns.size for one in given]
+    ends = np.cumsum(sizes)
+
+    def log_posterior(theta):
+        z = theta[:, ends[-1] :]
+        total = np.sum([one.prior.log_prior(z[:, i]) for i, one in enumerate(shared)], axis=0)
+        for one, own in zip(given, np.split(theta[:, : ends[-1]], ends[:-1], axis=1), strict=True):
+            total = total + one.log_density(own, z)
+        return total
+
+    own = [m.draws.flat[:, g.own_columns] for m, g in zip(members, given, strict=True)]
+    z = np.concatenate([m.alone.z for m in members])
+    centre = np.concatenate([each.mean(axis=0) for each in own] + [z.mean(axis=0)])
+    covariance = block_diag(*[np.cov(each.T) for each in own], np.atleast_2d(np.cov(z.T)) / len(members))
+    chains, convergence = sample(log_posterior, centre, covariance, SamplerSettings(seed=2))
+    assert convergence.passed
+    return chains.pooled, convergence.ess
+
+
+def joint_run_with_scatter(members, shared):
+    """Draws of one shared number, of its scatter and of each board's own: (n, 2 + n_boards) array, effective sizes.
+
+    Each board's own number is the middle and so many widths, these of unit spread.
+    """
+    (scatter,), given = scatters_of(shared), [one.quick(one.inference.surrogate) for one in members]
+    ends, n = np.cumsum([one.own_columns.size for one in given]), len(members)
+
+    def own_numbers(theta):
+        middle, u = theta[:, -2], theta[:, -1]
+        return middle[:, None] + scatter.width(u)[:, None] * theta[:, ends[-1] : -2]
+
+    def log_posterior(theta):
+        apart, middle, u = theta[:, ends[-1] : -2], theta[:, -2], theta[:, -1]
+        total = shared[0].prior.log_prior(middle) + scatter.prior.log_prior(u) - 0.5 * (apart**2).sum(axis=1)
+        possible = np.isfinite(total)
+        z = own_numbers(theta[possible])
+        blocks = np.split(theta[possible, : ends[-1]], ends[:-1], axis=1)
+        for i, (one, own) in enumerate(zip(given, blocks, strict=True)):
+            total[possible] += one.log_density(own, z[:, i : i + 1])
+        return total
+
+    own = [m.draws.flat[:, g.own_columns] for m, g in zip(members, given, strict=True)]
+    z = np.concatenate([m.alone.z for m in members])
+    centre = np.concatenate([each.mean(axis=0) for each in own] + [np.zeros(n), z.mean(axis=0), [0.8]])
+    blocks = [np.cov(each.T) for each in own] + [np.eye(n), np.atleast_2d(np.cov(z.T)) / n, [[0.3]]]
+    chains, convergence = sample(log_posterior, centre, block_diag(*blocks), SamplerSettings(seed=2))
+    assert convergence.ess_min > 2000  # in so many directions walkers go slowly
+    assert convergence.rhat.max() < 1.01
+    draws = chains.pooled
+    found = np.column_stack([draws[:, -2:], own_numbers(draws)])
+    return found, np.minimum(convergence.ess[-2], convergence.ess[-1])
+
+
+@pytest.mark.slow
+def test_numbers_that_scatter_are_those_of_a_joint_run(fitted_campaign):
+    """Middle, scatter and each board's own; and none of it what it is without scatter."""
+    shared = tuple(replace(one, scatter=0.5) for one in fitted_campaign.learnt.together.shared)
+    members = [replace(one, shared=shared) for one in fitted_campaign.learnt.members]
+    learnt = learn(members, SamplerSettings(seed=1))
+    reference, ess = joint_run_with_scatter(members, shared)
+    both = min(ess, learnt.convergence.ess_min) / 2
+
+    for i in range(2):
+        assert max(in_errors(learnt.chains.pooled[:, i], reference[:, i], both)) < 4.0
+    for i, member in enumerate(members):
+        _, draws, effective = learnt.board(i, np.random.default_rng(0), 1)
+        z = member.given.z_of(draws.flat)[:, 0]
+        assert max(in_errors(z, reference[:, 2 + i], min(effective, both))) < 4.0
+    same = fitted_campaign.learnt.chains.pooled[:, 0]
+    assert max(in_errors(same, reference[:, 0], both)) > 4.0
+
+
+def in_errors(draws, reference, ess):
+    """Difference of means, and of the logarithms of the sds, in standard errors of the reference.
+
+    That of ln sd is sqrt((kurtosis - 1) / 4 n) of n draws, 1 / sqrt(2 n) only where they are normal: numbers of boards
+    that scatter by an unknown width have a kurtosis of about 6.
+    """
+    sd = reference.std()
+    kurtosis = (((reference - reference.mean()) / sd) ** 4).mean()
+    spread = abs(np.log(draws.std() / sd)) * np.sqrt(4.0 * ess / (kurtosis - 1.0))
+    return abs(draws.mean() - reference.mean()) / sd * np.sqrt(ess), spread
+
+
+def test_the_shared_posterior_is_that_of_a_joint_run(fitted_campaign):
+    members = fitted_campaign.learnt.members
+    reference, ess = joint_run(members)
+    z = fitted_campaign.learnt.chains.pooled[:, 0]
+    both = min(ess[-1], fitted_campaign.learnt.convergence.ess[0])
+
+    assert max(in_errors(z, reference[:, -1], both / 2)) < 4.0
+    ends = np.cumsum([0, *(one.given.own_columns.size for one in members)])
+    for i, member in enumerate(members):
+        own = fitted_campaign.boards[member.name].draws.flat[:, member.given.own_columns]
+        for column in range(3):  # ln D_x, ln D_y, ln D_s
+            few = min(ess[ends[i] + column], fitted_campaign.boards[member.name].inference.convergence.ess_min)
+            assert max(in_errors(own[:, column], reference[:, ends[i] + column], few / 2)) < 4.5
+
+
+@pytest.mark.slow
+def test_the_surrogate_leaves_no_trace_in_the_shared_posterior(fitted_campaign):
+    members = fitted_campaign.learnt.members
+    assert any(one.inference.surrogate is not None for one in members)
+    reference, ess = joint_run(members, is_exact=True)
+    z = fitted_campaign.learnt.chains.pooled[:, 0]
+
+    assert max(in_errors(z, reference[:, -1], min(ess[-1], fitted_campaign.learnt.convergence.ess[0]) / 2)) < 4.0
+
+
+def test_without_a_board_the_shared_posterior_is_another(fitted_campaign):
+    """The negative control."""
+    members = fitted_campaign.learnt.members
+    fewer = learn(members[:2], SamplerSettings(seed=1))
+    z, less = fitted_campaign.learnt.chains.pooled[:, 0], fewer.chains.pooled[:, 0]
+
+    assert max(in_errors(less, z, fitted_campaign.learnt.convergence.ess[0] / 2)) > 4.0
+
+
+def test_the_truth_is_inside_and_sharing_narrows(fitted_campaign):
+    one = fitted_campaign.summary.shared[SHARED]
+
+    assert abs(one.all_boards.mean - MASS) < 3.0 * one.all_boards.sd
+    for board, own in one.own.items():
+        assert one.all_boards.sd < own.sd
+        alone, under_all = fitted_campaign.alone[board].summary, fitted_campaign.boards[board].summary
+        assert under_all.elastic.E_x.sd < alone.elastic.E_x.sd
+    assert not any(one.refuses for one in fitted_campaign.summary.left_out_boards.values())
+
+
+def test_a_sensor_on_all_boards_is_claimed_from_those_left_out(campaign, fitted_campaign):
+    before = fit_boards(_without_shared(campaign), 1, None, Stages(None, 1.0))
+    members = {name: Member(one.inference, one.draws, ()) for name, one in before.items()}
+    taught = taught_boards(fitted_campaign.learnt, members, 1)
+
+    assert judge(taught).holds
+    for name, one in taught.items():
+        others = fitted_campaign.summary.shared["attached_mass.mass"].others[name]
+        assert one.log_score_gain > 0.0
+        assert one.after_rms_cents < one.before_rms_cents
+        assert one.others["attached_mass.mass"].mean == pytest.approx(others.mean, rel=0.05)
+
+
+@pytest.mark.parametrize("scatter", [0.0, 0.5])
+def test_a_board_that_is_left_out_has_what_the_others_teach(fitted_campaign, scatter):
+    """Its shared number as they teach it; its constants as they go with such numbers."""
+    shared = tuple(replace(one, scatter=scatter) for one in fitted_campaign.learnt.together.shared)
+    members = tuple(replace(one, shared=shared) for one in fitted_campaign.learnt.members)
+    learnt = learn(members, SamplerSettings(seed=1)) if scatter else fitted_campaign.learnt
+    for i, member in enumerate(learnt.members):
+        _, draws = learnt.board_left_out(i, np.random.default_rng(0), 1)
+        z = member.given.z_of(draws.flat)[:, 0]
+        mean, covariance = learnt.together.taught((i,))
+        n = len(np.unique(z))
+        assert abs(z.mean() - mean[0]) < 4.0 * np.sqrt(covariance[0, 0] / n)
+        assert z.std() == pytest.approx(np.sqrt(covariance[0, 0]), rel=4.0 / np.sqrt(n))
+        alone = member.draws.moduli["E_x"].ravel()
+        slope = np.polyfit(member.given.z_of(member.draws.flat)[:, 0], np.log(alone), 1)[0]
+        expected = np.log(alone).mean() + slope * (mean[0] - member.alone.z.mean())
+        assert np.log(draws.moduli["E_x"]).mean() == pytest.approx(expected, abs=0.1 * np.log(alone).std())
+
+
+def test_a_draw_that_ends_where_there_is_no_plate_has_no_weight(fitted_campaign):
+    member, drawn = fitted_campaign.learnt.members[0], fitted_campaign.learnt.samples[0]
+    z = np.concatenate([[[100.0]], np.full((199, 1), drawn.z.mean())])
+    moved = member.moved(drawn, member.log_prior, z, np.random.default_rng(0))
+    inference, draws = member.posterior_of(moved, moved.weights, np.random.default_rng(0), 1)
+
+    assert moved.weights[0] == 0.0
+    assert moved.weights[1:] == pytest.approx(1.0 / 199)
+    assert np.isfinite(rms_cents(inference, draws))
+
+
+def test_a_board_walked_anew_is_that_of_weights(fitted_campaign, monkeypatch):
+    """The way that is taken where few of a board's own draws are left gives the same where many are."""
+    learnt = fitted_campaign.learnt
+    monkeypatch.setattr(learning, "FEWEST_WEIGHTED_DRAWS", np.inf)
+    for i, member in enumerate(learnt.members):
+        _, anew, effective = learnt.board(i, np.random.default_rng(0), 1)
+        usual = fitted_campaign.boards[member.name].draws
+        assert effective > 500
+        for name, values in usual.moduli.items():
+            both = max(in_errors(np.log(anew.moduli[name]).ravel(), np.log(values).ravel(), effective / 2))
+            assert both < 5.0, (member.name, name)
+
+
+def others_at(member, sds):
+    """What others teach so many of a board's own standard deviations off: ln of its density, mean and covariance."""
+    mean, covariance = moments(member.alone.z, member.alone.weights)
+    sd = np.sqrt(covariance[0, 0])
+    middle, width = mean + sds * sd, 0.1 * sd
+    return lambda z: -0.5 * ((z[:, 0] - middle[0]) / width) ** 2, (middle, width**2 * np.eye(1))
+
+
+def test_a_board_that_others_lead_far_off_is_walked_where_its_law_is_known(fitted_campaign, monkeypatch):
+    """Five standard deviations off, where its own draws end: as a walk on the law itself; one surrogate does not do."""
+    member = fitted_campaign.learnt.members[0]
+    others, aim = others_at(member, 5.0)
+    drawn = member.anew(others, member.alone, aim, 1)
+    effective = drawn.effective(drawn.weights)
+    assert effective > learning.FEWEST_WEIGHTED_DRAWS
+    own = member.given.own_columns
+    centre, covariance = moments(np.column_stack([drawn.theta[:, own], drawn.z]), drawn.weights)
+    chains, convergence = sample(
+        _joint(member.given, others), centre, covariance, SamplerSettings(seed=2, n_ensembles=2)
+    )
+    assert convergence.passed
+    for i in range(own.size):
+        ours, exact = drawn.theta[:, own[i]], chains.pooled[:, i]
+        mean, spread = drawn.weights @ ours, exact.std()
+        assert abs(mean - exact.mean()) < 5.0 * spread * np.sqrt(1.0 / effective + 1.0 / convergence.ess_min)
+
+    monkeypatch.setattr(boards, "_MOST_WALKS", 1)
+    once = member.anew(others, member.alone, aim, 1)
+    assert once.effective(once.weights) < learning.FEWEST_WEIGHTED_DRAWS
+
+
+def test_where_no_draw_has_a_density_by_the_law_what_was_there_before_stays(fitted_campaign):
+    """A mass of more than all boards that there are: no draw counts as one of many that are equally good."""
+    member = fitted_campaign.learnt.members[0]
+    others, aim = others_at(member, 80.0)
+    found = member.anew(others, member.alone, aim, 1)
+    assert found is member.alone
+
+
+def test_a_likelihood_that_is_off_its_draws_is_found_again(fitted_campaign):
+    """A slope of two standard deviations too much: the board is lost, and learned anew."""
+    learnt = fitted_campaign.learnt
+    first = learnt.together.likelihoods[0]
+    tilted = replace(first, coefficients=first.coefficients + np.eye(1, first.coefficients.size)[0] * 2.0)
+    together = replace(learnt.together, likelihoods=(tilted, *learnt.together.likelihoods[1:]))
+
+    assert (learnt.astray < learning.ASTRAY).all()
+    assert replace(learnt, together=together).astray[0] > learning.ASTRAY

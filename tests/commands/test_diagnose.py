@@ -1,0 +1,360 @@
+"""`diagnose` from card to files: the contract of diagnosis.json, the two fits, and folders that are there already."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Sequence
+from functools import partial
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+import runs
+from carried_boards import CARRIES, LABEL, five_modes
+from click.testing import CliRunner
+from runs import files_in, read_json
+
+from bayesplate.cli import main
+from bayesplate.commands.check import check
+from bayesplate.commands.diagnose import diagnose as run_diagnose
+from bayesplate.commands.fit import fit
+from bayesplate.diagnosis.joint import full_search
+from bayesplate.errors import InputError
+from bayesplate.posterior.checkpoint import CHAINS
+from bayesplate.posterior.convergence import Gate
+from bayesplate.posterior.sampling import SamplerSettings
+from bayesplate.results.folder import OutputFolder
+
+WITH_SHEAR = "paper-cantilever-fe"
+CALM = "fiemme-spruce-clamped"
+WORDS = {"none needed", "named", "indistinguishable group", "unexplained", "undetectable"}
+KEYS = {
+    "format", "verdict", "claim", "effects", "known", "before", "after", "gain_null_percentile", "elastic_shift",
+    "candidates", "recommendation",
+}  # fmt: skip
+ERRORS = {
+    "in_sample_rms_cents", "leave_one_out_rms_cents", "nested_leave_one_out_rms_cents", "log_score", "hits_90",
+}  # fmt: skip
+CANDIDATE = {
+    "name", "setup", "raw_rms_cents", "visible_rms_cents", "bias_percent", "inclusion_probability", "amplitude",
+    "look_alikes", "rejected_because",
+}  # fmt: skip
+MODULI = {"E_x", "E_y", "G_xy"}
+FIT = {"summary.json", "posterior.nc"}
+TRIED = ("transverse_shear", "clamp_rotation")
+LOOSE_GATE = Gate(rhat_max=10.0, tau_count_min=1.0, ess_min=1.0)
+
+
+def diagnose(folder: Path, *arguments: str) -> runs.Run:
+    result = CliRunner().invoke(main, ["diagnose", *arguments, "--out", str(folder)])
+    return runs.Run(result.exit_code, result.stdout, result.stderr, folder)
+
+
+def quickly(patch: pytest.MonkeyPatch, *, page: bool = False) -> None:
+    """Two candidates, and a sampler whose first judgement passes; a page only where it is asked for."""
+    patch.setattr("bayesplate.commands.fitting.SamplerSettings", partial(SamplerSettings, gate=LOOSE_GATE))
+    patch.setattr("bayesplate.commands.diagnose.full_search", partial(full_search, tried=TRIED))
+    if not page:
+        patch.setattr("bayesplate.commands.diagnose.write_page", lambda *_: None)
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    quickly(monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def with_shear(tmp_path_factory: pytest.TempPathFactory) -> runs.Run:
+    """A board whose readings name shear, among two candidates."""
+    with pytest.MonkeyPatch.context() as patch:
+        quickly(patch)
+        return diagnose(tmp_path_factory.mktemp("named") / "out", WITH_SHEAR, "--json")
+
+
+@pytest.fixture(scope="module")
+def calm(tmp_path_factory: pytest.TempPathFactory) -> runs.Run:
+    """A board that needs nothing, among two candidates."""
+    with pytest.MonkeyPatch.context() as patch:
+        quickly(patch)
+        return diagnose(tmp_path_factory.mktemp("calm") / "out", CALM)
+
+
+def told(run: runs.Run):
+    return read_json((run.folder / "diagnosis.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("which", ["with_shear", "calm"])
+def test_diagnosis_json_keeps_its_contract(which, request):
+    run = request.getfixturevalue(which)
+    assert run.exit_code == 0, run.stderr
+    found = told(run)
+    assert set(found) >= KEYS
+    assert found["format"] == 1
+    assert found["verdict"] in WORDS
+    assert isinstance(found["claim"], bool)
+    assert set(found["before"]) == ERRORS
+    assert set(found["after"]) == ERRORS
+    assert set(found["elastic_shift"]) == MODULI
+    assert all(set(one) >= {"before", "after", "shift_in_sd"} for one in found["elastic_shift"].values())
+    assert {one["name"] for one in found["candidates"]} >= set(TRIED)
+    for one in found["candidates"]:
+        assert set(one) >= CANDIDATE
+        assert 0.0 <= one["inclusion_probability"] <= 1.0
+        assert (one["rejected_because"] is None) == (one["name"] in found["effects"])
+        assert one["amplitude"] is None or set(one["amplitude"]) >= {"q05", "q50", "q95", "unit"}
+        assert one["bias_percent"] is None or set(one["bias_percent"]) == MODULI
+    known = ["transverse_shear", "fluid_loading", *(["exciter"] if which == "calm" else [])]  # which that card states
+    every = [list(some) for n in range(len(known) + 1) for some in combinations(known, n)]
+    assert [one["effects"] for one in found["known"]] == every
+    assert all(set(one["change_percent"]) == MODULI and one["without"] == [] for one in found["known"])
+    assert 0.0 <= found["gain_null_percentile"] <= 100.0
+    # simulated boards are made to choose where an effect is added, and nowhere else
+    is_added = found["verdict"] in ("named", "indistinguishable group")
+    assert is_added == (which == "with_shear")
+    assert (found["null_control"]["nested_ratio_to_beat"] is not None) == is_added
+    assert found["recommendation"] == "" or found["recommendation"].endswith(".")
+
+
+def test_what_an_effect_explains_is_no_doubt_any_more(with_shear):
+    """The plate without shear misses its readings by far, and the fit before says so; with shear it does not."""
+    before, after = (
+        read_json((with_shear.folder / name).read_text()) for name in ("before/summary.json", "summary.json")
+    )
+    (scatter,) = (one for one in before["warnings"] if "scatter about the fitted plate" in one)
+    assert scatter not in after["warnings"]
+    assert told(with_shear)["notes"] == []
+
+
+def test_known_effects_are_computed_before_anything_is_fitted_again(with_shear, calm):
+    """Falls and rises are in the file and in what is printed; the board as it stands is the one that `check` shows."""
+    stands, shear, air, both = told(with_shear)["known"]
+    assert stands["in_sample_rms_cents"] == pytest.approx(check(WITH_SHEAR).in_sample_rms_cents, abs=0.01)
+    assert shear["leave_one_out_rms_cents"] < 0.5 * stands["leave_one_out_rms_cents"] < air["leave_one_out_rms_cents"]
+    assert shear["in_sample_rms_cents"] < both["in_sample_rms_cents"] < air["in_sample_rms_cents"]
+    printed = " ".join(calm.stdout.split())
+    assert "transverse shear lowers the left-out error from" in printed
+    assert "fluid loading raises it from" in printed
+    assert "Where the error rises, something that acts the other way is lacking" in printed
+
+
+def test_what_is_printed_as_json_is_what_is_written(with_shear):
+    assert read_json(with_shear.stdout) == told(with_shear)
+
+
+def test_after_a_refit_the_summary_is_of_the_refitted_model_and_before_holds_the_first(with_shear):
+    found = told(with_shear)
+    assert found["effects"] == ["transverse_shear"]
+    assert FIT | {"diagnosis.json"} == {name for name in with_shear.files if not name.startswith("before/")}
+    assert {f"before/{name}" for name in FIT} == {name for name in with_shear.files if name.startswith("before/")}
+    first = read_json((with_shear.folder / "before" / "summary.json").read_text(encoding="utf-8"))
+    after = with_shear.summary
+    assert first["model"]["effects"] == []
+    assert after["model"]["effects"] == ["transverse_shear"]
+    moduli = after["effects"]["board"]["transverse_shear"]
+    assert {name: entry["unit"] for name, entry in moduli.items()} == {"G_xz": "Pa", "G_yz": "Pa"}
+    assert (first["model"]["theory"], after["model"]["theory"]) == ("thin", "shear-flexible")
+    for side, summary in (("before", first), ("after", after)):
+        assert found[side]["in_sample_rms_cents"] == summary["error"]["in_sample_rms_cents"]
+        for name in MODULI:
+            assert found["elastic_shift"][name][side] == summary["elastic"][name]["mean"]
+    assert after["error"]["in_sample_rms_cents"] < 0.5 * first["error"]["in_sample_rms_cents"]
+
+
+def test_without_a_refit_there_is_no_before_and_nothing_changes(calm):
+    found = told(calm)
+    assert found["effects"] == []
+    assert set(calm.files) == FIT | {"diagnosis.json"}
+    assert found["before"] == found["after"]
+    assert all(one["shift_in_sd"] == 0 for one in found["elastic_shift"].values())
+    assert found["claim"] is False
+    assert f"Verdict: {found['verdict']}." in calm.stdout
+    assert found["verdict"] in ("none needed", "undetectable")
+
+
+@pytest.mark.slow
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path, quick, with_shear):
+    again = diagnose(tmp_path / "again", WITH_SHEAR, "--quiet")
+    other = diagnose(tmp_path / "other", WITH_SHEAR, "--quiet", "--seed", "2")
+    assert again.stdout == ""
+    assert again.files == with_shear.files
+    assert other.files["summary.json"] != with_shear.files["summary.json"]
+
+
+def test_a_folder_with_results_needs_force_and_force_leaves_no_stale_before(tmp_path, quick, with_shear, monkeypatch):
+    """What is computed besides is left out: known effects, and advice."""
+    monkeypatch.setattr("bayesplate.commands.diagnose.known_fits", lambda *_: ())
+    monkeypatch.setattr("bayesplate.commands.diagnose.advice", lambda *_: "")
+    folder = tmp_path / "out"
+    for name, content in with_shear.files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+    (folder / "notes.txt").write_bytes(b"mine")
+    refused = diagnose(folder, CALM)
+    assert refused.exit_code == 3
+    assert refused.files == {**with_shear.files, "notes.txt": b"mine"}
+
+    forced = diagnose(folder, CALM, "--force", "--quiet")
+    assert forced.exit_code == 0
+    assert set(forced.files) == FIT | {"diagnosis.json", "notes.txt"}
+    assert not (folder / "before").exists()
+
+
+@pytest.mark.parametrize("has_notes", [True, False])
+def test_what_somebody_else_keeps_in_before_stays(tmp_path, has_notes):
+    """The fit of an earlier diagnosis goes when the new one is whole, and comes back where it leaves nothing."""
+    (tmp_path / "before").mkdir()
+    for name in (*FIT, *(["notes.txt"] if has_notes else [])):
+        (tmp_path / "before" / name).write_bytes(b"mine")
+    before = files_in(tmp_path)
+    folder = OutputFolder(tmp_path)
+    folder.open(resume=False)
+    assert not any((tmp_path / "before" / name).exists() for name in FIT)
+    folder.release()
+    assert files_in(tmp_path) == before
+
+    folder.open(resume=False)
+    (tmp_path / "summary.json").write_bytes(b"new")
+    folder.close()
+    folder.release()
+    assert files_in(tmp_path) == {"summary.json": b"new"} | ({"before/notes.txt": b"mine"} if has_notes else {})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (("no-such-board",), 3),
+        ((CALM, "--effects", "no_such_effect"), 3),
+        ((CALM, "--force", "--resume"), 2),
+    ],
+)
+def test_refused_input_leaves_no_folder(tmp_path, arguments, code):
+    run = diagnose(tmp_path / "out", *arguments)
+    assert run.exit_code == code
+    assert not run.folder.exists()
+    assert "Traceback" not in run.stderr
+
+
+@pytest.mark.parametrize("command", [run_diagnose, fit])
+def test_settings_that_cannot_be_sampled_leave_no_folder(tmp_path, command):
+    """Fit and diagnose open their folder in one way: after everything that may be refused."""
+    with pytest.raises(InputError, match="seed"):
+        command(CALM, out=tmp_path / "out", seed=-1)
+    assert not (tmp_path / "out").exists()
+
+
+def card_of_few(folder: Path, board: str, labels: Sequence[str]) -> str:
+    """A shipped card with the readings of a few labels only."""
+    lines = (Path(runs.__file__).parents[1] / f"models/boards/{board}.toml").read_text(encoding="utf-8").splitlines()
+    kept = [line for line in lines if not line.startswith('"(') or line.split('"')[1] in labels]
+    card = folder / "few.toml"
+    card.write_text("\n".join(kept).replace(f'"{board}"', '"few"') + "\n", encoding="utf-8")
+    return str(card)
+
+
+def test_too_few_readings_leave_no_folder(tmp_path):
+    run = diagnose(tmp_path / "out", card_of_few(tmp_path, CALM, ("(0,0)", "(0,2)")))
+    assert run.exit_code == 4
+    assert not run.folder.exists()
+
+
+def test_three_modes_are_fitted_and_leave_nothing_to_judge_by(tmp_path, monkeypatch):
+    """The fit is there with its page; what a search would tell is null, and is said to be."""
+    with monkeypatch.context() as patch:
+        quickly(patch, page=True)
+        card = card_of_few(tmp_path, "fiemme-spruce-clamped", ("(1,0)", "(0,2)", "(1,1)"))
+        run = diagnose(tmp_path / "out", card)
+    assert run.exit_code == 0, run.stderr
+    found = told(run)
+    assert set(run.files) >= FIT | {"diagnosis.json", "report.html", "before-after.csv"}
+    assert len(run.summary["modes"]) == 3
+    assert (found["verdict"], found["effects"], found["refitted"], found["claim"]) == ("undetectable", [], [], False)
+    assert "three modes" in found["reason"]
+    assert "leave nothing to judge by" in " ".join(run.stdout.split())
+    assert set(found) >= KEYS
+    missing = {name for name, value in found["before"].items() if value is None}
+    assert missing == {"leave_one_out_rms_cents", "nested_leave_one_out_rms_cents", "log_score"}
+    assert found["before"] == found["after"]
+    assert found["gain_null_percentile"] is None
+    assert found["p_value"] == {"before": None, "after": None}
+    assert [one["below_detection_limit"] for one in found["candidates"][:2]] == [True, True]
+    assert found["recommendation"].startswith("Measure ")
+
+
+def test_there_is_nothing_to_resume(tmp_path):
+    folder = tmp_path / "out"
+    assert diagnose(folder, CALM, "--resume").exit_code == 6
+    (folder / "checkpoint" / "linear").mkdir(parents=True)
+    run = diagnose(folder, CALM, "--resume")
+    assert run.exit_code == 6
+    assert "none to resume" in run.stderr
+
+
+@pytest.mark.parametrize("place", [pytest.param("full_search", marks=pytest.mark.slow), "diagnosis_of"])
+def test_an_interrupted_diagnosis_resumes_to_the_same_bytes(tmp_path, quick, monkeypatch, with_shear, place):
+    """Stopped after the first fit, and after both; what is computed between the two is of the resumed run."""
+
+    def stop(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(f"bayesplate.commands.diagnose.{place}", stop)
+        patch.setattr("bayesplate.commands.diagnose.known_fits", lambda *_: ())
+        stopped = diagnose(tmp_path / "out", WITH_SHEAR)
+    assert stopped.exit_code == 130
+    assert "--resume continues" in stopped.stderr
+    assert not (FIT | {"diagnosis.json"}) & set(stopped.files)
+    assert any(name.startswith("checkpoint/before/") for name in stopped.files)
+
+    assert diagnose(tmp_path / "out", WITH_SHEAR, "--resume", "--seed", "2").exit_code == 6
+    resumed = diagnose(tmp_path / "out", WITH_SHEAR, "--resume", "--quiet")
+    assert resumed.exit_code == 0, resumed.stderr
+    assert resumed.files == with_shear.files
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_sampling_is_heeded_and_the_run_resumes(tmp_path, stop):
+    """The whole of it, all candidates, in a process of its own."""
+    import os
+    import subprocess
+    import sys
+    import time
+
+    def heed_interrupts() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    folder = tmp_path / "out"
+    program = [sys.executable, "-m", "bayesplate", "diagnose", CALM, "--out", str(folder), "--quiet"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(program, **pipes, text=True, env=dict(os.environ), preexec_fn=heed_interrupts) as process:
+        chains = folder / "checkpoint" / "before" / "linear" / CHAINS
+        deadline = time.monotonic() + 120
+        while not chains.exists() and process.poll() is None:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        process.send_signal(stop)
+        _, stderr = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert stderr == "interrupted; --resume continues from the last checkpoint\n"
+    assert not (FIT | {"diagnosis.json"}) & set(files_in(folder))
+
+    assert diagnose(folder, CALM, "--resume", "--quiet").exit_code == 0
+    whole = diagnose(tmp_path / "whole", CALM, "--quiet")
+    assert files_in(folder) == whole.files
+
+
+def test_a_mode_that_alone_carries_a_constant_counts_in_no_error_of_a_diagnosis(tmp_path, quick):
+    """Before, after and with known effects."""
+    found = run_diagnose(str(five_modes(tmp_path)), n_null=50)
+
+    told = found.to_json()
+    (one,) = told["carrying_modes"]
+    assert (one["label"], one["carries"]) == (LABEL, CARRIES)
+    left_out = {row.label: row.left_out_cents for row in found.before.summary.modes}
+    others = np.array([value for label, value in left_out.items() if label != LABEL])
+    rms = float(np.sqrt(np.mean(others**2)))
+    assert told["before"]["leave_one_out_rms_cents"] == pytest.approx(rms)
+    assert abs(left_out[LABEL]) > 3.0 * rms  # it would show
+    for row in told["known"]:
+        assert row["leave_one_out_rms_cents"] < 1.5 * rms

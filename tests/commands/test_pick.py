@@ -1,0 +1,244 @@
+"""`pick` as a maker and a laboratory use it: files in, the [setup] out, labels, and nothing where it is refused."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+import runs
+from click.testing import CliRunner
+from generator.sand import photograph
+from made_recordings import CARD, E_X, E_Y, G_XY, SENSOR, SIDES, board, hits, write_taps, write_wav
+from PIL import Image
+
+import bayesplate
+from bayesplate.cli import main
+from bayesplate.commands.prepare import prepare
+from bayesplate.errors import InputError
+
+TRUTH = {"E_x": E_X, "E_y": E_Y, "G_xy": G_XY}
+HIGHEST = 430.0
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    """A folder with a card, three hits between two places, and a picture of sand; what was picked is in out/."""
+    folder = tmp_path_factory.mktemp("bench")
+    (folder / "planted.toml").write_text(CARD)
+    rng = np.random.default_rng(2)
+    for number in range(3):
+        force, heard = hits(rng, [0.05], (0.02, 0.02), rate=4000.0)
+        write_wav(folder / f"hit{number + 1}.wav", 4000.0, force, -heard)  # the sensor faces the hammer
+    solved = board().modes
+    Image.fromarray(np.round(255.0 * photograph(rng, solved.shape(2), SIDES)).astype(np.uint8)).save(
+        folder / "sand.png"
+    )
+    sensor, sand = f"{1e3 * SENSOR[0]:g},{1e3 * SENSOR[1]:g}", f"{board().damped[2]:.0f}={folder / 'sand.png'}"
+    arguments = [str(folder / f"hit{number}.wav") for number in (1, 2, 3)]
+    arguments += ["--card", str(folder / "planted.toml"), "--hammer", "20,20", "--sensor", sensor, "--sand", sand]
+    arguments += ["--sensor-mass", "0.6,0.1", "--highest", str(HIGHEST), "--out", str(folder / "out"), "--json"]
+    result = CliRunner().invoke(main, ["pick", *arguments])
+    assert result.exit_code == 0, result.output
+    return folder, runs.read_json(result.stdout)
+
+
+def test_json_has_the_planted_modes_with_labels_signs_and_errors(bench):
+    _, found = bench
+    truth = dict(zip(("({},{})".format(*name) for name, _ in board().modes.names()), board().damped, strict=False))
+    likely = [peak for peak in found["peaks"] if peak["spurious_probability"] < 0.5 and peak["hz"] < 400.0]
+
+    assert found["polarity"] == "opposite"
+    assert len(likely) >= 7
+    for peak in likely:
+        label = peak["labels"][0]
+        assert label["probability"] > 0.9
+        assert abs(peak["hz"] - truth[label["label"]]) < max(4.0 * peak["sd_hz"], 1e-4 * peak["hz"])
+        m, n = (int(index) for index in label["label"].strip("()").split(","))
+        assert peak["sign"] == ("+" if (m + n) % 2 == 0 else "-")  # opposite corners
+
+
+def test_the_fragment_is_a_setup_and_completes_the_card(bench):
+    folder, found = bench
+    setup = tomllib.loads((folder / "out" / "setup.toml").read_text())["setup"]
+    prepared = prepare(folder / "planted.toml", setup=folder / "out" / "setup.toml")
+    (read,) = prepared.stated.setups
+
+    assert setup["hammer"]["at_mm"] == [20, 20]
+    assert setup["attached"] == [{"kind": "accelerometer", "at_mm": [560, 197], "mass_g": {"mean": 0.6, "sd": 0.1}}]
+    n_likely = sum(peak["spurious_probability"] < 0.5 for peak in found["peaks"])
+    assert len(read.readings) + len(read.peaks) == n_likely
+    assert read.noise.median == pytest.approx(1e-3)
+    assert setup["label_confidence"]["(2,1)"] > 0.9  # the sand said so
+    assert read.ends_x == ("free", "free")
+
+
+def test_the_fragment_alone_is_no_card_and_says_what_it_is_for(bench):
+    folder, _ = bench
+    with pytest.raises(
+        InputError, match=r"setup\.toml: wanted a card, .* \(it completes a card: CARD --setup setup\.toml\)"
+    ):
+        bayesplate.check(folder / "out" / "setup.toml")
+
+
+def test_the_page_shows_everything_and_fetches_nothing(bench):
+    folder, found = bench
+    page = (folder / "out" / "recordings.html").read_text()
+
+    for peak in found["peaks"]:
+        assert f"{peak['hz']:.2f}"[:-1] in page
+    assert page.count("data:image/svg+xml;base64,") == 3
+    assert "http" not in page.replace("http-equiv", "").replace("http://www.w3.org", "")
+    assert {file.name for file in (folder / "out" / "figures").iterdir()} == {
+        f"{name}.{ending}" for name in ("spectra", "errors", "stability") for ending in ("png", "svg")
+    }
+
+
+def test_what_is_there_is_not_overwritten_unasked(bench):
+    folder, _ = bench
+    before = runs.files_in(folder / "out")
+    result = CliRunner().invoke(main, ["pick", str(folder / "hit1.wav"), "--out", str(folder / "out")])
+
+    assert result.exit_code == 3
+    assert "setup.toml, recordings.html, pick.json already there (--force replaces them" in result.stderr
+    assert runs.files_in(folder / "out") == before
+
+
+def test_refused_files_leave_no_folder_and_name_every_fault(tmp_path):
+    (tmp_path / "empty.wav").write_bytes(b"")
+    (tmp_path / "a.txt").write_text("hit")
+    out = tmp_path / "out"
+    result = CliRunner().invoke(main, ["pick", str(tmp_path / "empty.wav"), str(tmp_path / "a.txt"), "--out", str(out)])
+
+    assert result.exit_code == 3
+    assert "empty.wav: wanted a recording, got an empty file" in result.stderr
+    assert "a.txt: wanted a recording" in result.stderr
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"files": "a.wav"}, r"files: wanted a list of one path or more"),
+        ({"files": ["a.wav"], "rate": 0.0, "lowest": 600.0}, r"rate: wanted .*\nlowest and highest: wanted two freq"),
+        ({"files": ["a.wav"], "hammer": [(1.0, 2.0)] * 2}, r"hammer: wanted no place, one for all files, or one for"),
+        ({"files": ["a.wav"], "sensor": [(1.0,)]}, r"sensor 1: wanted a place \(x, y\) in m"),
+        ({"files": ["a.wav"], "sensor_mass": 3.0}, r"sensor_mass: wanted mass and standard deviation in kg"),
+        (
+            {"files": ["a.wav"], "motion": "loud", "polarity": "up"},
+            r'motion: wanted "acceleration".*\npolarity: wanted',
+        ),
+        ({"files": ["a.wav"], "channels": "0"}, r'channels: wanted "force,response", "response,force"'),
+        ({"files": ["a.wav"], "sand": {-1.0: 3}}, r"sand -1\.0: wanted a frequency in Hz.*\nsand -1\.0: wanted a name"),
+    ],
+)
+def test_every_bad_argument_is_named(given, said):
+    with pytest.raises(InputError, match=said):
+        bayesplate.pick(**given)
+
+
+def test_places_and_masses_that_its_card_cannot_have_are_refused_before_anything_is_read(tmp_path):
+    (tmp_path / "planted.toml").write_text(CARD)
+    at = {"hammer": [(0.6, 0.02)], "sensor": [(0.02, -0.003), (0.58, 0.217)]}
+
+    with pytest.raises(InputError) as caught:
+        bayesplate.pick(["a.wav", "b.wav"], card=tmp_path / "planted.toml", sensor_mass=(0.3, 0.0), **at)
+    with pytest.raises(
+        InputError, match=r"sensor_mass: wanted at most 2% of the board's 253.8 g for a sensor that rov"
+    ):
+        bayesplate.pick(
+            ["a.wav", "b.wav"], card=tmp_path / "planted.toml", sensor_mass=(0.03, 0.0), sensor=[(0, 0), (0.1, 0)]
+        )
+    with pytest.raises(InputError, match=r"a\.wav: wanted a recording"):
+        bayesplate.pick(["a.wav"], card=tmp_path / "planted.toml", sensor=[(-0.01, 0.0)], motion="pressure")
+
+    hammer, sensor, mass = map(str, caught.value.faults)
+    assert hammer.startswith(
+        "hammer: wanted a place on the free part of the board, x 0 to 580 mm, y 0 to 217 mm, got [600,"
+    )
+    assert sensor.startswith("sensor 1: wanted a place on the free part of the board")
+    assert mass == "sensor_mass: wanted less than the board's own 253.8 g, got 300 g"
+
+
+@pytest.mark.parametrize("given", ["0,6", "0,6,0,1", "nan", "-1", "a"])
+def test_the_mass_of_the_sensor_is_asked_for_in_grams(given):
+    result = CliRunner().invoke(main, ["pick", "a.wav", "--sensor-mass", given])
+
+    assert result.exit_code == 2
+    assert f"wanted a mass in g, or mass and standard deviation, with decimal points, got '{given}'" in result.stderr
+
+
+BAD_FRAGMENTS = {
+    "plate": ("[plate]\nmass_g = 3\n[setup]\n", "fragment.toml plate: wanted nothing but [setup], got another key"),
+    "typo": ("[setup]\nunlabeled_hz = [3]\n", "fragment.toml [setup] unlabeled_hz: wanted one of"),
+    "several": ("[[setup]]\n[[setup]]\n", "fragment.toml: wanted one table [setup], got several [[setup]]"),
+    "other name": (
+        '[setup]\nname = "clamped"\n',
+        "fragment.toml [setup] name: wanted the name of a setup of planted.toml",
+    ),
+    "value": ("[setup]\nunlabelled_hz = [-3]\n", "planted.toml with fragment.toml [setup] unlabelled_hz 1: wanted"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FRAGMENTS)
+def test_a_fragment_that_cannot_be_used_is_refused_with_its_place(tmp_path, name):
+    text, said = BAD_FRAGMENTS[name]
+    (tmp_path / "planted.toml").write_text(CARD)
+    (tmp_path / "fragment.toml").write_text(text)
+    result = CliRunner().invoke(
+        main, ["check", str(tmp_path / "planted.toml"), "--setup", str(tmp_path / "fragment.toml")]
+    )
+
+    assert result.exit_code == 3
+    assert said in result.stderr
+
+
+def test_a_fragment_of_another_name_with_edges_is_one_more_setup(tmp_path):
+    (tmp_path / "planted.toml").write_text(CARD + '\n[setup.frequencies_hz]\n"(1,1)" = 51\n')
+    edges = 'edges = { x0 = "clamped", x1 = "free", y0 = "free", y1 = "free" }\n'
+    (tmp_path / "fragment.toml").write_text(f'[setup]\nname = "held"\n{edges}unlabelled_hz = [31]\n')
+
+    first, second = prepare(tmp_path / "planted.toml", setup=tmp_path / "fragment.toml").stated.setups
+
+    assert (first.name, second.name, second.ends_x) == ("setup", "held", ("clamped", "free"))
+    assert [str(reading.label) for reading in first.readings] == ["(1,1)"]
+
+
+def test_readings_of_a_fragment_stand_in_place_of_all_that_the_card_has(tmp_path):
+    """Its edges and noise stay; of two sets of readings of one setup nobody could tell which is meant."""
+    (tmp_path / "planted.toml").write_text(CARD + 'unlabelled_hz = [404]\n[setup.frequencies_hz]\n"(1,1)" = 51\n')
+    (tmp_path / "fragment.toml").write_text('[setup.frequencies_hz]\n"(2,0)" = 76.2\n')
+
+    (setup,) = prepare(tmp_path / "planted.toml", setup=tmp_path / "fragment.toml").stated.setups
+
+    assert [(str(reading.label), reading.frequency.mean) for reading in setup.readings] == [("(2,0)", 76.2)]
+    assert setup.peaks == ()
+    assert setup.noise.median == pytest.approx(1e-3)
+
+
+def test_a_campaign_takes_no_fragment(tmp_path):
+    with pytest.raises(InputError, match="setup: wanted a board, whose setup it completes, got a campaign"):
+        bayesplate.check("spruce-half-tops", setup=tmp_path / "fragment.toml")
+
+
+@pytest.mark.slow
+def test_from_phone_taps_to_a_posterior_that_holds_the_truth(tmp_path):
+    """Two recordings of six taps each, hum and all, in one go; the wrong density is the negative control."""
+    (tmp_path / "planted.toml").write_text(CARD)
+    taps = write_taps(tmp_path, np.random.default_rng(6))
+    found = bayesplate.pick(
+        taps, card=tmp_path / "planted.toml", motion="pressure", highest=500.0, out=tmp_path / "out"
+    )
+    fragment = tmp_path / "out" / "setup.toml"
+
+    fitted = bayesplate.fit(tmp_path / "planted.toml", setup=fragment).summary
+    wrong = tmp_path / "wrong" / "planted.toml"
+    wrong.parent.mkdir()
+    wrong.write_text(CARD.replace("= 429", "= 450"))
+    control = bayesplate.fit(wrong, setup=fragment).summary
+
+    assert json.loads((tmp_path / "out" / "pick.json").read_text())["n_hits"] == found.summary.n_hits == 12
+    for name, truth in TRUTH.items():
+        assert abs(fitted.elastic[name].mean - truth) < 3.5 * fitted.elastic[name].sd
+        assert abs(control.elastic[name].mean - truth) > 3.5 * control.elastic[name].sd

@@ -1,0 +1,116 @@
+"""Labels of picked peaks: which a card states, and how sure it is said to be."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from generator.sand import photograph
+from made_recordings import CARD, SIDES, board
+
+from bayesplate.commands.pick_labels import Labels, label_peaks
+from bayesplate.commands.pick_sand import upright
+from bayesplate.commands.pick_words import moved_between_hits
+from bayesplate.commands.prepare import prepare
+from bayesplate.recordings.contract import LabelChance, PickedRow
+from bayesplate.recordings.picking import PickedMode
+from bayesplate.results.words import chances
+
+CASES = {
+    "both say the same: the confidence is that of sand and residues": (
+        {"(3,1)": 0.999, "(2,2)": 0.001}, {"(3,1)": 0.6, "(2,2)": 0.4}, ("(3,1)", 0.6),
+    ),
+    "sand and residues tell nothing: beyond doubt by its frequency": ({"(3,1)": 0.995}, {}, ("(3,1)", 0.995)),
+    "they tell nothing, and its frequency leaves some doubt": ({"(3,1)": 0.98, "(2,2)": 0.02}, {}, None),
+    "they prefer another, yet all together leave no doubt": (
+        {"(2,2)": 0.999}, {"(3,1)": 0.68, "(2,2)": 0.32}, ("(2,2)", 0.999),
+    ),
+    "they prefer another, and doubt is left": ({"(5,0)": 0.69, "(3,3)": 0.31}, {"(3,3)": 0.9, "(5,0)": 0.1}, None),
+    "they are not sure": ({"(3,1)": 0.9, "(2,2)": 0.1}, {"(3,1)": 0.45, "(2,2)": 0.4}, None),
+    "rather no mode": ({"(1,2)": 0.35}, {"(1,2)": 0.73}, None),
+    "a mode of no clear name": ({"mode 7": 1.0}, {}, None),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("by_all", "by_evidence", "expected"), CASES.values(), ids=CASES)
+def test_the_label_stated_is_never_another_than_the_most_probable(by_all, by_evidence, expected):
+    assert Labels((by_all,), (by_evidence,), None).stated(0) == expected
+
+
+PEAK = PickedMode(
+    frequency=0.0, sd=0.0, noise_sd=0.0, scatter_sd=0.0, window_sd=0.0, damping=0.01, damping_sd=0.001, mobility=(1.0,),
+    mobility_sd=(0.1,), complexity=0.0, alike=1.0, amplitude=1.0, seen=1.0, spurious=0.0, kind="",
+)  # fmt: skip
+
+
+def test_a_picture_of_another_mode_or_crosswise_is_told(tmp_path):
+    """Sand of the modes themselves is the negative control."""
+    (tmp_path / "planted.toml").write_text(CARD)
+    prepared = prepare(tmp_path / "planted.toml", may_lack_frequencies=True)
+    likely = tuple(replace(PEAK, frequency=hz, sd=1e-3 * hz) for hz in board().damped[:8])
+    picked = SimpleNamespace(likely=likely, spectra=SimpleNamespace(force=None, between=((None, None),)))
+    rng = np.random.default_rng(4)
+    sand = [photograph(rng, board().modes.shape(m), SIDES) for m in (2, 3)]
+    names = ["({},{})".format(*name) for name, _ in board().modes.names()[:4]]
+
+    right = label_peaks(prepared.stated, prepared.prior, picked, None, {2: [sand[0]], 3: [sand[1]]})
+    wrong = label_peaks(prepared.stated, prepared.prior, picked, None, {2: [sand[1]], 3: [sand[1]]})
+    kept, told = upright(prepared.board, {145.0: sand[0], 150.0: sand[1].T})
+
+    assert right.doubts == ()
+    (doubt,) = wrong.doubts
+    assert f"shows {names[3]}, and its frequency is that of {names[2]}: is it the picture of this peak" in doubt
+    assert [*kept] == [145.0]
+    assert told[0].startswith(
+        "the sand at 150 Hz left out: the picture is higher than wide, the board 580 mm along x and"
+    )
+
+
+def test_false_peaks_among_the_lowest_do_not_change_the_labels_of_the_others(tmp_path):
+    """Three are no modes. One lies 4 % from a mode, and might be it of a plate that is 1 % unlike the board."""
+    (tmp_path / "planted.toml").write_text(CARD)
+    prepared = prepare(tmp_path / "planted.toml", may_lack_frequencies=True)
+    names = ["({},{})".format(*name) for name, _ in board().modes.names()[:8]]
+    truth = board().damped[:8]
+    planted = [(hz, 0.0, name) for hz, name in zip(truth, names, strict=True)]
+    false = [(0.5 * truth[0], 0.1, ""), (1.04 * truth[0], 0.15, ""), (1.05 * truth[2], 0.2, "")]
+    every = sorted(planted + false)
+    likely = tuple(replace(PEAK, frequency=hz, sd=1e-3 * hz, spurious=spurious) for hz, spurious, _ in every)
+    picked = SimpleNamespace(likely=likely, spectra=SimpleNamespace(force=None, between=((None, None),)))
+
+    labels = label_peaks(prepared.stated, prepared.prior, picked, None, {})
+
+    right = [labels.of(i)[0][0] == name and labels.of(i)[0][1] > 0.95 for i, (_, _, name) in enumerate(every) if name]
+    assert all(right)
+
+
+ROW = PickedRow(
+    hz=184.6, sd_hz=0.2, noise_hz=0.1, scatter_hz=0.0, window_hz=0.18, damping_percent=1.1, damping_sd_percent=0.06,
+    sign="-", amplitude=0.13, spurious_probability=0.1, kind="", seen=1.0, alike=0.99,
+    labels=(LabelChance("(1,2)", 0.35), LabelChance("(3,0)", 0.04), LabelChance("(0,2)", 0.01)),
+    unlabelled_probability=0.6,
+)  # fmt: skip
+
+
+def test_a_peak_that_fits_none_of_the_boards_modes_is_rather_no_mode_of_it():
+    """Though it is one by the recordings: a support rings too."""
+    assert ROW.is_likely
+    assert ROW.mode_probability == pytest.approx(0.9 * 0.4)
+    assert chances(ROW.may_be(2)) == "(1,2) 35 %, (3,0) 4 %, none 60 %"
+    assert chances(replace(ROW, unlabelled_probability=0.05).may_be(1)) == "(1,2) 35 %"
+
+
+def test_without_a_card_the_recordings_alone_decide():
+    bare = replace(ROW, labels=(), unlabelled_probability=None)
+    assert bare.mode_probability == pytest.approx(0.9)
+    assert chances(bare.may_be(2)) == "–"
+
+
+def test_loud_peaks_that_differ_from_hit_to_hit_ask_whether_the_hits_were_at_one_place():
+    unlike = replace(ROW, kind="not alike from hit to hit", spurious_probability=0.9, amplitude=0.5)
+    steady, faint = replace(unlike, damping_percent=0.01), replace(unlike, amplitude=0.02)
+    moved = [replace(unlike, hz=hz) for hz in (181.0, 263.9, 283.3)]
+
+    assert moved_between_hits([ROW, *moved[:2], steady, faint], 2.0) == []
+    (told,) = moved_between_hits([ROW, *moved], 2.0)
+    assert told.startswith("3 loud peaks ring down but are not alike from hit to hit, 181.0, 263.9, 283.3 Hz: were all")

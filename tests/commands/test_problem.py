@@ -1,0 +1,350 @@
+"""`Problem`: densities and the map from the unit cube, as other samplers use them, and what the commands make of it."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from runs import files_in
+from scipy import stats
+
+import bayesplate
+from bayesplate.board.board import Board
+from bayesplate.board.material import moduli
+
+BOARD = "fiemme-spruce-clamped"
+UNCERTAIN = "spruce-free-2R"
+
+
+@pytest.fixture(scope="module")
+def problem() -> bayesplate.Problem:
+    """A board whose sizes, mass and Poisson ratio are uncertain, with effects whose priors have one bound and two.
+
+    How stiff its support is is not stated: the effect's own prior ends at zero.
+    """
+    board = bayesplate.Problem.from_card(UNCERTAIN).prepared.stated
+    lying = replace(board, setups=tuple(replace(one, bounce=None) for one in board.setups))
+    return bayesplate.Problem.from_card(lying, effects=["fluid_loading", "support_stiffness"])
+
+
+@pytest.fixture(scope="module")
+def clamped() -> bayesplate.Problem:
+    return bayesplate.Problem.from_card(BOARD)
+
+
+def points(problem: bayesplate.Problem, n: int, seed: int = 1) -> np.ndarray:
+    """Draws from the prior."""
+    return problem.prior_transform(np.random.default_rng(seed).uniform(size=(n, problem.n_dim)))
+
+
+def near(problem: bayesplate.Problem, n: int) -> np.ndarray:
+    """Points where the posterior lies."""
+    posed = problem.posed
+    theta = np.random.default_rng(1).multivariate_normal(posed.centre, 0.01 * posed.covariance, n)
+    columns, bounds = posed.parameters.fitted_columns, posed.parameters.fitted_bounds
+    theta[:, columns] = np.clip(theta[:, columns], bounds.lower + 1e-6, bounds.upper - 1e-6)
+    return theta
+
+
+def test_one_point_gives_what_many_give(problem):
+    theta = near(problem, 5)
+    for name in ("log_prob", "log_prior", "log_likelihood", "predict"):
+        method = getattr(problem, name)
+        many = method(theta)
+        assert len(many) == 5
+        assert np.isfinite(many).all()
+        for row, at in zip(many, theta, strict=True):
+            np.testing.assert_allclose(method(at), row, rtol=1e-12)  # sums of one row and of five round differently
+            np.testing.assert_array_equal(method(at.tolist()), method(at))
+    assert np.ndim(problem.log_prob(theta[0])) == 0
+    assert problem.predict(theta[0]).shape == (len(problem.labels),)
+    np.testing.assert_allclose(
+        problem.log_prob(theta), problem.log_prior(theta) + problem.log_likelihood(theta), rtol=1e-12
+    )
+    u = np.full((3, problem.n_dim), 0.3)
+    np.testing.assert_array_equal(problem.prior_transform(u)[1], problem.prior_transform(u[0]))
+
+
+def test_the_columns_and_the_readings_are_those_of_the_archive(problem, clamped, fiemme):
+    assert len(problem.names) == problem.n_dim == problem.posed.centre.size
+    assert {"z[thickness]", "z[poisson_xy]", "z[support_stiffness.stiffness[free]]"} < set(problem.names)
+    made = fiemme.to_arviz()
+    assert clamped.labels == tuple(made.observed_data["reading"].values)
+    assert clamped.names == tuple(made.sample_stats["parameter"].values)
+    assert clamped.board.setups[0].labels == tuple(reading.label for reading in clamped.board.setups[0].readings)
+
+
+def test_what_sessions_share_is_among_the_columns(clamped):
+    """A board clamped twice: the discrepancies of its modes are sampled, so whoever else samples needs them too."""
+    (setup,) = clamped.board.setups
+    again = bayesplate.Problem.from_card(replace(clamped.board, setups=(setup, replace(setup, name="again"))))
+    theta = near(again, 3)
+    assert again.n_dim == len(again.names) == again.posed.centre.size
+    assert sum("discrepancy" in name for name in again.names) == 1 + len(setup.labels)
+    assert np.isfinite(again.log_prob(theta)).all()
+    assert again.predict(theta).shape == (3, 2 * len(setup.labels))
+    assert np.isfinite(again.log_prior(points(again, 20))).any()
+
+
+def test_predict_and_the_likelihood_are_those_of_the_fit(clamped, fiemme):
+    """At the draws of a fit: the frequencies, the density up to its constant, and the likelihood of every reading."""
+    draws = fiemme.draws
+    flat = draws.flat[:50]
+    np.testing.assert_allclose(np.log(clamped.predict(flat)), draws.log_frequency.reshape(-1, 6)[:50], rtol=1e-12)
+    np.testing.assert_allclose(clamped.log_prob(flat), draws.log_posterior.ravel()[:50], rtol=1e-9)
+    own = draws.log_likelihood.reshape(-1, 6)[:50].sum(axis=1)
+    np.testing.assert_allclose(clamped.log_likelihood(flat), own, rtol=1e-12)
+
+
+def log_density_of(problem: bayesplate.Problem, u: np.ndarray) -> float:
+    """Log density of theta that the map from the cube implies at a point: less the log of its Jacobian there."""
+    step = 1e-6
+    ways = np.eye(problem.n_dim) * step
+    jacobian = (problem.prior_transform(u + ways) - problem.prior_transform(u - ways)) / (2.0 * step)
+    return -float(np.linalg.slogdet(jacobian)[1])
+
+
+IN_RIGIDITIES = {
+    "D_x": bayesplate.Quantity.from_range(5.0, 60.0),
+    "D_y": bayesplate.Quantity.from_median(2.0, 1.8),
+    "D_s": bayesplate.Quantity.from_median(5.0, 1.5),
+}
+
+
+@pytest.mark.parametrize("prior", [None, "in-rigidities"])
+def test_the_map_from_the_cube_has_the_density_of_the_prior(problem, prior):
+    """By the change of variables; central differences of a step of 1e-6 are good to some 1e-8 of the slopes."""
+    if prior is not None:
+        card = bayesplate.PriorCard.from_quantities(prior, IN_RIGIDITIES, source="a test")
+        named = replace(problem.prepared.named, prior=card)
+        problem = replace(problem, prepared=replace(problem.prepared, named=named))
+    bounds = [one.prior.standard_bounds for one in problem.prepared.board.uncertain]
+    assert {int(np.isfinite(pair).sum()) for pair in bounds} == {0, 1, 2}
+    cube = np.random.default_rng(4).uniform(0.02, 0.98, (20, problem.n_dim))
+    possible = np.isfinite(problem.log_prior(problem.prior_transform(cube)))
+    assert possible.sum() > 15
+    for u in cube[possible]:
+        assert log_density_of(problem, u) == pytest.approx(problem.log_prior(problem.prior_transform(u)), abs=1e-5)
+        # the control: a point that the map leads elsewhere has another density
+        moved = problem.prior_transform(np.clip(u + 0.015, 0.0, 1.0))
+        assert log_density_of(problem, u) != pytest.approx(problem.log_prior(moved), abs=1e-5)
+
+
+WIDE = {
+    "E_x": bayesplate.Quantity.from_median(2e9, 2.5),
+    "E_y": bayesplate.Quantity.from_median(1e9, 2.5),
+    "G_xy": bayesplate.Quantity.from_median(0.5e9, 1.5),
+}
+
+
+@pytest.fixture(scope="module")
+def wide() -> bayesplate.Problem:
+    """Moduli so uncertain that a part of the prior is no material's, at an uncertain thickness and Poisson ratio."""
+    board = bayesplate.Problem.from_card(UNCERTAIN).board
+    (setup,) = board.setups
+    labelled = replace(setup, peaks=(), readings=tuple(replace(one, confidence=1.0) for one in setup.readings))
+    free = replace(board, setups=(labelled,)).with_priors(
+        {"poisson_xy": bayesplate.Quantity.from_mean(0.6, 0.2, "normal")}
+    )
+    prior = bayesplate.PriorCard.from_quantities("wide", WIDE, source="a test")
+    return bayesplate.Problem.from_card(free, prior=prior)
+
+
+def test_draws_through_the_cube_are_those_of_each_density(wide):
+    """Among materials: moduli and inputs against draws of every density by itself, by Kolmogorov and Smirnov."""
+    n, rng = 20_000, np.random.default_rng(6)
+    board = wide.board
+    values = wide.posed.parameters.values(points(wide, n))
+    found = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])._asdict()
+    found |= {"thickness": values["thickness"], "poisson_xy": values["poisson_xy"]}
+    direct = {name: one.sample(rng, n) for name, one in WIDE.items()}
+    direct |= {name: board.inputs[name].sample(rng, n) for name in ("thickness", "poisson_xy")}
+    possible = direct["poisson_xy"] ** 2 * direct["E_y"] / direct["E_x"] < 1.0
+    is_material = np.isfinite(found["E_x"])
+
+    assert 0.02 < 1.0 - possible.mean() < 0.5
+    for name, drawn in direct.items():
+        # A p-value below 1e-4 comes by chance once in two thousand runs of these five.
+        assert stats.ks_2samp(found[name][is_material], drawn[possible]).pvalue > 1e-4
+    thick = stats.ks_2samp(1.02 * found["thickness"][is_material], direct["thickness"][possible])
+    assert thick.pvalue < 1e-4  # the control
+
+
+def test_where_no_material_exists_the_likelihood_is_zero_and_nothing_is_not_a_number(wide):
+    theta = points(wide, 2000)
+    values = wide.posed.parameters.values(theta)
+    E_x = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"]).E_x
+    none = np.isnan(E_x)
+
+    assert np.isfinite(theta).all()
+    assert 20 < none.sum() < 1000
+    for method in (wide.log_likelihood, wide.log_prior, wide.log_prob):
+        density = method(theta)
+        assert not np.isnan(density).any()
+        np.testing.assert_array_equal(np.isfinite(density), ~none)
+    np.testing.assert_array_equal(np.isfinite(wide.predict(theta)).all(axis=1), ~none)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e6, -1e6])
+def test_far_outside_the_density_is_zero(clamped, value):
+    theta = clamped.posed.centre.copy()
+    for column in range(clamped.n_dim):
+        there = np.where(np.arange(clamped.n_dim) == column, value, theta)
+        assert clamped.log_prob(there) == clamped.log_likelihood(there) == -np.inf
+
+
+def test_beyond_a_bound_the_density_is_zero(problem):
+    (column,) = (i for i, name in enumerate(problem.names) if name.startswith("z[support_stiffness"))
+    low = problem.prepared.board.uncertain[column - problem.n_dim].prior.standard_bounds[0]
+    theta = np.tile(problem.posed.centre, (2, 1))
+    theta[:, column] = low + 0.01, low - 0.01
+
+    assert np.isfinite(problem.log_prob(theta)).tolist() == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("theta", "got"),
+    [(np.zeros(3), r"one of shape \(3,\)"), (np.zeros((2, 5)), r"one of shape \(2, 5\)"),
+     (np.zeros((1, 1, 4)), r"one of shape \(1, 1, 4\)"), ("point", "str"), ([[1.0], [1.0, 2.0]], "list")],
+)  # fmt: skip
+def test_points_of_another_shape_are_refused(clamped, theta, got):
+    said = rf"theta: wanted .* \(4,\) or \(n, 4\), columns log_D_x.* got {got}"
+    with pytest.raises(bayesplate.InputError, match=said):
+        clamped.log_prob(theta)
+
+
+@pytest.mark.parametrize("use", [bayesplate.Problem.from_card, bayesplate.modes, bayesplate.compare, bayesplate.cite])
+def test_a_campaign_is_no_board(use):
+    with pytest.raises(bayesplate.InputError, match=r"card: wanted a board: .* got a Campaign \(its boards are"):
+        use(bayesplate.Campaign.from_card("spruce-half-tops"))
+
+
+def test_a_problem_is_one_already(clamped):
+    with pytest.raises(bayesplate.InputError, match=r"card: wanted a board: .* got a Problem \(it is one: use it"):
+        bayesplate.Problem.from_card(clamped)
+
+
+def test_the_frequencies_of_other_plates_need_the_exact_law(clamped):
+    """What `predict` says of itself: at draws of the prior the linear law is far off, near the estimate it is not."""
+    exact = bayesplate.Problem.from_card(BOARD, law="exact")
+    for theta, is_far in ((near(clamped, 20), False), (points(clamped, 20), True)):
+        off = 1200.0 * np.abs(np.log2(clamped.predict(theta) / exact.predict(theta)))
+        assert bool(np.nanmax(off) > 100.0) is is_far
+
+
+def test_points_outside_the_cube_are_refused(clamped):
+    with pytest.raises(bayesplate.InputError, match=r"u: wanted numbers from 0 to 1, got 1\.5"):
+        clamped.prior_transform([0.5, 1.5, 0.5, 0.5])
+
+
+def test_the_corners_of_the_cube_are_points_too(clamped):
+    for u in (0.0, 1.0):
+        theta = clamped.prior_transform(np.full(clamped.n_dim, u))
+        assert np.isfinite(theta).all()
+        assert not np.isnan(clamped.log_prob(theta))
+
+
+def test_the_plates_are_solved_once_and_not_before_they_are_needed(monkeypatch):
+    from bayesplate.commands import problem as module
+
+    calls, pose = [], module.pose
+    monkeypatch.setattr(module, "pose", lambda *given, **options: calls.append(1) or pose(*given, **options))
+    one = bayesplate.Problem.from_card(BOARD)
+    theta = one.prior_transform(np.full(one.n_dim, 0.5))
+    one.log_prior(theta)
+    assert (calls, "4 parameters" in repr(one)) == ([], True)
+    one.log_prob(theta)
+    one.predict(theta)
+    bayesplate.check(one)
+    assert calls == [1]
+
+
+def test_the_prior_and_the_law_can_be_given(clamped):
+    other = bayesplate.Problem.from_card(BOARD, prior="spruce", law="exact", robust=True)
+    theta = clamped.posed.centre
+
+    assert (other.prior.name, other.law, other.posed.posterior.robust) == ("spruce", "exact", True)
+    assert (clamped.prior.name, clamped.law) == ("weakly-informative", "linear")
+    assert other.log_prior(theta) != pytest.approx(clamped.log_prior(theta), abs=0.1)
+
+
+def test_a_setup_that_took_the_place_of_the_card_s_is_in_the_text_and_in_its_digest(tmp_path, clamped):
+    """posterior.nc and summary.json have them: nothing else has to be kept for a run to be repeated."""
+    fragment = tmp_path / "setup.toml"
+    fragment.write_text('[setup.frequencies_hz]\n"(0,0)" = 53\n', encoding="utf-8")
+    card = bayesplate.Problem.from_card(BOARD, setup=fragment).prepared.card
+
+    assert "= 53" in card.text
+    assert hashlib.sha256(card.text.encode()).hexdigest() == card.sha256 != clamped.prepared.card.sha256
+
+
+@pytest.mark.usefixtures("quickly")
+def test_a_problem_a_card_and_a_board_give_the_same_draws_and_write_nothing(tmp_path, monkeypatch, clamped):
+    monkeypatch.chdir(tmp_path)
+    board = clamped.board
+    card = tmp_path / f"{BOARD}.toml"
+    board.to_toml(card)
+    before = files_in(tmp_path)
+    results = [bayesplate.fit(given, seed=3) for given in (BOARD, clamped, board, card)]
+
+    assert files_in(tmp_path) == before
+    assert [result.folder for result in results] == [None] * 4
+    assert len({result.draws.theta.tobytes() for result in results}) == 1
+    assert results[2].summary == results[3].summary
+    assert results[2].summary.card_sha256 == Board.from_toml(card).sha256
+
+
+@pytest.mark.usefixtures("quickly")
+def test_what_is_written_of_a_board_is_what_is_written_of_its_card(tmp_path, clamped):
+    card = tmp_path / f"{BOARD}.toml"
+    clamped.board.to_toml(card)
+    for name, given in (("board", clamped.board), ("card", card)):
+        bayesplate.fit(given, out=tmp_path / name, report=False)
+
+    assert files_in(tmp_path / "board") == files_in(tmp_path / "card")
+    assert set(files_in(tmp_path / "board")) == {"summary.json", "posterior.nc"}
+
+
+@pytest.mark.parametrize(
+    ("function", "given"),
+    [("fit", {"effects": []}), ("fit", {"law": "exact"}), ("fit", {"robust": True}), ("check", {"effects": []}),
+     ("diagnose", {"effects": []}), ("compare", {"effects": []}), ("modes", {"effects": []}),
+     ("cite", {"effects": []})],
+)  # fmt: skip
+def test_what_a_problem_states_is_not_stated_again(clamped, function, given):
+    with pytest.raises(bayesplate.InputError, match=f"{next(iter(given))}: wanted nothing beside a Problem"):
+        getattr(bayesplate, function)(clamped, **given)
+
+
+def test_a_diagnosis_of_robust_noise_is_refused():
+    with pytest.raises(bayesplate.InputError, match="robust: wanted a problem with normal noise"):
+        bayesplate.diagnose(bayesplate.Problem.from_card(BOARD, robust=True))
+
+
+def test_a_board_whose_effects_a_card_cannot_state_is_refused(problem):
+    """The parameters of declared effects have their own priors; another one would be lost on the way, unsaid."""
+    declared = problem.prepared.board
+    name = next(one.name for one in declared.uncertain if one.effect == "support_stiffness")
+    changed = declared.with_priors({name: declared.inputs[name].scaled(2.0)})
+
+    assert bayesplate.Problem.from_card(declared, effects=declared.effects).names == problem.names
+    with pytest.raises(bayesplate.InputError, match="wanted the prior of a declared effect, got another one"):
+        bayesplate.Problem.from_card(changed)
+
+
+def test_a_faulty_board_is_refused_as_its_card_would_be(tmp_path, clamped):
+    thick = bayesplate.Quantity.exact(-3e-3)
+    board = replace(clamped.board.with_priors({"thickness": thick}), effects=("grain_angel",))
+    Path(tmp_path / f"{BOARD}.toml").write_text(board.to_toml(), encoding="utf-8")
+    told = []
+    for given in (board, tmp_path / f"{BOARD}.toml"):
+        with pytest.raises(bayesplate.InputError) as refused:
+            bayesplate.check(given)
+        told.append(str(refused.value))
+
+    assert told[0] == told[1]
+    assert f"{BOARD}.toml [plate] thickness_mm: wanted a positive number, got -3.0" in told[0]
+    assert "did you mean grain_angle?" in told[0]

@@ -1,0 +1,248 @@
+"""A run that was stopped is continued to the same bytes, and refused where it is another run."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import runs
+from runs import files_in, read_json
+
+from bayesplate.posterior.checkpoint import CHAINS
+
+BOARD = "fiemme-spruce-clamped"
+UNCONVERGED = {"format", "name", "seed", "versions", "card_sha256", "model", "converged", "sampler", "warnings"}
+RESULTS = {"summary.json", "posterior.nc"}
+"""What a fit without a report leaves; that a report is the same too is shown where threads are counted."""
+
+
+def results_of(files: dict[str, bytes]) -> dict[str, bytes]:
+    return {name: files[name] for name in RESULTS}
+
+
+def start(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:
+    """A fit in a process of its own, which heeds an interrupt even where the tests themselves run in the background."""
+
+    def heed_interrupts() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    program = [sys.executable, "-m", "bayesplate", "fit", *arguments, "--out", str(folder)]
+    variables = {**os.environ, **environment}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen(program, **pipes, text=True, env=variables, preexec_fn=heed_interrupts)
+
+
+def stop_while_sampling(folder: Path, *stops: signal.Signals) -> tuple[int, str]:
+    """Send a signal once a chunk is saved; the exit code and what was said. The first of two only holds it."""
+    with start(folder, BOARD, "--no-report") as process:
+        saved = folder / "checkpoint" / "linear" / CHAINS
+        deadline = time.monotonic() + 600
+        while not saved.exists() and process.poll() is None:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        for stop in stops:
+            process.send_signal(stop)
+            if stop == signal.SIGSTOP:
+                for beside in ("--force", "--resume"):
+                    assert_taken(folder, beside, process.pid)
+        _, stderr = process.communicate(timeout=600)
+    return process.returncode, stderr
+
+
+def assert_taken(folder: Path, option: str, owner: int) -> None:
+    """Another run in the folder of one in progress is refused and touches nothing."""
+    before = files_in(folder)
+    run = runs.fit(folder, BOARD, option)
+
+    assert run.exit_code == 6
+    assert f"wanted sole use, got another run (process {owner}) that writes to it" in run.stderr
+    assert files_in(folder) == before
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_fit_resumes_to_the_same_bytes(tmp_path, fiemme_files, stop):
+    exit_code, stderr = stop_while_sampling(tmp_path / "out", stop)
+
+    assert exit_code == 130
+    assert stderr == "interrupted; --resume continues from the last checkpoint\n"
+    assert RESULTS & set(files_in(tmp_path / "out")) == set()
+    assert runs.fit(tmp_path / "out", BOARD, "--resume", "--no-report").exit_code == 0
+    assert files_in(tmp_path / "out") == results_of(fiemme_files)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs a signal that cannot be caught")
+def test_a_killed_fit_resumes_to_the_same_bytes(tmp_path, fiemme_files):
+    """And while it was alive, though it did nothing, no other run could take its folder."""
+    exit_code, _ = stop_while_sampling(tmp_path / "out", signal.SIGSTOP, signal.SIGKILL)
+
+    assert exit_code == -signal.SIGKILL
+    left = files_in(tmp_path / "out")
+    assert RESULTS & set(left) == set()
+    assert f"checkpoint/linear/{CHAINS}" in left
+    assert runs.fit(tmp_path / "out", BOARD, "--resume", "--no-report").exit_code == 0
+    assert files_in(tmp_path / "out") == results_of(fiemme_files)
+
+
+def test_an_interrupt_before_sampling_leaves_nothing(tmp_path, monkeypatch):
+    def interrupted(*_: object, **__: object) -> None:
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(10)
+
+    monkeypatch.setattr("bayesplate.commands.problem.pose", interrupted)
+    run = runs.fit(tmp_path / "out", BOARD)
+
+    assert run.exit_code == 130
+    assert not run.folder.exists()
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+
+
+def test_an_interrupt_before_the_first_checkpoint_promises_nothing(tmp_path, monkeypatch):
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bayesplate.commands.fitting.infer", interrupted)
+    run = runs.fit(tmp_path / "out", BOARD)
+
+    assert (run.exit_code, run.stderr) == (130, "interrupted\n")
+    assert not run.folder.exists()
+
+
+def test_a_run_that_does_not_converge_says_so_and_gives_no_constants(stopped):
+    assert stopped.exit_code == 5
+    assert stopped.summary["converged"] is False
+    assert set(stopped.summary) == UNCONVERGED
+    assert stopped.summary["sampler"]["steps"] == 200
+    assert stopped.summary["sampler"]["tau_max"] > 0
+    assert any("autocorrelation" in sentence for sentence in stopped.summary["warnings"])
+    assert "posterior.nc" not in stopped.files
+    assert "the sampler did not converge, so no constants are given" in stopped.stderr
+    assert read_json(stopped.stdout)["error"]["exit_code"] == 5
+    assert not any(name in stopped.stdout + stopped.stderr for name in ("E_x", "GPa"))
+
+
+def test_a_run_that_did_not_converge_is_continued_where_more_steps_are_allowed(stopped, fiemme_files):
+    """200 steps and then the others are the same draws as all of them at once, and the same burn-in is dropped."""
+    assert runs.fit(stopped.folder, BOARD, "--resume", "--quiet", "--no-report").exit_code == 0
+    assert stopped.files == results_of(fiemme_files)
+
+
+def test_a_damaged_checkpoint_is_refused_and_stays(stopped):
+    chains = stopped.folder / "checkpoint" / "linear" / CHAINS
+    chains.write_bytes(chains.read_bytes()[:1000])
+    before = stopped.files
+    again = runs.fit(stopped.folder, BOARD, "--resume", "--quiet", "--no-report")
+
+    assert again.exit_code == 6
+    assert "got a damaged one; start anew with --force" in again.stderr
+    assert again.files == {**before, "checkpoint/linear/lock": again.files["checkpoint/linear/lock"]}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "options", "what"),
+    [
+        ('"(0,0)" = 57', '"(0,0)" = 58', (), "differs in its fingerprint"),
+        ("density_kg_m3 = 399", "density_kg_m3 = 400", (), "differs in its fingerprint"),
+        ("poisson_xy = 0.51", "poisson_xy = 0.50", (), "differs in its fingerprint"),
+        ("format = 1", "format = 1 # the archive holds the text of the card", (), "differs in its fingerprint"),
+        ("", "", ("--seed", "2"), "differs in its seed: wanted 2, got 1"),
+        ("", "", ("--robust",), "differs in its fingerprint"),
+        ("", "", ("--exact",), "wanted a saved run under the exact law, got none to resume"),
+    ],
+)
+def test_another_run_is_not_continued(stopped, own_card, old, new, options, what):
+    """Exit 6, the difference named, and what the first run left stays as it was."""
+    before = stopped.files
+    text = own_card.read_text(encoding="utf-8")
+    assert text.count(old) == 1 or not old
+    own_card.write_text(text.replace(old, new) if old else text, encoding="utf-8")
+    run = runs.fit(stopped.folder, str(own_card), "--resume", *options)
+
+    assert run.exit_code == 6
+    assert what in run.stderr
+    assert "--force" in run.stderr
+    assert run.files == {**before, "checkpoint/linear/lock": run.files["checkpoint/linear/lock"]}
+
+
+def test_a_folder_with_a_run_is_neither_overwritten_nor_continued_unasked(stopped):
+    before = stopped.files
+    run = runs.fit(stopped.folder, BOARD)
+
+    assert run.exit_code == 3
+    assert "--force replaces its results, --resume continues an interrupted run" in run.stderr
+    assert run.files == before
+
+
+@pytest.mark.parametrize("content", [{}, {"notes.txt": b"mine"}, {"summary.json": b"{}"}])
+def test_there_is_nothing_to_resume(tmp_path, content):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    for name, data in content.items():
+        (folder / name).write_bytes(data)
+    run = runs.fit(folder, BOARD, "--resume")
+
+    assert run.exit_code == 6
+    assert "wanted the checkpoint of an interrupted run" in run.stderr
+    assert run.files == content
+
+
+def test_force_replaces_the_results_and_the_checkpoint_and_nothing_else(stopped, quick_fit):
+    (stopped.folder / "posterior.nc").write_bytes(b"old")
+    (stopped.folder / "notes.txt").write_bytes(b"mine")
+    run = quick_fit(BOARD, "--force", "--quiet")
+
+    assert run.folder == stopped.folder
+
+    assert run.exit_code == 0
+    assert set(run.files) == {*RESULTS, "notes.txt"}
+    assert run.files["notes.txt"] == b"mine"
+    assert run.summary["converged"] is True
+    assert run.files["posterior.nc"] != b"old"
+
+
+@pytest.mark.usefixtures("quickly")
+def test_force_that_is_interrupted_before_sampling_leaves_the_old_results(tmp_path, monkeypatch):
+    """They were laid aside, and come back."""
+    (tmp_path / "figures").mkdir()
+    for name in ("summary.json", "posterior.nc", "figures/modes.png"):
+        (tmp_path / name).write_bytes(b"old")
+    before = files_in(tmp_path)
+
+    def interrupted(*arguments: object, **options: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bayesplate.commands.fitting.infer", interrupted)
+    run = runs.fit(tmp_path, BOARD, "--force")
+
+    assert run.exit_code == 130
+    assert files_in(tmp_path) == before
+
+
+def test_force_of_a_refused_card_keeps_the_old_results(quick_fit, own_card):
+    before = quick_fit(str(own_card), "--quiet").files
+    own_card.write_text(own_card.read_text(encoding="utf-8").replace("= 600", "= -600"), encoding="utf-8")
+    run = quick_fit(str(own_card), "--force")
+
+    assert run.exit_code == 3
+    assert run.files == before
+
+
+def test_another_seed_gives_other_bytes(tmp_path, fiemme_files):
+    other = runs.fit(tmp_path / "out", BOARD, "--quiet", "--no-report", "--seed", "2").files
+
+    assert set(other) == RESULTS
+    assert all(other[name] != fiemme_files[name] for name in RESULTS)
+    assert read_json(other["summary.json"].decode())["seed"] == 2
+
+
+def test_the_same_seed_gives_the_same_bytes_whatever_the_number_of_threads(tmp_path, fiemme_files):
+    """The report's too. Another process, asked for another number of threads: long sums must not follow it."""
+    other = "2" if os.environ.get("OMP_NUM_THREADS") == "1" else "1"
+    with start(tmp_path / "out", BOARD, "--quiet", OMP_NUM_THREADS=other, OPENBLAS_NUM_THREADS=other) as process:
+        assert process.communicate(timeout=300) == ("", "")
+
+    assert files_in(tmp_path / "out") == fiemme_files

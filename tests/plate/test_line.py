@@ -1,0 +1,197 @@
+"""One line of Hermite elements: exact for cubics, beam functions of the handbooks, even and odd functions of a half."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from deflected import unknowns
+from numpy.polynomial import Polynomial
+
+from bayesplate.plate.beams import N_BEAMS, beam_functions
+from bayesplate.plate.line import graded_nodes, line, rigid_degrees
+
+ENDS = list(product(("clamped", "supported", "free"), repeat=2))
+
+# Roots of the beam equations cos k cosh k = +-1 and tan k = tanh k: the two lowest wavenumbers on the unit interval.
+BEAM_WAVENUMBERS = {
+    ("clamped", "clamped"): (4.7300407449, 7.8532046241),
+    ("free", "free"): (4.7300407449, 7.8532046241),
+    ("clamped", "free"): (1.8751040687, 4.6940911330),
+    ("supported", "supported"): (np.pi, 2.0 * np.pi),
+    ("clamped", "supported"): (3.9266023120, 7.0685827456),
+    ("supported", "free"): (3.9266023120, 7.0685827456),
+}
+
+# Integrals over [0, 1] of derivatives of x^2 against those of x^3, by hand.
+SQUARE_AGAINST_CUBE = {(0, 0): 1 / 6, (1, 1): 3 / 2, (2, 2): 6.0, (0, 2): 3 / 2, (2, 0): 1 / 2}
+
+
+def of_cubic(side, cubic):
+    return unknowns(side, cubic, cubic.deriv())
+
+
+@pytest.mark.parametrize("orders", SQUARE_AGAINST_CUBE)
+def test_integrals_of_cubics_are_exact(orders):
+    free = line(("free", "free"), 3)
+    both = (of_cubic(free, Polynomial.basis(degree)) for degree in (2, 3))
+
+    square, cube = (free.derivatives[order] @ one for order, one in zip(orders, both, strict=True))
+
+    assert free.weights @ (square * cube) == pytest.approx(SQUARE_AGAINST_CUBE[orders], rel=1e-12)
+
+
+def test_shapes_evaluate_a_cubic_exactly():
+    free = line(("free", "free"), 4, is_split=False)
+    cubic = Polynomial([1.0, -1.0, 0.0, 1.0])
+    points = np.array([0.0, 0.1, 0.33, 0.5, 0.91, 1.0])
+
+    np.testing.assert_allclose(free.shapes(points) @ of_cubic(free, cubic), cubic(points), rtol=1e-12)
+
+
+def test_points_and_weights_are_those_of_gauss_on_each_element():
+    """Five points are exact to degree nine and no further; of a half line the integral is that of the whole."""
+    whole, half = (line(("free", "free"), 2, is_split=is_split) for is_split in (False, True))
+
+    def error(degree):
+        return abs(whole.weights @ whole.points**degree * (degree + 1) - 1.0)
+
+    assert error(9) < 1e-14
+    assert error(10) > 1e-9
+    assert half.points.max() < 0.5
+    assert half.weights @ (half.points - 0.5) ** 2 == pytest.approx(1 / 12, rel=1e-13)
+
+
+@pytest.mark.parametrize("ends", ENDS)
+def test_held_ends_take_their_of_cubic(ends):
+    """A clamp holds value and slope, on a shear-flexible plate the value alone; the slope there is the shear strain."""
+    whole = line(ends, 5)
+    n_clamped, n_supported = ends.count("clamped"), ends.count("supported")
+
+    assert whole.kept(0, is_sheared=False).sum() == 2 * 6 - 2 * n_clamped - n_supported
+    assert whole.kept(0, is_sheared=True).sum() == 2 * 6 - n_clamped - n_supported
+    assert whole.kept_strain(0).sum() == 2 * 6 - n_clamped
+    assert whole.ties() == [
+        (2 * node, 2 * node + 1) for node, end in zip((0, 5), ends, strict=True) if end == "clamped"
+    ]
+
+
+def test_what_is_held_may_be_less_than_the_ends_say():
+    """A released clamp: its beam functions and rigid motions stay those of a clamped line, its functions do not."""
+    free = line(("clamped", "clamped"), 5, held=("free", "guided"))
+
+    assert free.ends == ("clamped", "clamped")
+    np.testing.assert_array_equal(np.flatnonzero(~free.kept(0, is_sheared=False)), [2 * 5 + 1])
+    assert free.ties() == [(2 * 5, 2 * 5 + 1)]
+
+
+@pytest.mark.parametrize(("ends", "wavenumbers"), BEAM_WAVENUMBERS.items())
+def test_beam_functions_have_the_wavenumbers_of_the_handbooks(ends, wavenumbers):
+    # The relative error of a wavenumber is about (k / 40)^4 / 2880, at most 5.2e-7 here.
+    bending = beam_functions(ends).integrals(2, 2)
+    n_rigid = len(rigid_degrees(ends))
+
+    np.testing.assert_allclose(bending[n_rigid : n_rigid + 2] ** 0.25, wavenumbers, rtol=1e-6)
+
+
+@pytest.mark.parametrize("ends", ENDS)
+def test_rigid_motions_come_first_and_do_not_bend(ends):
+    bending = beam_functions(ends).integrals(2, 2)
+    n_rigid = len(rigid_degrees(ends))
+
+    # The lowest elastic eigenvalue of any line is that of the clamped-free one, 1.8751^4 = 12.36.
+    assert np.all(np.abs(bending[:n_rigid]) < 1e-6)
+    assert bending[n_rigid] > 12.0
+
+
+def test_free_line_shifts_before_it_turns():
+    points = np.linspace(0.0, 1.0, 5)
+
+    shift, turn = beam_functions(("free", "free")).at(points)[:, :2].T
+
+    np.testing.assert_allclose(shift, 1.0, rtol=1e-12)
+    np.testing.assert_allclose(turn, np.sqrt(12.0) * (points - 0.5), atol=1e-12)
+
+
+@pytest.mark.parametrize("ends", ENDS)
+def test_beam_functions_are_orthonormal(ends):
+    beams = beam_functions(ends)
+    at_points = beams.side.derivatives[0] @ beams.coefficients
+
+    np.testing.assert_allclose((at_points.T * beams.side.weights) @ at_points, np.eye(N_BEAMS), atol=1e-9)
+
+
+@pytest.mark.parametrize("end", ["clamped", "supported", "free"])
+@pytest.mark.parametrize("parity", [0, 1])
+def test_functions_of_a_half_go_on_beyond_the_middle_with_their_sign(end, parity):
+    half = line((end, end), 6)
+    points = np.linspace(0.0, 0.5, 7)
+
+    left, right = (half.shapes(at, parity).toarray() for at in (points, 1.0 - points))
+
+    kept = half.kept(parity, is_sheared=False)
+    np.testing.assert_allclose(right[:, kept], (-1.0) ** parity * left[:, kept], atol=1e-12)
+    # Both halves meet with one value and one slope, that of an even function zero and that of an odd one free.
+    assert list(kept[-2:]) == [parity == 0, parity == 1]
+
+
+@pytest.mark.parametrize("end", ["clamped", "supported", "free"])
+@pytest.mark.parametrize("is_sheared", [False, True])
+def test_even_and_odd_functions_of_a_half_are_all_functions_of_the_whole(end, is_sheared):
+    """Of the deflection, and of the strain along the side, which is odd where the deflection is even."""
+    half, whole = (line((end, end), 6, is_sheared, is_split=is_split) for is_split in (True, False))
+    points = np.linspace(0.0, 1.0, 201)
+
+    def are_the_same(parts, expected):
+        found = np.hstack([part.toarray() for part in parts])
+        ranks = [np.linalg.matrix_rank(one, tol=1e-9) for one in (found, np.hstack([found, expected.toarray()]))]
+        return found.shape == expected.shape and ranks == 2 * [expected.shape[1]]
+
+    at = whole.shapes(points)
+    deflection = [half.shapes(points, p)[:, half.kept(p, is_sheared)] for p in (0, 1)]
+    assert are_the_same(deflection, at[:, whole.kept(0, is_sheared)])
+    strain = [half.shapes(points, 1 - p)[:, half.kept_strain(p)] for p in (0, 1)]
+    assert are_the_same(strain, at[:, whole.kept_strain(0)])
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_ends_have_their_own_values_and_slopes(order):
+    whole, half = (line(("free", "free"), 4, is_split=is_split) for is_split in (False, True))
+    cubic = Polynomial([1.0, 2.0, 3.0, 4.0])
+
+    for at in product((False, True), repeat=2):
+        rows, weights = whole.at_ends(at, order)
+        expected = [
+            cubic.deriv(order)(end) if order else cubic(end) for end, asked in zip((0.0, 1.0), at, strict=True) if asked
+        ]
+        np.testing.assert_allclose(rows @ of_cubic(whole, cubic), expected)
+        np.testing.assert_array_equal(weights, np.ones(sum(at)))
+    rows, weights = half.at_ends((True, True), order)
+    assert rows @ of_cubic(half, cubic) == pytest.approx(2.0 if order else 1.0)
+    np.testing.assert_array_equal(weights, [2.0])
+
+
+@pytest.mark.parametrize("ends", [ends for ends in ENDS if ends[0] != ends[1]])
+def test_unlike_ends_leave_a_whole_line(ends):
+    assert not line(ends, 6).is_split
+    assert line(ends, 6).share == 1.0
+
+
+def test_an_element_across_the_middle_leaves_a_whole_line():
+    assert line(("free", "free"), 6).is_split
+    assert not line(("free", "free"), 5).is_split
+
+
+@pytest.mark.parametrize("ends", ENDS)
+def test_elements_are_graded_towards_free_ends(ends):
+    nodes = graded_nodes(ends, 12)
+    n_free = ends.count("free")
+    whole = 1.0 / (12 - 2 * n_free)
+
+    assert nodes.size == 13
+    assert nodes[0] == 0.0
+    assert nodes[-1] == 1.0
+    for end, lengths in zip(ends, (np.diff(nodes), np.diff(nodes)[::-1]), strict=True):
+        expected = [1 / 16, 3 / 16, 3 / 4] if end == "free" else [1.0, 1.0, 1.0]
+        np.testing.assert_allclose(lengths[:3] / whole, expected, rtol=1e-12)

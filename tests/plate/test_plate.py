@@ -1,0 +1,253 @@
+"""The plate: energies by hand, the two-dimensional element as oracle, rigid motions, and one pencil of each class."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from deflected import power
+from dense_pencils import dense, spectrum, together, whole
+from scipy.linalg import eigh
+from skfem import Basis, BilinearForm, ElementQuadBFS, MeshQuad
+
+from bayesplate.plate.fields import Fabric
+from bayesplate.plate.line import N_POINTS_CUT, line
+from bayesplate.plate.plate import plate_of
+from bayesplate.plate.shear import SHEAR_FLEXIBLE, shear_flexible_plate
+from bayesplate.plate.terms import AlongEdges, Amount, AtPlaces, OnDeflections, OverPlate, Parity, Weights
+from bayesplate.plate.thin import THIN, thin_plate
+
+ENDS = list(product(("clamped", "supported", "free"), repeat=2))
+EDGES = [pytest.param(x, y, id="".join(end[0] for end in x + y)) for x, y in product(ENDS, ENDS)]
+FREE = ("free", "free")
+MESH = (6, 4)
+SPRUCE = Weights(np.array([5.35, 0.75, 0.31, 1.0]), np.ones(1))
+
+# Polynomials f(x) g(y) on the unit square, and by hand: int w_xx^2, int w_yy^2, 2 int w_xx w_yy, int w_xy^2, int w^2.
+ENERGIES = {
+    "x^2 + y^2": (4.0, 4.0, 8.0, 0.0, 28 / 45),
+    "xy": (0.0, 0.0, 0.0, 1.0, 1 / 9),
+    "x^2 y": (4 / 3, 0.0, 0.0, 4 / 3, 1 / 15),
+    "x^2 y^2": (4 / 5, 4 / 5, 8 / 9, 16 / 9, 1 / 25),
+    "x^3 y^2": (12 / 5, 4 / 7, 8 / 5, 12 / 5, 1 / 35),
+}
+PRODUCTS = {
+    "x^2 + y^2": [(2, 0), (0, 2)],
+    "xy": [(1, 1)],
+    "x^2 y": [(2, 1)],
+    "x^2 y^2": [(2, 2)],
+    "x^3 y^2": [(3, 2)],
+}
+
+
+@pytest.mark.parametrize("polynomial", ENERGIES)
+def test_energies_of_polynomials_by_hand(polynomial):
+    """A free plate holds bicubics exactly, so its terms are their integrals; x^2 + y^2 fixes the factor of the mix."""
+    x, y = (line(FREE, n, is_split=False) for n in (2, 3))
+    (own,) = plate_of(THIN, x, y).classes
+    vector = sum(np.kron(power(x, p), power(y, q)) for p, q in PRODUCTS[polynomial])
+
+    stiffness, mass = own.energies(vector[:, None])
+
+    np.testing.assert_allclose([*stiffness[0], *mass[0]], ENERGIES[polynomial], rtol=1e-11, atol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def two_dimensional():
+    """Stiffness and mass of the free plate by the Bogner-Fox-Schmit element on the same mesh, and its basis."""
+    xx, yy, mix, xy = SPRUCE.stiffness
+    nodes = [np.linspace(0.0, 1.0, n + 1) for n in MESH]
+    basis = Basis(MeshQuad.init_tensor(*nodes).with_defaults(), ElementQuadBFS(), intorder=8)
+
+    def energy(u, v, w):
+        mixed = u.hess[0, 0] * v.hess[1, 1] + u.hess[1, 1] * v.hess[0, 0]
+        along = xx * u.hess[0, 0] * v.hess[0, 0] + yy * u.hess[1, 1] * v.hess[1, 1]
+        return along + mix * mixed + xy * u.hess[0, 1] * v.hess[0, 1]
+
+    return BilinearForm(energy).assemble(basis), BilinearForm(lambda u, v, w: u * v).assemble(basis), basis
+
+
+@pytest.mark.parametrize(("ends_x", "ends_y"), EDGES)
+def test_classes_together_have_the_spectrum_of_the_two_dimensional_element(two_dimensional, ends_x, ends_y):
+    """The element knows nothing of lines, products and symmetry: the classes must lose and add no mode."""
+    stiffness, mass, basis = two_dimensional
+    held = {"left": ends_x[0], "right": ends_x[1], "bottom": ends_y[0], "top": ends_y[1]}
+    along = {"left": "u_y", "right": "u_y", "bottom": "u_x", "top": "u_x"}
+    fixed = [np.array([], dtype=int)]
+    for edge, end in held.items():
+        nodal = basis.get_dofs(edge).nodal
+        names = {"clamped": ["u", "u_x", "u_y", "u_xy"], "supported": ["u", along[edge]], "free": []}[end]
+        fixed += [nodal[name] for name in names]
+    kept = np.setdiff1d(np.arange(basis.N), np.concatenate(fixed))
+    expected = eigh(stiffness[kept][:, kept].toarray(), mass[kept][:, kept].toarray(), eigvals_only=True)[:12]
+
+    plate = thin_plate(ends_x, ends_y, *MESH)
+    eigenvalues = np.sort(np.concatenate([spectrum(own, SPRUCE) for own in plate.classes]))
+
+    assert eigenvalues.size == kept.size
+    # Rigid motions are zero to rounding: 1e-8 of the highest of the twelve.
+    np.testing.assert_allclose(eigenvalues[:12], expected, rtol=1e-8, atol=1e-8 * expected[-1])
+
+
+@pytest.mark.parametrize(("ends_x", "ends_y"), EDGES)
+def test_zero_eigenvalues_are_counted_for_every_support(ends_x, ends_y):
+    # Lowest elastic eigenvalues of these boards lie above 1; zeros come out below 1e-9.
+    for own in thin_plate(ends_x, ends_y, *MESH).classes:
+        assert np.sum(spectrum(own, SPRUCE) < 1e-4) == own.n_rigid
+
+
+@pytest.mark.parametrize(
+    ("ends_x", "ends_y", "parities"),
+    [
+        (FREE, ("clamped", "clamped"), [(0, 0), (0, 1), (1, 0), (1, 1)]),
+        (("clamped", "free"), FREE, [(0, 0), (0, 1)]),
+        (FREE, ("clamped", "supported"), [(0, 0), (1, 0)]),
+        (("clamped", "free"), ("supported", "free"), [(0, 0)]),
+    ],
+)
+def test_classes_are_those_of_like_opposite_edges(ends_x, ends_y, parities):
+    plate = thin_plate(ends_x, ends_y, 4, 6)
+
+    assert [own.parity for own in plate.classes] == parities
+    for beams in product(range(3), range(3)):
+        assert plate.symmetry_class(plate.parity(beams)).parity in parities
+
+
+@pytest.mark.parametrize("parity", [Parity(0, 0), Parity(0, 1), Parity(1, 0), Parity(1, 1)])
+def test_deflections_have_the_parity_of_their_class(parity):
+    own = thin_plate(FREE, ("clamped", "clamped"), 4, 6).symmetry_class(parity)
+    deflections = own.deflections(np.random.default_rng(3).standard_normal((own.n_dof, 2)))
+    x, y = np.array([0.1, 0.4]), np.array([0.2, 0.3, 0.45])
+    here = deflections.on(x, y)
+
+    np.testing.assert_allclose(deflections.on(1 - x, y), (-1.0) ** parity.x * here, atol=1e-12)
+    np.testing.assert_allclose(deflections.on(x, 1 - y), (-1.0) ** parity.y * here, atol=1e-12)
+    np.testing.assert_allclose(
+        deflections.across(x, np.stack([y, 1 - y])), _each_its_own(deflections, x, y), atol=1e-12
+    )
+
+
+def _each_its_own(deflections, x, y):
+    """On y at the first place along x, on the mirrored ones at the second."""
+    return np.stack([deflections.on(x[:1], y)[:, 0], deflections.on(x[1:], 1 - y)[:, 0]], axis=1)
+
+
+@pytest.mark.parametrize("parity", [Parity(0, 0), Parity(0, 1), Parity(1, 0), Parity(1, 1)])
+@pytest.mark.parametrize("outline", [None, lambda x: (0.1 + 0.0 * x, 0.9 + 0.0 * x)], ids=["rectangle", "outline"])
+def test_integrals_of_deflections_are_sums_over_the_plate(parity, outline):
+    x, y = (line(ends, 4, n_points=N_POINTS_CUT) for ends in (("clamped", "clamped"), FREE))
+    own = plate_of(THIN, x, y).symmetry_class(parity)
+    deflections = own.deflections(np.random.default_rng(4).standard_normal((own.n_dof, 3)))
+    low, high = (0.0, 1.0) if outline is None else (0.1, 0.9)
+    at, weights = np.polynomial.legendre.leggauss(4)
+    cuts = np.unique(np.clip(np.linspace(0.0, 1.0, 5), low, high))
+
+    def points(nodes):
+        lengths = np.diff(nodes)[:, None]
+        return (nodes[:-1, None] + lengths * (at + 1.0) / 2.0).ravel(), (lengths * weights / 2.0).ravel()
+
+    (at_x, along_x), (at_y, along_y) = points(np.linspace(0.0, 1.0, 5)), points(cuts)
+    expected = along_x @ deflections.on(at_x, at_y) @ along_y
+
+    np.testing.assert_allclose(deflections.integrals(outline), expected, atol=1e-12)
+
+
+def mean_square(deflections):
+    """A mass term of the mean deflection, as of a support that moves with the board."""
+    means = deflections.integrals(None)
+    return np.outer(means, means)
+
+
+def bump(x, y):
+    return np.exp(x * y) + 0.3 * np.sin(3.0 * x + y)
+
+
+PLACE, BESIDE = Amount(((1.0, 0.3, 0.8), (-2.0, 0.9, 0.1))), Amount(((-1.0, 0.2, 0.2),), beside=1)
+FURTHER = (
+    OverPlate(("slope_x", "slope_x")),
+    AlongEdges(0, (True, True), "w"),
+    AlongEdges(1, (True, True), "turn_y"),
+    AtPlaces(((1.0, BESIDE, BESIDE), (0.5, PLACE, Amount(beside=0)))),
+)
+HEAVY = (AtPlaces(((0.3, PLACE, PLACE), (1.0, Amount(beside=0), Amount(beside=0)), (1.0, BESIDE, BESIDE))),)
+
+
+def varied(kinematics, is_split, ends_x=("clamped", "clamped"), ends_y=FREE, outline=None):
+    """A plate with two fields of each group and every kind of further term."""
+    is_sheared = kinematics is SHEAR_FLEXIBLE
+    x, y = (line(ends, 4, is_sheared, is_split) for ends in (ends_x, ends_y))
+    fields = {group: [None, bump] for group in ("along", "bending", "shear", "mass", "rotary")}
+    return plate_of(kinematics, x, y, Fabric(fields, outline, is_turned=True)).with_terms(FURTHER, HEAVY)
+
+
+def some_weights(plate, seed=2):
+    rng = np.random.default_rng(seed)
+    return Weights(*(rng.uniform(0.5, 2.0, len(terms)) for terms in (plate.stiffness, plate.masses)))
+
+
+@pytest.mark.parametrize("is_split", [True, False])
+@pytest.mark.parametrize("kinematics", [THIN, SHEAR_FLEXIBLE], ids=["thin", "shear-flexible"])
+def test_the_pencil_of_a_class_is_its_terms_on_every_unknown(kinematics, is_split):
+    """Assembled of elements, and from the strains of unit vectors: all fields, edges, places and ties are in both."""
+    plate = varied(kinematics, is_split)
+    weights = some_weights(plate)
+    assert len(plate.classes) == (4 if is_split else 1)
+    assert plate.n_beside == 2
+    for own in plate.classes:
+        for found, expected in zip(dense(own, weights), whole(own, weights), strict=True):
+            np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("kinematics", [THIN, SHEAR_FLEXIBLE], ids=["thin", "shear-flexible"])
+def test_energies_are_the_diagonals_of_the_terms(kinematics):
+    (own,) = varied(kinematics, is_split=False).classes
+    plate = own.plate.with_terms([OnDeflections(mean_square)], [OnDeflections(mean_square)])
+    (own,) = plate.classes
+    vectors = np.random.default_rng(6).standard_normal((own.n_dof, 3))
+
+    for found, terms in zip(own.energies(vectors), (own.project_stiffness, own.project_masses), strict=True):
+        diagonals = np.diagonal(terms(vectors), axis1=1, axis2=2)
+        np.testing.assert_allclose(found, diagonals.T, rtol=1e-9, atol=1e-12 * np.abs(diagonals).max())
+
+
+@pytest.mark.parametrize("kinematics", [THIN, SHEAR_FLEXIBLE], ids=["thin", "shear-flexible"])
+def test_pencils_on_a_span_have_the_terms_that_exist_on_deflections_too(kinematics):
+    plate = varied(kinematics, is_split=True)
+    plate = plate.with_terms([OnDeflections(mean_square)], [OnDeflections(mean_square)])
+    own = plate.classes[0]
+    draws = [some_weights(plate, seed) for seed in range(3)]
+    vectors = np.random.default_rng(7).standard_normal((own.n_dof, 4))
+
+    found = own.on_span([own.pencil(plate.elements(one)) for one in draws], together(draws), vectors)
+
+    for side in (0, 1):
+        expected = np.stack([vectors.T @ whole(own, one)[side] @ vectors for one in draws])
+        np.testing.assert_allclose(found[side], expected, atol=1e-11 * np.abs(expected).max())
+
+
+def test_what_the_masses_give_to_coordinates_beside_the_plate():
+    plate = varied(THIN, is_split=False)
+    (own,) = plate.classes
+    vectors = np.zeros((own.n_dof, 2))
+    vectors[own.n_on_plate :] = [[1.0, 2.0], [3.0, 4.0]]
+
+    found = own.project_beside(vectors)
+
+    np.testing.assert_array_equal(found[:-1], 0.0)
+    np.testing.assert_allclose(found[-1], [[1.0 + 9.0, 2.0 + 12.0], [14.0, 4.0 + 16.0]])
+
+
+@pytest.mark.parametrize("ends", [("clamped", "free"), ("supported", "clamped"), ("clamped", "clamped")])
+def test_at_a_clamp_a_shear_flexible_plate_does_not_turn(ends):
+    """Its deflection meets the clamp at the angle of the shear strain, and nothing else holds its slope there."""
+    at = tuple(end == "clamped" for end in ends)
+    terms = [AlongEdges(0, at, strain) for strain in ("turn_x", "slope_x", "w")]
+    for own in shear_flexible_plate(ends, FREE, 4, 4).with_terms(terms, []).classes:
+        vectors = np.random.default_rng(8).standard_normal((own.n_dof, 2))
+
+        turning, sloping, moving = own.energies(vectors)[0][:, -3:].T
+
+        assert np.abs(turning).max() < 1e-25
+        assert np.abs(moving).max() == 0.0
+        assert sloping.min() > 1e-3

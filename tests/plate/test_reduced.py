@@ -1,0 +1,328 @@
+"""The plate on few vectors: its tolerance at points it has not seen, the error it states, draws, names, the tangent."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from itertools import product
+
+import numpy as np
+import pytest
+import ritz
+from bars import meets
+from dense_pencils import together
+
+from bayesplate.frequencies.laws import ExactLaw, LinearLaw
+from bayesplate.plate import reduction
+from bayesplate.plate.mesh import mesh
+from bayesplate.plate.naming import find
+from bayesplate.plate.reduction import reduced_order_model
+from bayesplate.plate.shear import shear_flexible_plate
+from bayesplate.plate.solve import solve_classes
+from bayesplate.plate.terms import Weights
+from bayesplate.plate.thin import thin_plate
+
+WANTED = {
+    "cantilever": (ritz.FINNISH, [(0, 0), (0, 1), (1, 0), (0, 2), (1, 1), (1, 2)]),
+    "clamped": (ritz.FIEMME, [(0, 0), (0, 1), (1, 0), (1, 1), (0, 2), (1, 2)]),
+    "free": (ritz.FREE_SPRUCE, [(1, 1), (2, 0), (2, 1), (0, 2), (1, 2), (3, 0), (3, 1), (2, 2), (3, 2)]),
+}
+HALF_WIDTHS = np.array([0.3, 0.3, 0.24])
+"""Of ln(D_x / D_s), ln(D_y / D_s) and nu_xy: three standard deviations of a six-mode fit of one board."""
+TOLERANCES = 0.1, 1.0
+"""Cents: of a law for a careful laboratory, and of a usual one, a fifth of 0.3 %."""
+CORNERS = [np.array(signs) for signs in product((-1.0, 1.0), repeat=3)]
+
+
+def weights_at(board, point):
+    ratio_x, ratio_y, nu_xy = HALF_WIDTHS * point
+    moved = replace(board, D_x=board.D_x * np.exp(ratio_x), D_y=board.D_y * np.exp(ratio_y), nu_xy=board.nu_xy + nu_xy)
+    return Weights(moved.unit_weights, np.ones(1))
+
+
+def cents(eigenvalues, expected):
+    """600 log2: eigenvalues are squares of frequencies."""
+    return 600.0 * np.log2(eigenvalues / expected)
+
+
+def somewhere(n, seed):
+    return np.random.default_rng(seed).uniform(-1.0, 1.0, (n, 3))
+
+
+@cache
+def named(name):
+    """A plate, and its modes found by name at the centre."""
+    board, names = WANTED[name]
+    centre = weights_at(board, np.zeros(3))
+    plate = thin_plate(*board.ends, *mesh(centre))
+    return plate, find(plate, centre, names)
+
+
+@cache
+def prepared(name, tolerance=TOLERANCES[0]):
+    """The law for a box around the centre."""
+    board, _ = WANTED[name]
+    plate, found = named(name)
+    centre, *corners = (weights_at(board, point) for point in (np.zeros(3), *CORNERS))
+    held_out = [weights_at(board, point) for point in somewhere(6, 5)]
+    return reduced_order_model(plate, [one.place for one in found.values()], centre, corners, held_out, tolerance)
+
+
+@cache
+def trial(name, n_draws=16):
+    """Weights nobody has seen, and full solves there."""
+    plate, found = named(name)
+    draws = [weights_at(WANTED[name][0], point) for point in somewhere(n_draws, 99)]
+    exact = []
+    for weights in draws:
+        solved = solve_classes(plate, weights, dict.fromkeys((own.parity for own in plate.classes), 8))
+        exact.append([solved[mode.place.parity].eigenvalues[mode.place.rank] for mode in found.values()])
+    return together(draws), np.array(exact)
+
+
+@pytest.mark.parametrize("name", WANTED)
+def test_frequencies_hold_within_half_a_cent_where_nothing_was_trained(name):
+    """Of a law that was asked for a tenth of one."""
+    draws, exact = trial(name)
+
+    worst = np.abs(cents(prepared(name).eigenvalues(draws), exact)).max()
+    meets("V11", f"full solves at 16 points, {name}", worst, at_most=0.5, unit="cents")
+
+
+@pytest.mark.parametrize("tolerance", TOLERANCES)
+@pytest.mark.parametrize("name", WANTED)
+def test_reported_error_is_honest(name, tolerance):
+    """Sixteen other points may hold a worse one than the few that were held out, but not by more than a factor of 3."""
+    draws, exact = trial(name)
+    reduced = prepared(name, tolerance)
+
+    worst = np.abs(cents(reduced.eigenvalues(draws), exact)).max()
+
+    assert reduced.worst_cents <= tolerance
+    meets("V11", f"over the error that the law states, {name}", worst / reduced.worst_cents, at_most=3.0)
+
+
+@pytest.mark.parametrize("name", WANTED)
+def test_a_basis_is_no_larger_than_its_tolerance_asks(name):
+    """Another tolerance is another basis: the widest has fewer vectors than the narrowest, which it misses."""
+    sizes, errors = [], []
+    for tolerance in (1e-4, 0.1, 1.0, 10.0):
+        reduced = prepared(name, tolerance)
+        assert reduced.worst_cents <= tolerance
+        sizes.append(sum(own.stiffness.shape[-1] for own in reduced.classes))
+        errors.append(reduced.worst_cents)
+
+    assert sizes == sorted(sizes, reverse=True)
+    assert sizes[0] > sizes[-1]
+    assert errors[-1] > 1e-4
+
+
+def test_reported_error_is_the_true_one_where_the_basis_is_poor():
+    """The negative control: trained at the centre alone, the law misses its tolerance and says by how much."""
+    board, _ = WANTED["cantilever"]
+    plate, found = named("cantilever")
+    places = [one.place for one in found.values()]
+    centre, outside = weights_at(board, np.zeros(3)), weights_at(board, np.array([1.0, -1.0, 1.0]))
+    solved = solve_classes(plate, outside, dict.fromkeys((own.parity for own in plate.classes), 8))
+    exact = [solved[p.parity].eigenvalues[p.rank] for p in places]
+
+    reduced = reduced_order_model(plate, places, centre, [], [outside], 0.5)
+
+    assert reduced.worst_cents > 0.5
+    errors = np.abs(cents(reduced.eigenvalues(together([outside])), [exact]))
+    assert reduced.worst_cents == pytest.approx(errors.max(), rel=1e-6)
+
+
+@pytest.mark.parametrize(("tolerance", "n_solved"), [(3.0, 1 + 7 + 6), (1e-7, 1 + 14 + 6)])
+def test_further_points_are_solved_where_the_first_ones_will_not_do(tolerance, n_solved, monkeypatch):
+    """Of fourteen points around the centre half; held-out ones that join the basis no longer check it."""
+    board, _ = WANTED["clamped"]
+    plate, found = named("clamped")
+    around, held_out = (
+        [weights_at(board, at) for at in points] for points in ([*CORNERS, *somewhere(6, 1)], somewhere(6, 2))
+    )
+    solved, checked = [], []
+
+    def counted(plate, weights, n_modes):
+        solved.append(weights)
+        return solve_classes(plate, weights, n_modes)
+
+    def watched(own, middle, snapshots, checks, *further):
+        checked.append((len(snapshots), len(checks)))
+        return _reduced(own, middle, snapshots, checks, *further)
+
+    _reduced = reduction._reduced
+    monkeypatch.setattr(reduction, "solve_classes", counted)
+    monkeypatch.setattr(reduction, "_reduced", watched)
+    places = [one.place for one in found.values()]
+    reduced_order_model(plate, places, weights_at(board, np.zeros(3)), around, held_out, tolerance)
+
+    assert len(solved) == n_solved
+    few, many = (7, 6), (14 + 3, 3)
+    assert list(dict.fromkeys(checked)) == ([few] if n_solved == 14 else [few, (14, 6), many])
+
+
+@pytest.mark.parametrize("tolerance", TOLERANCES)
+@pytest.mark.parametrize("name", WANTED)
+def test_law_never_lies_below_the_full_solve(name, tolerance):
+    """A Ritz value on fewer vectors is an upper bound."""
+    draws, exact = trial(name)
+
+    assert cents(prepared(name, tolerance).eigenvalues(draws), exact).min() > -1e-6
+
+
+@pytest.mark.parametrize("tolerance", TOLERANCES)
+@pytest.mark.parametrize("name", WANTED)
+def test_law_is_exact_at_the_centre(name, tolerance):
+    """Its modes there are the first vectors of the basis, and a step from a mode leaves it where it is."""
+    centre = together([weights_at(WANTED[name][0], np.zeros(3))])
+    expected = [[mode.eigenvalue for mode in named(name)[1].values()]]
+
+    assert np.abs(cents(prepared(name, tolerance).eigenvalues(centre), expected)).max() < 1e-5
+
+
+@pytest.mark.parametrize("name", WANTED)
+def test_modes_of_draws_are_named_as_those_of_full_solves(name):
+    """The rank of every name that is certain at points around."""
+    board, names = WANTED[name]
+    plate, found = named(name)
+    points = [weights_at(board, point) for point in somewhere(12, 8)]
+    nothing = Weights(-points[0].stiffness, points[0].mass)
+    ranks = prepared(name).ranks(together([*points, nothing]))
+    assert all(of_draws[-1] == -1 for of_draws in ranks.values())
+    n_named = 0
+    for i, point in enumerate(points):
+        places = {beams: one.place for beams, one in find(plate, point, names).items()}
+        for beams, place in places.items():
+            own = [one.place.rank for one in found.values() if one.place.parity == place.parity]
+            if place.is_certain and place.rank <= max(own):
+                assert ranks[beams][i] == place.rank
+                n_named += 1
+    assert n_named > 0.9 * len(points) * len(names)
+
+
+@pytest.mark.parametrize("name", WANTED)
+def test_a_heavier_plate_has_the_same_names_as_surely(name):
+    """Water makes a plate ten times as heavy; a shape fits its name whatever the mass it is normalised in."""
+    draws, _ = trial(name)
+    reduced = prepared(name)
+
+    ranks, heavier = (reduced.ranks(Weights(draws.stiffness, n * draws.mass), 0.75) for n in (1.0, 10.0))
+
+    assert all(np.array_equal(heavier[beams], own) for beams, own in ranks.items())
+    assert sum(int(np.sum(own < 8)) for own in ranks.values()) > 0
+
+
+@pytest.mark.parametrize("name", WANTED)
+def test_eigenvalues_are_homogeneous_of_degree_one_in_the_stiffness(name):
+    draws, _ = trial(name)
+    reduced = prepared(name)
+
+    scaled = reduced.eigenvalues(Weights(2.7 * draws.stiffness, 1.3 * draws.mass))
+
+    np.testing.assert_allclose(scaled, reduced.eigenvalues(draws) * 2.7 / 1.3, rtol=1e-10)
+
+
+@pytest.mark.parametrize("n_draws", [0, 1, 16, 511, 513])
+def test_many_draws_are_the_draws_one_by_one(n_draws):
+    """However many are held at once."""
+    draws, _ = trial("free")
+    reduced = prepared("free")
+    which = np.arange(n_draws) % 16
+    one_by_one = np.stack([reduced.eigenvalues(together([draws.at(i)]))[0] for i in range(16)])
+
+    found = reduced.eigenvalues(Weights(draws.stiffness[which], draws.mass[which]))
+
+    np.testing.assert_allclose(found, one_by_one[which], rtol=1e-11)
+
+
+@pytest.mark.parametrize("name", WANTED)
+def test_where_there_is_no_plate_there_is_no_number(name):
+    draws, _ = trial(name)
+    reduced = prepared(name)
+    spoilt = Weights(draws.stiffness.copy(), draws.mass.copy())
+    spoilt.stiffness[1] *= -1.0
+    spoilt.mass[2] *= -1.0
+
+    found = reduced.eigenvalues(spoilt)
+
+    assert np.isnan(found[1:3]).all()
+    rest = np.delete(np.arange(16), [1, 2])
+    np.testing.assert_allclose(found[rest], reduced.eigenvalues(draws)[rest], rtol=1e-11)
+
+
+@pytest.mark.parametrize("name", WANTED)
+def test_energies_of_a_draw_sum_to_its_eigenvalue(name):
+    """The sum rule on few vectors: of each wanted mode, in the caller's order."""
+    draws, _ = trial(name)
+    reduced = prepared(name, 1.0)
+
+    for i in range(3):
+        one = together([draws.at(i)])
+        stiffness, mass = reduced.energies(one)
+        np.testing.assert_allclose(stiffness @ one.stiffness[0], reduced.eigenvalues(one)[0], rtol=1e-8)
+        np.testing.assert_allclose(mass @ one.mass[0], 1.0, rtol=1e-8)
+
+
+@pytest.mark.parametrize("name", WANTED)
+@pytest.mark.parametrize("term", range(4))
+def test_linear_law_is_the_tangent_of_the_exact_law(name, term):
+    """By a central difference of the exact law at the centre."""
+    board, names = WANTED[name]
+    _, found = named(name)
+    reduced = prepared(name)
+    linear = LinearLaw(np.stack([found[n].stiffness for n in names]), np.stack([found[n].mass for n in names]))
+    centre = weights_at(board, np.zeros(3))
+
+    def slope(law, step=1e-3):
+        moved = [centre.stiffness * (1.0 + sign * step * np.eye(4)[term]) for sign in (1.0, -1.0)]
+        above, below = law.squared(Weights(np.stack(moved), np.ones((2, 1))))
+        return (above - below) / (2.0 * step)
+
+    # As shares of the mode's energy; the tolerance is the step's square.
+    eigenvalues = np.array([found[n].eigenvalue for n in names])
+    np.testing.assert_allclose(slope(ExactLaw(reduced)) / eigenvalues, slope(linear) / eigenvalues, atol=2e-5)
+
+
+@pytest.mark.parametrize("support", ["free", "cantilever"])
+def test_a_shear_flexible_plate_is_held_within_its_tolerance_too(support):
+    """Over three masses and six stiffnesses, shear moduli over a factor of two; rigid motions of the free one."""
+    board = replace(ritz.FREE_SPRUCE, edges=ritz.ALL_FREE if support == "free" else ritz.CANTILEVER)
+    mass = np.array([1.0, 1e-4, 1e-3])
+    plate = shear_flexible_plate(*board.ends, 10, 10)
+    rng = np.random.default_rng(11)
+
+    def at(shares):
+        return Weights(
+            np.array([*board.unit_weights, 2e4, 1e3]) * np.exp([0.3, 0.3, 0.2, 0.0, 0.7, 0.7] * shares), mass
+        )
+
+    names = [(1, 1), (2, 0), (0, 2), (2, 1)] if support == "free" else [(0, 0), (0, 1), (1, 0), (0, 2)]
+    places = [one.place for one in find(plate, at(np.zeros(6)), names).values()]
+    around, held_out, unseen = ([at(s) for s in rng.uniform(-1.0, 1.0, (n, 6))] for n in (16, 6, 10))
+
+    reduced = reduced_order_model(plate, places, at(np.zeros(6)), around, held_out, 1.0)
+
+    exact = []
+    for weights in unseen:
+        solved = solve_classes(plate, weights, dict.fromkeys({p.parity for p in places}, 6))
+        exact.append([solved[p.parity].eigenvalues[p.rank] for p in places])
+    assert reduced.worst_cents <= 1.0
+    assert np.abs(cents(reduced.eigenvalues(together(unseen)), exact)).max() <= 3.0 * reduced.worst_cents
+
+
+def test_points_that_are_no_plate_teach_nothing_and_check_nothing():
+    """An expansion of fields may be negative at a far corner of the box: the others serve, and one of them has to."""
+    board, _ = WANTED["cantilever"]
+    plate, modes = named("cantilever")
+    centre = weights_at(board, np.zeros(3))
+    places = [mode.place for mode in modes.values()]
+    near, far, checked = (weights_at(board, at * np.ones(3)) for at in (0.5, -0.5, 0.3))
+    nothing = Weights(centre.stiffness, -centre.mass)
+    without = reduced_order_model(plate, places, centre, [near, far], [checked], 0.1)
+    found = reduced_order_model(plate, places, centre, [near, nothing, far], [nothing, checked], 0.1)
+    assert found.worst_cents == pytest.approx(without.worst_cents, rel=1e-3)
+    draws = together([near, checked])
+    np.testing.assert_allclose(found.eigenvalues(draws), without.eigenvalues(draws), rtol=1e-8)
+    with pytest.raises(np.linalg.LinAlgError):
+        reduced_order_model(plate, places, centre, [near, far], [nothing], 0.1)

@@ -1,0 +1,347 @@
+"""Eigenvalues and shapes of the thin plate: handbooks, exact formula, Ritz, convergence, energies and symmetries."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+import ritz
+from bars import meets
+from dense_pencils import dense, spectrum, whole
+from scipy.linalg import eig, eigh
+
+from bayesplate.plate.line import line
+from bayesplate.plate.mesh import ELEMENTS_PER_SIDE, mesh
+from bayesplate.plate.plate import plate_of
+from bayesplate.plate.shear import SHEAR_FLEXIBLE, shear_flexible_plate
+from bayesplate.plate.solve import solve, solve_classes, solve_up_to
+from bayesplate.plate.terms import Amount, AtPlaces, OnDeflections, Weights
+from bayesplate.plate.thin import THIN, thin_plate
+
+SQUARE = ritz.Plate.isotropic(0.3, ritz.ALL_FREE)
+SUPPORTS = {
+    "clamped": ritz.ALL_CLAMPED,
+    "supported": ritz.ALL_SUPPORTED,
+    "free": ritz.ALL_FREE,
+    "cantilever": ritz.CANTILEVER,
+    "mixed": {"x0": "clamped", "x1": "free", "y0": "supported", "y1": "free"},
+}
+BOARDS = {"square": SQUARE, "finnish": ritz.FINNISH, "fiemme": ritz.FIEMME, "guitar": ritz.FREE_SPRUCE}
+
+# omega L^2 sqrt(rho h / D) of the lowest mode of an isotropic square plate, nu = 0.3.
+HANDBOOK = {"clamped": 35.9852, "free": 13.4682, "cantilever": 3.4711, "supported": 2.0 * np.pi**2}
+
+
+def weights_of(board):
+    return Weights(board.unit_weights, np.ones(1))
+
+
+def solved(board, n_modes, shape=None):
+    weights = weights_of(board)
+    return solve(thin_plate(*board.ends, *(shape or mesh(weights))), weights, n_modes)
+
+
+def hertz(board, n_modes, shape=None):
+    return np.sqrt(solved(board, n_modes, shape).eigenvalues) / (2.0 * np.pi)
+
+
+def cents(found, expected):
+    """Largest difference of frequencies."""
+    return 1200.0 * np.abs(np.log2(found / expected)).max()
+
+
+@cache
+def reference(board_name, support, n_modes=12):
+    """Frequencies by Ritz; between 20 and 26 polynomials they move by 0.0016 % at most (square cantilever)."""
+    return ritz.frequencies(replace(BOARDS[board_name], edges=SUPPORTS[support]), n_modes, n=26)
+
+
+@pytest.mark.parametrize(("support", "omega"), HANDBOOK.items())
+def test_lowest_mode_of_a_square_plate_is_that_of_the_handbooks(support, omega):
+    board = replace(SQUARE, edges=SUPPORTS[support])
+
+    assert np.sqrt(solved(board, 1).eigenvalues[0]) == pytest.approx(omega, rel=1e-4)
+
+
+@pytest.mark.parametrize("board", [ritz.FINNISH, ritz.FIEMME, ritz.FREE_SPRUCE], ids=["finnish", "fiemme", "guitar"])
+def test_supported_orthotropic_plate_has_the_exact_spectrum(board):
+    board = replace(board, edges=ritz.ALL_SUPPORTED)
+    m, n = np.meshgrid(np.arange(1, 12), np.arange(1, 12))
+    along_x, along_y = np.pi * m / board.L_x, np.pi * n / board.L_y
+    energy = (
+        board.D_x * along_x**4
+        + board.D_y * along_y**4
+        + (board.D_s + 2.0 * board.nu_xy * board.D_y) * along_x**2 * along_y**2
+    )
+    exact = np.sort(np.sqrt(energy / (board.rho * board.h)).ravel())[:12] / (2.0 * np.pi)
+
+    frequencies = hertz(board, 12)
+
+    assert frequencies[0] == pytest.approx(exact[0], rel=1e-4)
+    meets("V10", "closed form, supported all round, 12 modes", cents(frequencies, exact), at_most=0.346, unit="cents")
+
+
+@pytest.mark.parametrize("is_swapped", [False, True], ids=["", "swapped"])
+@pytest.mark.parametrize("support", SUPPORTS)
+@pytest.mark.parametrize("board_name", BOARDS)
+def test_twelve_modes_agree_with_ritz_on_the_production_mesh(board_name, support, is_swapped):
+    """First mode within 0.01 %, twelve within 0.02 % (a third of a cent), whichever way the board lies."""
+    board = replace(BOARDS[board_name], edges=SUPPORTS[support])
+    expected = reference(board_name, support)
+
+    frequencies = hertz(board.swapped if is_swapped else board, 12)
+
+    assert frequencies[0] == pytest.approx(expected[0], rel=1e-4)
+    meets("V10", "Ritz in Legendre polynomials, 12 modes", cents(frequencies, expected), at_most=0.346, unit="cents")
+
+
+@pytest.mark.parametrize("ratio", [1e-4, 0.02, 0.3, 1.0, 5.0, 90.0, 1e5])
+def test_mesh_follows_the_wavelengths_and_keeps_its_size(ratio):
+    n_x, n_y = mesh(Weights(np.array([1.0, ratio, 0.1, 0.5]), np.ones(1)))
+
+    assert n_x % 2 == n_y % 2 == 0
+    # Rounding to even numbers moves each by at most 1 of at least 12.
+    assert n_x * n_y == pytest.approx(ELEMENTS_PER_SIDE**2, rel=0.1)
+    assert n_x / n_y == pytest.approx(np.clip(ratio**0.25, 1 / 3, 3), rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("board_name", "support", "n_modes", "lowest", "highest"),
+    [
+        ("square", "supported", 6, 3.7, 4.3),
+        ("square", "clamped", 6, 3.7, 4.3),
+        ("fiemme", "supported", 6, 3.7, 4.3),
+        ("fiemme", "clamped", 6, 3.7, 4.3),
+        ("square", "cantilever", 1, 1.7, 2.5),
+        ("finnish", "cantilever", 1, 1.7, 2.5),
+    ],
+)
+def test_observed_order_of_convergence(board_name, support, n_modes, lowest, highest):
+    """Order four for smooth modes; about two where a clamped edge ends at a free one and the corner is singular."""
+    board = replace(BOARDS[board_name], edges=SUPPORTS[support])
+    sizes = np.array([6, 8, 12, 16])
+    errors = np.array([hertz(board, n_modes, (n, n)) / reference(board_name, support)[:n_modes] - 1 for n in sizes])
+
+    orders = -np.polyfit(np.log(sizes), np.log(errors), 1)[0]
+
+    assert np.all(errors > 0), "a Ritz value must lie above"
+    words = "order of convergence, smooth modes" if lowest > 3.0 else "order of convergence, singular corners"
+    meets("V10", words, orders.min(), at_least=lowest, at_most=highest)
+    meets("V10", words, orders.max(), at_least=lowest, at_most=highest)
+
+
+def test_frequency_of_a_clamped_plate_depends_on_poisson_through_the_twist_alone():
+    """By parts int w_xx w_yy = int w_xy^2 where all edges are clamped, so that d omega^2 / d nu = 2 D_y int w_xy^2."""
+    board, step = ritz.FIEMME, 1e-3
+    modes = solved(board, 8)
+    per_nu = board.D_y / (board.rho * board.h * board.L_x**2 * board.L_y**2)
+    above, below = (solved(replace(board, nu_xy=board.nu_xy + s), 8).eigenvalues for s in (step, -step))
+
+    twist = modes.coefficients[:, 3]
+
+    np.testing.assert_allclose(modes.coefficients[:, 2], 2.0 * twist, rtol=1e-8)
+    # The central difference leaves a third-order term of 1e-7.
+    np.testing.assert_allclose((above - below) / (2.0 * step), 2.0 * per_nu * twist, rtol=1e-5)
+
+
+@pytest.mark.parametrize("board", [ritz.FINNISH, ritz.FREE_SPRUCE], ids=["cantilever", "free"])
+def test_mix_is_not_twice_the_twist_where_an_edge_is_free(board):
+    """The negative control of the clamped identity: it must fail here."""
+    modes = solved(board, 6)
+
+    assert np.abs(modes.coefficients[:, 2] / modes.coefficients[:, 3] - 2.0).max() > 0.5
+
+
+@pytest.mark.parametrize("board", [ritz.FINNISH, ritz.FIEMME, ritz.FREE_SPRUCE], ids=["cantilever", "clamped", "free"])
+def test_energies_sum_to_the_eigenvalue(board):
+    modes = solved(board, 12)
+
+    np.testing.assert_allclose(modes.coefficients @ board.unit_weights, modes.eigenvalues, rtol=1e-8)
+    np.testing.assert_allclose(modes.mass_coefficients[:, 0], 1.0, rtol=1e-8)
+
+
+@pytest.mark.parametrize("board", [ritz.FINNISH, ritz.FIEMME, ritz.FREE_SPRUCE], ids=["cantilever", "clamped", "free"])
+@pytest.mark.parametrize("term", range(4))
+def test_energies_are_the_slopes_of_the_eigenvalues(board, term):
+    """Against exact solves on both sides; the step is small beside the gaps, the rest is of second order in it."""
+    weights, plate = weights_of(board), thin_plate(*board.ends, 12, 12)
+    step = 1e-4 * np.eye(4)[term] * weights.stiffness
+
+    modes = solve(plate, weights, 6)
+    above, below = (
+        solve(plate, weights._replace(stiffness=weights.stiffness + s), 6).eigenvalues for s in (step, -step)
+    )
+
+    slopes = modes.coefficients[:, term] * 2.0 * step[term]
+    np.testing.assert_allclose(above - below, slopes, atol=1e-4 * np.abs(slopes).max())
+
+
+@pytest.mark.parametrize("support", SUPPORTS)
+@pytest.mark.parametrize("shape", [(8, 8), (20, 4)])
+def test_sparse_solver_finds_the_lowest_modes_of_all_classes(support, shape):
+    """Against a dense solver on the whole plate; a long board has nearly all its low modes in two classes."""
+    board = replace(SQUARE, edges=SUPPORTS[support], L_x=1.0 if shape[0] == shape[1] else 8.0)
+    weights, plate = weights_of(board), thin_plate(*board.ends, *shape)
+    dense = {own.parity: spectrum(own, weights)[own.n_rigid :] for own in plate.classes}
+    expected = np.sort(np.concatenate(list(dense.values())))[:14]
+
+    modes = solve(plate, weights, 14)
+
+    np.testing.assert_allclose(modes.eigenvalues, expected, rtol=1e-8)
+    for parity, rank, eigenvalue in zip(modes.parities, modes.ranks, modes.eigenvalues, strict=True):
+        assert dense[parity][rank] == pytest.approx(eigenvalue, rel=1e-8)
+
+
+@pytest.mark.parametrize("support", SUPPORTS)
+def test_swapping_the_axes_leaves_the_eigenvalues(support):
+    board = replace(ritz.FINNISH, edges=SUPPORTS[support])
+    modes, swapped = solved(board, 10, (10, 8)), solved(board.swapped, 10, (8, 10))
+
+    off = np.abs(swapped.eigenvalues / modes.eigenvalues - 1.0).max()
+    meets("V13", "axes exchanged, eigenvalues", off, at_most=1e-10)
+    energies = modes.coefficients[:, [1, 0, 2, 3]]
+    np.testing.assert_allclose(swapped.coefficients, energies, atol=1e-10 * energies.max())
+    assert [(p.y, p.x) for p in swapped.parities] == list(modes.parities)
+
+
+@pytest.mark.parametrize("support", SUPPORTS)
+def test_eigenvalues_scale_with_stiffness_and_against_mass(support):
+    board = replace(ritz.FINNISH, edges=SUPPORTS[support])
+    weights, plate = weights_of(board), thin_plate(*board.ends, 8, 8)
+    scaled = Weights(weights.stiffness * 3.7, weights.mass * 1.9)
+
+    expected = solve(plate, weights, 10).eigenvalues * 3.7 / 1.9
+
+    off = np.abs(solve(plate, scaled, 10).eigenvalues / expected - 1.0).max()
+    meets("V13", "stiffness and mass scaled, eigenvalues", off, at_most=1e-10)
+
+
+@pytest.mark.parametrize("board", [ritz.FINNISH, ritz.FIEMME, ritz.FREE_SPRUCE], ids=["cantilever", "clamped", "free"])
+def test_shapes_are_those_of_ritz(board):
+    x, y = np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.0, 7)
+    expected = ritz.solve(ritz.Ritz(board))
+
+    shapes = solved(board, 6).displacement(x, y)
+
+    for mode, shape in enumerate(shapes):
+        other = expected.shape(mode)(x * board.L_x, y * board.L_y)
+        correlation = np.sum(shape * other) / np.linalg.norm(shape) / np.linalg.norm(other)
+        # One minus the correlation is half the squared error of the shape: 1e-8 is a shape right to 0.015 %.
+        assert abs(correlation) > 1 - 1e-8
+        # Mass-normalised on the unit square here, on the board there.
+        assert np.linalg.norm(shape) == pytest.approx(np.linalg.norm(other) * np.sqrt(board.L_x * board.L_y), rel=2e-4)
+
+
+def test_classes_are_solved_for_as_many_modes_as_they_are_asked():
+    plate = thin_plate(("free", "free"), ("free", "free"), 6, 6)
+    counts = {own.parity: 4 + i for i, own in enumerate(plate.classes)}
+
+    for parity, modes in solve_classes(plate, weights_of(SQUARE), counts).items():
+        assert modes.eigenvalues.shape == (counts[parity],)
+        assert np.all(modes.eigenvalues > 100.0), "13.47^2 is the lowest elastic eigenvalue: no rigid motion is left"
+        assert modes.rigid.shape[1] == modes.own.n_rigid
+
+
+@pytest.mark.parametrize("highest", [1e2, 1e4, 4e4])
+def test_all_modes_up_to_an_eigenvalue_are_found(highest):
+    """As many as a dense solver counts, however few of them a class is solved for at first; and at least as asked."""
+    plate, weights = thin_plate(*SQUARE.ends, 10, 10), weights_of(SQUARE)
+    dense = np.sort(np.concatenate([spectrum(own, weights)[own.n_rigid :] for own in plate.classes]))
+    expected = dense[: max(3, np.sum(dense <= highest))]
+
+    found = solve_up_to(plate, weights, highest, n_least=3)
+
+    # A square plate has pairs of one frequency: of the third and its like rounding decides which is the higher.
+    np.testing.assert_allclose(found.eigenvalues, expected, rtol=1e-7)
+
+
+def mean_products(deflections):
+    """A mass term of the mean deflections, as a support that moves with the board has."""
+    means = deflections.integrals(None)
+    return np.outer(means, means)
+
+
+def stiffer_middle(deflections):
+    """A stiffness term of deflections beside one another, as the air of a closed box has."""
+    at = np.array([0.2, 0.4, 0.6, 0.8])
+    moved = deflections.on(at, at).mean(axis=(1, 2))
+    return np.outer(moved, moved)
+
+
+@pytest.mark.parametrize("support", ["free", "cantilever"])
+def test_terms_that_exist_on_deflections_are_on_the_span_of_the_plates_own_modes(support):
+    """Against a dense solver with these terms on all unknowns: modes that the solver took without them lose little."""
+    board = replace(ritz.FREE_SPRUCE, edges=SUPPORTS[support])
+    plate = thin_plate(*board.ends, 6, 6).with_terms([OnDeflections(stiffer_middle)], [OnDeflections(mean_products)])
+    bare = weights_of(board)
+    weights = Weights(np.array([*bare.stiffness, 0.2 * bare.stiffness[0]]), np.array([*bare.mass, 0.3]))
+    dense = {own.parity: eigh(*whole(own, weights), eigvals_only=True)[own.n_rigid :] for own in plate.classes}
+
+    for parity, modes in solve_classes(plate, weights, dict.fromkeys(dense, 4)).items():
+        off = modes.eigenvalues / dense[parity][:4] - 1.0
+        # Eight spare modes: a Ritz value on them lies above, by less than a tenth of a cent.
+        assert off.min() > -1e-8
+        assert off.max() < 1e-4
+        stiffness, mass = modes.coefficients()
+        np.testing.assert_allclose(stiffness @ weights.stiffness, modes.eigenvalues, rtol=1e-8)
+        np.testing.assert_allclose(mass @ weights.mass, 1.0, rtol=1e-8)
+
+
+@pytest.mark.parametrize("assemble", [thin_plate, shear_flexible_plate], ids=["thin", "shear-flexible"])
+def test_weights_of_no_plate_are_told(assemble):
+    """Not a mode below zero, nor one of a mass that is none."""
+    plate = assemble(("clamped", "free"), ("free", "free"), 6, 6)
+    n_terms, n_masses = len(plate.stiffness), len(plate.masses)
+    nothing = Weights(np.ones(n_terms), -np.ones(n_masses))
+
+    with pytest.raises(np.linalg.LinAlgError):
+        solve_classes(plate, nothing, {plate.classes[0].parity: 3})
+
+
+@pytest.mark.parametrize("projected", [(), (OnDeflections(mean_products),)], ids=["board alone", "projected mass"])
+def test_free_plate_answers_for_its_rounding_alone(projected):
+    """Rigid motions make the factorised matrix nearly singular; no eigenvalue may carry that.
+
+    Weights of the points moved by one unit in the last place move an eigenvalue by that times the largest energy of a
+    point against its own, here some 1e8. The control: values taken as the solver gives them at a shift a thousandth of
+    this one move by 5e-3.
+    """
+    side = line(("free", "free"), 8, is_sheared=True, is_split=False)
+    plate = plate_of(SHEAR_FLEXIBLE, side, side).with_terms([], projected)
+    mass = np.array([1.0, 1e-4, 1e-4, *(0.3 for _ in projected)])
+    weights = Weights(np.array([1.0, 0.1, 0.05, 0.3, 4e3, 2e2]), mass)
+    modes = solve(plate, weights, 6)
+    rng = np.random.default_rng(0)
+    moved = replace(
+        plate,
+        stiffness=tuple(
+            (term, grid * (1.0 + np.finfo(float).eps * rng.choice([-1.0, 1.0], grid.shape)))
+            for term, grid in plate.stiffness
+        ),
+    )
+
+    np.testing.assert_allclose(solve(moved, weights, 6).eigenvalues, modes.eigenvalues, rtol=1e-7)
+    quotients = (modes.coefficients @ weights.stiffness) / (modes.mass_coefficients @ weights.mass)
+    np.testing.assert_allclose(quotients, modes.eigenvalues, rtol=1e-7)
+
+
+def test_a_mass_below_zero_at_a_place_takes_no_mode_with_it():
+    """As where a place is read between others: 2 and -1 % of the board. Against all eigenvalues of the whole pencil.
+
+    What is left out for the solver comes back on the span of its vectors: an error below half of that mass.
+    """
+    x, y = (line(("clamped", "clamped"), n, is_split=False) for n in (10, 8))
+    here, there = (Amount(((1.0, at, 0.37),)) for at in (0.31, 0.44))
+    places = [AtPlaces(((1.0, one, one),)) for one in (here, there)]
+    plate = plate_of(THIN, x, y).with_terms([], places)
+    weights = Weights(np.array([3e4, 1e4, 3e3, 1e4]), np.array([1.0, 0.02, -0.01]))
+    (own,) = plate.classes
+    stiffness, mass = dense(own, weights)
+    every = eig(stiffness, mass, right=False)
+    elastic = np.sort(every[np.isfinite(every) & (every.real > 0.0)].real)
+    assert np.linalg.eigvalsh(mass)[0] < 0.0
+
+    found = solve_classes(plate, weights, {own.parity: 12})[own.parity].eigenvalues
+    assert found == pytest.approx(elastic[:12], rel=0.005)

@@ -1,0 +1,267 @@
+"""The terms of a plate against plain sums over points of it, and against closed forms of loaded and sprung beams."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from bayesplate.plate.fields import Fabric, layout
+from bayesplate.plate.line import N_POINTS_CUT, line
+from bayesplate.plate.plate import plate_of
+from bayesplate.plate.shear import SHEAR_FLEXIBLE
+from bayesplate.plate.solve import solve
+from bayesplate.plate.terms import AlongEdges, Amount, AtPlaces, OverPlate, Weights
+from bayesplate.plate.thin import THIN
+
+FREE = ("free", "free")
+GROUPS = ("along", "bending", "shear", "mass", "rotary")
+
+# By field: factor, unknowns, derivatives along x and y. A thin plate has the deflection alone.
+BEND_X = ((1.0, "w", 2, 0), (-1.0, "g_x", 1, 0))
+BEND_Y = ((1.0, "w", 0, 2), (-1.0, "g_y", 0, 1))
+TWIST = ((1.0, "w", 1, 1), (-0.5, "g_x", 0, 1), (-0.5, "g_y", 1, 0))
+SHEAR_X, SHEAR_Y = ((1.0, "g_x", 0, 0),), ((1.0, "g_y", 0, 0),)
+TURN_X = ((1.0, "w", 1, 0), (-1.0, "g_x", 0, 0))
+TURN_Y = ((1.0, "w", 0, 1), (-1.0, "g_y", 0, 0))
+DEFLECTION = ((1.0, "w", 0, 0),)
+# Times two where two strains differ, as in 2 w_xx w_yy and 4 w_xx w_xy.
+BENDING = [(1, BEND_X, BEND_X), (1, BEND_Y, BEND_Y), (2, BEND_X, BEND_Y), (1, TWIST, TWIST)]
+COUPLING = [(4, BEND_X, TWIST), (4, BEND_Y, TWIST)]
+SHEARS = [(1, SHEAR_X, SHEAR_X), (1, SHEAR_Y, SHEAR_Y)]
+MASS, ROTARY = (1, DEFLECTION, DEFLECTION), [(1, TURN_X, TURN_X), (1, TURN_Y, TURN_Y)]
+
+
+def bump(x, y):
+    return np.exp(x * y) + 0.3 * np.sin(3.0 * x + y)
+
+
+def ripple(x, y):
+    return np.cos(2.0 * x - 3.0 * y)
+
+
+def narrowing(x):
+    """Cuts through several elements across the plate, and leaves the last one empty over a part of its length."""
+    return 0.05 + 0.2 * x**2, 0.97 - 0.25 * x
+
+
+def gauss(starts, lengths, n):
+    """Points and weights of each of some intervals: (n_intervals, n) arrays."""
+    at, weights = np.polynomial.legendre.leggauss(n)
+    return starts[:, None] + lengths[:, None] * (at + 1.0) / 2.0, lengths[:, None] * weights / 2.0
+
+
+def cubics(t, h):
+    """The four cubics of an element of length h and their derivatives at shares t of it: (3, 4, n_points) array."""
+    values = [1 - 3 * t**2 + 2 * t**3, h * (t - 2 * t**2 + t**3), 3 * t**2 - 2 * t**3, h * (t**3 - t**2)]
+    slopes = [(6 * t**2 - 6 * t) / h, 1 - 4 * t + 3 * t**2, (6 * t - 6 * t**2) / h, 3 * t**2 - 2 * t]
+    bends = [(12 * t - 6) / h**2, (6 * t - 4) / h, (6 - 12 * t) / h**2, (6 * t - 2) / h]
+    return np.array([values, slopes, bends])
+
+
+def derivatives(nodes, points):
+    """Of all functions of a free line at points: (3, n_points, n_unknowns) array."""
+    element = np.clip(np.searchsorted(nodes, points) - 1, 0, nodes.size - 2)
+    lengths = np.diff(nodes)[element]
+    found = np.zeros((3, points.size, 2 * nodes.size))
+    local = cubics((points - nodes[element]) / lengths, lengths)
+    for i in range(4):
+        found[:, np.arange(points.size), 2 * element + i] = local[:, i]
+    return found
+
+
+class Sums:
+    """Sums of products of strains over weighted points, one by one."""
+
+    def __init__(self, x, y, names):
+        self.x, self.y, self.names = x, y, names
+
+    def strain(self, terms, at_x, at_y):
+        along, across = derivatives(self.x, at_x), derivatives(self.y, at_y)
+        n = along.shape[2] * across.shape[2]
+        found = np.zeros((at_x.size, len(self.names), n))
+        for factor, name, i, j in terms:
+            if name in self.names:
+                both = along[i][:, :, None] * across[j][:, None, :]
+                found[:, self.names.index(name)] += factor * both.reshape(-1, n)
+        return found.reshape(at_x.size, -1)
+
+    def integral(self, factor, first, second, at_x, at_y, weights):
+        one, other = (self.strain(terms, at_x, at_y) for terms in (first, second))
+        product = factor * one.T @ (weights[:, None] * other)
+        return (product + product.T) / 2.0
+
+
+def points_within(x, y, outline):
+    """The plate's points along x, and for each all elements across, cut at the outline; with their weights."""
+    found = []
+    for at_x, ahead in zip(*(one.ravel() for one in gauss(x[:-1], np.diff(x), N_POINTS_CUT)), strict=True):
+        low, high = (0.0, 1.0) if outline is None else (float(limit) for limit in outline(at_x))
+        cuts = np.clip(y, low, high)
+        at_y, across = (one.ravel() for one in gauss(cuts[:-1], np.diff(cuts), N_POINTS_CUT))
+        found.append(np.stack([np.full(at_y.size, at_x), at_y, ahead * across]))
+    return np.concatenate(found, axis=1)
+
+
+@pytest.mark.parametrize("outline", [None, narrowing], ids=["rectangle", "outline"])
+@pytest.mark.parametrize("kinematics", [THIN, SHEAR_FLEXIBLE], ids=["thin", "shear-flexible"])
+def test_terms_are_sums_over_points(kinematics, outline):
+    """Two fields of each group, grain at an angle, and every kind of further term: as many forms, all symmetric."""
+    is_sheared = kinematics is SHEAR_FLEXIBLE
+    x, y = (line(FREE, n, is_sheared, is_split=False, n_points=N_POINTS_CUT) for n in (7, 5))
+    fields = {group: [None, bump] for group in GROUPS} | {"mass": [None, bump, ripple]}
+    # A mass at one place, and one that goes with how far two places move apart.
+    places = Amount(((1.0, 0.3, 0.8), (-1.0, 0.3, 0.1)))
+    further = (
+        OverPlate(("slope_x", "slope_y"), outline),
+        AlongEdges(0, (True, False), "turn_x"),
+        AlongEdges(1, (True, True), "turn_y"),
+    )
+    plate = plate_of(kinematics, x, y, Fabric(fields, outline, is_turned=True)).with_terms(
+        further, [AtPlaces(((1.0, places, places),))]
+    )
+    (own,) = plate.classes
+
+    sums = Sums(x.nodes, y.nodes, kinematics.fields)
+    at_x, at_y, weights = points_within(x.nodes, y.nodes, outline)
+    whole = points_within(x.nodes, y.nodes, None)
+
+    def own_term(term, factor, ghost):
+        values = 1.0 if factor is None else factor(at_x, at_y)
+        inside = sums.integral(*term, at_x, at_y, values * weights)
+        if outline is None or factor is not None:
+            return inside
+        return (1.0 - ghost) * inside + ghost * sums.integral(*term, *whole)
+
+    terms = [*BENDING, *SHEARS, *COUPLING, (2, SHEAR_X, SHEAR_Y)] if is_sheared else [*BENDING, *COUPLING]
+    groups = kinematics.groups(True)
+    counts = {group: len(one) for group, one in fields.items()}
+    expected = [own_term(terms[i], fields[groups[0][i]][k], 1e-5) for i, k in layout(groups[0], counts)]
+    slopes = ((1.0, "w", 1, 0),), ((1.0, "w", 0, 1),)
+    expected.append(sums.integral(2, *slopes, at_x, at_y, weights))
+    (along, in_x), (across, in_y) = ([one.ravel() for one in gauss(s[:-1], np.diff(s), 6)] for s in (x.nodes, y.nodes))
+    expected.append(sums.integral(1, TURN_X, TURN_X, np.zeros_like(across), across, in_y))
+    expected.append(sum(sums.integral(1, TURN_Y, TURN_Y, along, np.full_like(along, end), in_x) for end in (0.0, 1.0)))
+    masses = [MASS, *(ROTARY if is_sheared else [])]
+    inert = [own_term(masses[i], fields[groups[1][i]][k], 1e-8) for i, k in layout(groups[1], counts)]
+    at_places = sums.strain(DEFLECTION, np.array([0.3, 0.3]), np.array([0.8, 0.1]))
+    inert.append(np.outer(*2 * [at_places[0] - at_places[1]]))
+
+    unit = np.eye(own.n_dof)
+    for found, wanted in ((own.project_stiffness(unit), expected), (own.project_masses(unit), inert)):
+        assert len(found) == len(wanted)
+        for one, other in zip(found, wanted, strict=True):
+            np.testing.assert_allclose(one, other, rtol=0, atol=1e-10 * np.abs(other).max())
+
+
+STIFF = 1e7
+"""Bending along y and twist beside bending along x: the plate is a beam, but for a deflection of one part in that."""
+N_ALONG = 20
+
+
+def wavenumbers(ends, stiffness, masses, weights):
+    """Of a plate that is a beam along x of unit length and unit stiffness, with further terms: omega^2 is b^4."""
+    plate = plate_of(THIN, *(line(e, n, is_split=False) for e, n in ((ends, N_ALONG), (FREE, 4))))
+    own = Weights(np.array([1.0, STIFF, 0.0, STIFF, *weights[0]]), np.array([1.0, *weights[1]]))
+    return solve(plate.with_terms(stiffness, masses), own, 3).eigenvalues ** 0.25
+
+
+def are_near(found, expected):
+    """Cubic elements of length h raise b by (b h)^4 / 2880; the plate's own give at a place leaves a millionth."""
+    return np.all(np.abs(found / expected - 1.0) < 1.1 * (np.array(expected) / N_ALONG) ** 4 / 2880 + 1e-6)
+
+
+def roots(equation, intervals):
+    return [brentq(equation, *ends) for ends in intervals]
+
+
+TIP_PLACE = Amount(((1.0, 1.0, 0.3),))
+
+
+@pytest.mark.parametrize("mass", [0.1, 2.0])
+def test_a_mass_at_the_tip_of_a_beam(mass):
+    """1 + cos b cosh b + mass b (cos b sinh b - sin b cosh b) = 0, the mass as a multiple of the beam's."""
+
+    def equation(b):
+        return 1 + np.cos(b) * np.cosh(b) + mass * b * (np.cos(b) * np.sinh(b) - np.sin(b) * np.cosh(b))
+
+    found = wavenumbers(("clamped", "free"), [], [AtPlaces(((1.0, TIP_PLACE, TIP_PLACE),))], ([], [mass]))
+
+    # The lowest lies below that of the bare beam, the others between those of a beam without and with a held tip.
+    assert are_near(found, roots(equation, [(0.5, 1.8751), (3.9266, 4.6941), (7.0686, 7.8548)]))
+
+
+@pytest.mark.parametrize("mass", [0.1, 2.0])
+def test_a_mass_on_a_spring_at_the_tip_of_a_beam(mass):
+    """The same with mass / (1 - omega^2 mass / spring): a coordinate beside the plate has a mode of its own."""
+    spring = 100.0
+
+    def equation(b):
+        load = mass * b * (np.cos(b) * np.sinh(b) - np.sin(b) * np.cosh(b))
+        return (1 - b**4 * mass / spring) * (1 + np.cos(b) * np.cosh(b)) + load
+
+    rise = Amount(beside=0)
+    stretch = Amount(((-1.0, 1.0, 0.3),), beside=0)
+    found = wavenumbers(
+        ("clamped", "free"),
+        [AtPlaces(((1.0, stretch, stretch),))],
+        [AtPlaces(((1.0, rise, rise),))],
+        ([spring], [mass]),
+    )
+
+    at = np.linspace(0.3, 8.0, 400)
+    brackets = [(a, b) for a, b in pairwise(at) if equation(a) * equation(b) < 0.0]
+    assert are_near(found, roots(equation, brackets)[:3])
+
+
+def test_products_of_two_amounts_are_the_square_of_their_sum():
+    """(z - w)^2 as one square, and as z^2 - 2 z w + w^2: a spring either way."""
+    rise, place = Amount(beside=0), Amount(((1.0, 0.7, 0.2),))
+    stretch = Amount(((-1.0, 0.7, 0.2),), beside=0)
+    square = AtPlaces(((1.0, stretch, stretch),))
+    apart = AtPlaces(((1.0, rise, rise), (-2.0, rise, place), (1.0, place, place)))
+    (own,) = plate_of(THIN, line(FREE, 3), line(FREE, 3)).with_terms([square, apart], []).classes
+
+    one, other = own.project_stiffness(np.eye(own.n_dof))[-2:]
+
+    np.testing.assert_allclose(one, other, atol=1e-13)
+    assert one[-1, -1] == 1.0
+
+
+@pytest.mark.parametrize("spring", [1.0, 100.0])
+def test_a_spring_along_the_free_edge_of_a_cantilever(spring):
+    """b^3 (1 + cos b cosh b) + spring (sin b cosh b - cos b sinh b) = 0; the edge between free and held."""
+
+    def equation(b):
+        return b**3 * (1 + np.cos(b) * np.cosh(b)) + spring * (np.sin(b) * np.cosh(b) - np.cos(b) * np.sinh(b))
+
+    found = wavenumbers(("clamped", "free"), [AlongEdges(0, (False, True), "w")], [], ([spring], []))
+
+    assert are_near(found, roots(equation, [(1.8751, 3.92), (4.694, 7.06), (7.8547, 10.2)]))
+
+
+@pytest.mark.parametrize("spring", [1.0, 100.0])
+def test_a_rotational_spring_along_a_supported_edge(spring):
+    """2 b sin b sinh b = spring (cos b sinh b - sin b cosh b); the edge between supported and clamped."""
+
+    def equation(b):
+        return 2 * b * np.sin(b) * np.sinh(b) - spring * (np.cos(b) * np.sinh(b) - np.sin(b) * np.cosh(b))
+
+    found = wavenumbers(("supported", "supported"), [AlongEdges(0, (True, False), "slope_x")], [], ([spring], []))
+
+    assert are_near(found, roots(equation, [(np.pi, 3.9266), (2 * np.pi, 7.0686), (3 * np.pi, 10.2102)]))
+
+
+def test_springs_along_both_edges_are_those_along_each():
+    """On a plate whose halves are alike, solved by its classes, and on the whole of it."""
+    found = []
+    for is_split in (True, False):
+        x, y = (line(FREE, 6, is_split=is_split) for _ in "xy")
+        both = [AlongEdges(0, (True, True), "w"), AlongEdges(1, (True, True), "slope_y")]
+        weights = Weights(np.array([1.0, 0.7, 0.2, 0.9, 30.0, 2.0]), np.ones(1))
+        found.append(solve(plate_of(THIN, x, y).with_terms(both, []), weights, 10).eigenvalues)
+
+    # Springs hold the plate, but its classes still count the rigid motions of a free one.
+    np.testing.assert_allclose(*found, rtol=1e-8)
