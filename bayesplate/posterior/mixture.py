@@ -24,12 +24,8 @@ DEGREES_OF_FREEDOM = 6.0
 """Of each part: heavier tails than the posterior's, or walkers far out would stay there."""
 N_PARTS = 4
 _N_PASSES = 15
-FEW_PARAMETERS = 10
-"""Up to which a mixture knows a posterior well from few draws."""
-_MOST_FITTED, _MOST_OF_MANY = 4096, 32_768
-"""Draws that a mixture of few and of many parameters is fitted to."""
-_DRAWS_PER_NUMBER = 10
-"""Fewer draws than that for each number of a part's mean and covariance, and a part would follow single walkers."""
+_FEWEST_PER_NUMBER, _MOST_PER_NUMBER = 10, 200
+"""Draws for each number of a part's mean and covariance: fewer, and it follows single walkers; more only add time."""
 _FLOOR = 1e-3
 """Share of the covariance of all draws that each part keeps, so that none shrinks to a point."""
 
@@ -72,8 +68,9 @@ class Mixture:
         """
         flat = draws.reshape(-1, draws.shape[-1])
         n_dim = flat.shape[1]
-        flat = flat[:: -(-len(flat) // (_MOST_FITTED if n_dim <= FEW_PARAMETERS else _MOST_OF_MANY))]
-        n_parts = min(N_PARTS, len(flat) // (_DRAWS_PER_NUMBER * n_dim * (n_dim + 3) // 2))
+        n_numbers = n_dim * (n_dim + 3) // 2
+        flat = flat[:: -(-len(flat) // (_MOST_PER_NUMBER * n_numbers))]
+        n_parts = min(N_PARTS, len(flat) // (_FEWEST_PER_NUMBER * n_numbers))
         mixture = cls.one_fitted(flat)
         if n_parts < 2:
             return mixture

@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.posterior.mixture import FEW_PARAMETERS, Mixture
+from bayesplate.posterior.mixture import Mixture
 
 Floats = NDArray[np.float64]
 
-_STRETCHED = 0.25
-"""Of emcee's own moves."""
+_INDEPENDENT, _DIFFERENTIAL, _STRETCH = 0.76, 0.18, 0.06
+"""Shares of the steps."""
 _AHEAD = 16
 """Steps whose proposals are evaluated in one call, for they depend on no walker."""
 
@@ -66,9 +66,8 @@ def moves(mixture: Mixture) -> list[tuple[Any, float]]:
     """Independent proposals, and emcee's differential and stretch moves beside them, with their shares of the steps."""
     import emcee
 
-    others = 0.2 if mixture.centres.shape[1] <= FEW_PARAMETERS else 0.4
     return [
-        (IndependentMove(mixture), 1.0 - others),
-        (emcee.moves.DEMove(), (1.0 - _STRETCHED) * others),
-        (emcee.moves.StretchMove(), _STRETCHED * others),
+        (IndependentMove(mixture), _INDEPENDENT),
+        (emcee.moves.DEMove(), _DIFFERENTIAL),
+        (emcee.moves.StretchMove(), _STRETCH),
     ]
