@@ -28,7 +28,7 @@ from bayesplate.posterior.laplace import LaplaceApproximation, laplace_approxima
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.slips import Remarks, is_too_wide, noise_remarks, reading_remarks
 from bayesplate.posterior.target import Posterior, linear_suffices
-from bayesplate.posterior.veerings import veering_remarks, with_doubts
+from bayesplate.posterior.veerings import with_doubts
 
 Floats = NDArray[np.float64]
 
@@ -192,7 +192,7 @@ def _with_doubts(problem: PosedProblem, law: LawName | None) -> PosedProblem:
     """The problem posed again with labels in doubt near a veering, where there are such."""
     draws = _plausible(problem.board, problem.centre, problem.covariance)[:_N_NAMED]
     named = problem.parameters.values(np.concatenate([problem.centre[None], draws]))
-    doubted = with_doubts(problem.board, problem.posterior.models, named)
+    doubted, remarks = with_doubts(problem.board, problem.posterior.models, named)
     if doubted is problem.board:
         return problem
     try:
@@ -201,7 +201,7 @@ def _with_doubts(problem: PosedProblem, law: LawName | None) -> PosedProblem:
         return problem
     if all(is_too_wide(one.board, one.log_widening) for one in (problem, again)):
         return problem  # something else is wrong, and makes wrong plates look plausible
-    return replace(again, veerings=veering_remarks(problem.board, doubted))
+    return replace(again, veerings=remarks)
 
 
 def _plausible(board: Board, centre: Floats, covariance: Floats) -> Floats:

@@ -13,8 +13,8 @@ then it contradicts the labels that it rests on, and that is told.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ _CONTRADICTED = 0.95
 """Share of a fit's plates on which a label's mode certainly has another name, from which on it contradicts that."""
 
 
-def with_doubts(board: Board, models: Sequence[SetupModel], values: Values) -> Board:
+def with_doubts(board: Board, models: Sequence[SetupModel], values: Values) -> tuple[Board, tuple[str, ...]]:
     """The board, where each sure label that may be another mode's is as sure as plausible plates agree on its mode.
 
     Parameters
@@ -43,32 +43,39 @@ def with_doubts(board: Board, models: Sequence[SetupModel], values: Values) -> B
 
     Returns
     -------
-    Board
+    board : Board
         The same one where no label may.
+    remarks : tuple of str
+        A sentence per setup with such labels: which two shapes mix, and how sure the label is.
     """
-    doubts = [_confidences(model, values) for model in models]
+    doubts = [_doubts(model, values) for model in models]
     if not any(doubts):
-        return board
+        return board, ()
     setups = []
-    for setup, confidences in zip(board.setups, doubts, strict=True):
-        readings = (replace(one, confidence=confidences.get(one.beams, one.confidence)) for one in setup.readings)
+    for setup, own in zip(board.setups, doubts, strict=True):
+        readings = (
+            replace(one, confidence=own[one.beams].confidence) if one.beams in own else one for one in setup.readings
+        )
         setups.append(replace(setup, readings=tuple(readings)))
-    return replace(board, setups=tuple(setups))
+    told = (_remark(setup, own) for setup, own in zip(board.setups, doubts, strict=True) if own)
+    return replace(board, setups=tuple(setups)), tuple(told)
 
 
-def veering_remarks(before: Board, doubted: Board) -> tuple[str, ...]:
-    """A sentence per setup whose labels came into doubt between two boards: what it is about, and how sure they are."""
-    sentences = []
-    for setup, again in zip(before.setups, doubted.setups, strict=True):
-        pairs = zip(setup.readings, again.readings, strict=True)
-        new = [f"{one.label} {100.0 * one.confidence:.0f} %" for was, one in pairs if one.confidence != was.confidence]
-        if new:
-            sentences.append(
-                f"setup {setup.name}: near this plate modes of one kind exchange their shapes (a veering), so that a "
-                "figure may be the neighbour's; before the fit the label is taken as right with a probability of: "
-                f"{', '.join(new)}; a reading of the neighbour too, or another look at both figures, settles it"
-            )
-    return tuple(sentences)
+def _remark(setup: Setup, doubts: Mapping[Beams, _Doubt]) -> str:
+    each = [
+        f"{_label(setup, beams)} {100.0 * one.confidence:.0f} % "
+        f"(its shape mixes with that of {' and '.join(str(_label(setup, other)) for other in one.others)})"
+        for beams, one in doubts.items()
+    ]
+    return (
+        f"setup {setup.name}: near this plate modes of one kind exchange their shapes (a veering), so that a "
+        "figure may be the neighbour's; before the fit the label is taken as right with a probability of: "
+        f"{', '.join(each)}; a reading of the neighbour too, or another look at both figures, settles it"
+    )
+
+
+def _label(setup: Setup, beams: Beams) -> Label:
+    return Label(beams[0] + setup.first_label.m, beams[1] + setup.first_label.n)
 
 
 def contradicted_labels(models: Sequence[SetupModel], values: Values) -> tuple[str, ...]:
@@ -83,8 +90,8 @@ def contradicted_labels(models: Sequence[SetupModel], values: Values) -> tuple[s
     """
     sentences = []
     for model in models:
-        setup, first = model.setup, model.setup.first_label
-        others = {at: Label(i + first.m, j + first.n) for at, (i, j) in _named_otherwise(model, values).items()}
+        setup = model.setup
+        others = {at: _label(setup, beams) for at, beams in _named_otherwise(model, values).items()}
         read = [
             f"the mode at {setup.measured[at]:.5g} Hz, read as {setup.readings[at].label}, has that of {label}"
             for at, label in others.items()
@@ -120,8 +127,16 @@ def _ranks(model: SetupModel, values: Values, least: float = 0.0) -> dict[Beams,
     return {beams: one[is_plate] for beams, one in every.items()}
 
 
-def _confidences(model: SetupModel, values: Values) -> dict[Beams, float]:
-    """How sure each label is that may be another mode's: the share of plates that agree with the estimate."""
+@dataclass(frozen=True)
+class _Doubt:
+    """How sure a label is, the share of plates that agree with the estimate, and whose shapes its mode may have."""
+
+    confidence: float
+    others: tuple[Beams, ...]
+
+
+def _doubts(model: SetupModel, values: Values) -> dict[Beams, _Doubt]:
+    """By label those that may be another mode's."""
     sure = {one.beams: one.frequency.mean for one in model.setup.readings if one.is_sure}
     if not sure:
         return {}
@@ -134,7 +149,8 @@ def _confidences(model: SetupModel, values: Values) -> dict[Beams, float]:
         in_order = [one in sure and (sure[one] >= hertz if above else sure[one] <= hertz)
                     for one, above in zip(others, is_above[:, 0], strict=True)]  # fmt: skip
         if has_changed[~np.array(in_order, dtype=bool)].any():
-            found[beams] = 1.0 - float(has_changed.any(axis=0).mean())
+            mixed = (one for one, changed in zip(others, has_changed, strict=True) if changed.any())
+            found[beams] = _Doubt(1.0 - float(has_changed.any(axis=0).mean()), tuple(mixed))
     return found
 
 
