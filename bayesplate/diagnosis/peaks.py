@@ -21,6 +21,7 @@ from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.search import Ground
 from bayesplate.estimates.labelling import LIKELY
 from bayesplate.frequencies.reading_errors import ReadingErrors
+from bayesplate.posterior.statistics import resampled
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -152,9 +153,9 @@ def likely_labels(baseline: Baseline, log_frequency: Floats, noise: Floats, othe
 
 
 def _best(ground: Ground, one: Hypothesis, begun: Iterable[Rows]) -> Hypothesis:
-    """The hypothesis with those labels under which, summed over all others, the readings are most probable.
+    """The hypothesis with the labels that its readings likely have, summed over all ways to take them.
 
-    Labels that were found elsewhere, and those that they lead to under this hypothesis.
+    Looked for around labels that were found elsewhere, and those that they lead to under this hypothesis.
     """
     tried = {tuple(rows): rows for rows in begun}
     for rows in list(tried.values()):
@@ -172,28 +173,40 @@ def _rows(baseline: Baseline, one: Hypothesis) -> Rows:
 
 
 def _summed(ground: Ground, labelled: Sequence[Hypothesis]) -> Hypothesis:
-    """The most probable of some ways to label the readings, knowing what all ways together add to its evidence.
+    """The hypothesis with its likely labels, knowing what all other ways to label the readings add to its evidence.
 
-    The likelihood is averaged over draws that come from each of the ways, weighted by what each would have drawn.
+    Draws come from each of several ways and are weighted to the likelihood summed over all of them. Every way by itself
+    estimates the same sum, so the largest estimate says nothing of the labels: the weighted draws tell them.
     """
     from scipy.special import logsumexp
 
-    residual = ground.baseline.residual[None, :]
-    evidence = np.array([one.terms.log_evidence(one.seen(ground.baseline, residual))[0] for one in labelled])
+    evidence = np.array([_log_evidence(ground, one) for one in labelled])
     drawn = [_drawn(ground, one) for one in labelled]
     full = [log_summed(ground.baseline, each.predicted, each.noise) for each in drawn]
     both = zip(full, labelled, drawn, strict=True)
-    log_ratio = np.array([log_mean(sums - _log_of(ground, one, each)) for sums, one, each in both])
-    alone = evidence + log_ratio
+    alone = evidence + [log_mean(sums - _log_of(ground, one, each)) for sums, one, each in both]
     kept = np.argsort(-alone)[:_MOST_WAYS]
     kept = kept[alone[kept] > alone[kept[0]] - _WORTH]
     log_share = alone[kept] - logsumexp(alone[kept])
-    sampled = []
+    log_weights = []
     for share, at in zip(log_share, kept, strict=True):
         densities = [_log_of(ground, labelled[other], drawn[at]) - evidence[other] for other in kept]
-        sampled.append(share + log_mean(full[at] - logsumexp(np.array(densities) + log_share[:, None], axis=0)))
-    best = int(kept[0])
-    return replace(labelled[best], log_labels=float(logsumexp(sampled)) - float(evidence[best]))
+        log_weights.append(share + full[at] - logsumexp(np.array(densities) + log_share[:, None], axis=0))
+    weights = np.concatenate(log_weights)
+    log_sum = float(logsumexp(weights)) - np.log(_N_DRAWS)
+    picked = resampled(np.exp(weights - weights.max()), _N_WIDE, np.random.default_rng(0))
+    predicted, noise = (
+        np.concatenate([getattr(drawn[at], name) for at in kept])[picked] for name in ("predicted", "noise")
+    )
+    likeliest = labelled[kept[0]]
+    rows = likely_labels(ground.baseline, predicted, noise, likeliest.own.rows)
+    own = likeliest.labelled(ground.baseline, rows)
+    return replace(own, log_labels=log_sum - _log_evidence(ground, own))
+
+
+def _log_evidence(ground: Ground, one: Hypothesis) -> float:
+    """Under its own labels alone, by its normal terms."""
+    return float(one.terms.log_evidence(one.seen(ground.baseline, ground.baseline.residual[None, :]))[0])
 
 
 def _log_of(ground: Ground, one: Hypothesis, drawn: TermDraws) -> Floats:

@@ -11,6 +11,7 @@ import pytest
 from made_searches import NOISE, bare, baseline, candidate, ground_of, one_level
 from scipy.special import logsumexp
 
+from bayesplate.diagnosis import peaks
 from bayesplate.diagnosis.baseline import Baseline, Spectrum
 from bayesplate.diagnosis.folds import log_score_gains, nested
 from bayesplate.diagnosis.hypotheses import Hypothesis, confusable
@@ -159,6 +160,18 @@ def test_each_hypothesis_has_the_labels_that_it_makes_likely():
     found = with_own_labels(ground)
     assert found.hypotheses[1].own.rows.tolist() == truth
     assert found.hypotheses[0].own.rows[2] != truth[2]
+
+
+def test_labels_are_those_of_the_weighted_draws_whichever_way_estimates_most(monkeypatch):
+    """Every way to label estimates the same sum: the largest estimate may be that of the worst draws."""
+    ground, truth = planted()
+    one, base = ground.hypotheses[1], ground.baseline
+    ways = [one.labelled(base, np.array(truth)), one.labelled(base, base.rows)]
+    honest = peaks._summed(ground, ways)
+    estimates = iter([0.0, honest.log_labels + 40.0])
+    monkeypatch.setattr(peaks, "log_mean", lambda _: next(estimates))
+    monkeypatch.setattr(peaks, "_WORTH", 1e3)
+    assert peaks._summed(ground, ways).own.rows.tolist() == honest.own.rows.tolist() == truth
 
 
 def test_certain_labels_leave_the_hypotheses_alone():
