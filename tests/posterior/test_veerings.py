@@ -10,10 +10,10 @@ import made_boards
 import numpy as np
 import pytest
 import ritz
-from calibration.sbc import random_lines
-from calibration.truths import Design, draw_truth, make_problem
 from scipy import stats
 from scipy.optimize import minimize
+from validation.calibration.sbc import random_lines
+from validation.calibration.truths import Design, draw_truth, make_problem
 
 from bayesplate.board.prior import load_prior
 from bayesplate.frequencies.laws import LawName
