@@ -40,10 +40,8 @@ def test_many_draws_at_once_are_cheaper_than_few(problem):
     assert few > 3 * many
 
 
-@pytest.mark.parametrize(
-    ("board", "law", "least"),
-    [("fiemme-spruce-clamped", "linear", 10), pytest.param(BOARD, None, 5, marks=pytest.mark.slow)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("board", "law", "least"), [("fiemme-spruce-clamped", "linear", 10), (BOARD, None, 5)])
 def test_effective_draws_come_many_times_faster_than_from_plain_emcee(board, law, least):
     """In the same process on the same density. Dozens are measured: noise of the machine does not decide."""
     posed = timing.posed(board, law)

@@ -18,15 +18,15 @@ from validation.calibration.truths import Design, draw_truth, make_problem
 from bayesplate.board.material import RIGIDITIES
 
 SMALL = Design(law="fixed-linear", resolution=0.0, thickness_sd=0.0, n_walkers=12)
-N_SMALL, N_HALF, N_FLIPPED = 96, 32, 10
-"""The wrong sign is found in few: nearly every rank is at an end. A spread of 0.7 takes all of them."""
+N_SMALL, N_FLIPPED = 24, 10
+"""The wrong sign is found in few: nearly every rank is at an end."""
 
 
 @pytest.fixture(scope="module")
 def small():
     """The same simulations whenever they are made."""
-    both = ("noise fixed at half", "sign of the Poisson ratio flipped")
-    records = [simulate_one(SMALL, i, both[: (i < N_HALF) + (i < N_FLIPPED)]) for i in range(N_SMALL)]
+    flipped = ("sign of the Poisson ratio flipped",)
+    records = [simulate_one(SMALL, i, flipped[: i < N_FLIPPED]) for i in range(N_SMALL)]
     assert [record for record in records if "error" in record] == []
     return records
 
@@ -42,9 +42,7 @@ def test_ranks_of_the_truth_are_uniform(small):
     assert is_calibrated(table), table
 
 
-@pytest.mark.parametrize("mutant", [
-    "likelihood omitted", "noise fixed at half", "sign of the Poisson ratio flipped", "spread 0.7 of itself"
-])  # fmt: skip
+@pytest.mark.parametrize("mutant", ["likelihood omitted", "sign of the Poisson ratio flipped"])
 def test_a_wrong_posterior_is_caught(small, mutant):
     table = rows(ranks_of(small, mutant))
     assert is_caught(mutant, table), table
@@ -105,7 +103,7 @@ def test_narrowed_draws_keep_their_mean():
 
 
 def test_a_simulation_is_the_same_whenever_it_is_made(small):
-    again = simulate_one(SMALL, 20, ("noise fixed at half",))
+    again = simulate_one(SMALL, 20)
     assert again["ranks"] == small[20]["ranks"]
     assert again["ranks"] != small[21]["ranks"]
 

@@ -166,6 +166,7 @@ def test_half_the_width_about_the_median():
     assert [half_holds({**interval, "truth": t}) for t in (-0.6, -0.4, 1.4, 1.6)] == [False, True, True, False]
 
 
+@pytest.mark.slow
 def test_a_board_held_free_as_well_tells_a_soft_clamp_from_one_that_covers_more(tmp_path):
     """Either lowers what the clamp reads; of the cantilever alone E_x, the grip and its give stay open together."""
     rng = np.random.default_rng(1)

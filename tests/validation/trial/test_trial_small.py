@@ -23,10 +23,10 @@ from validation.trial.summary import CONDITIONS
 
 from bayesplate.diagnosis.null_control import null_control
 
-FEW = (Cell("one", "cantilever-6", 2, size=2.0), Cell("null", "cantilever-6", 2))
+FEW = (Cell("one", "cantilever-6", 1, size=2.0), Cell("null", "cantilever-6", 1))
 
 
-N_FEW_SETS = 60
+N_FEW_SETS = 20
 """Null simulations of a setting here: enough to rank against, and to compare one run with another."""
 
 
@@ -45,7 +45,7 @@ def without_time(records):
 
 @pytest.fixture(scope="module")
 def few():
-    """Four boards judged in this process; others that it forks have its laws."""
+    """Two boards judged in this process; others that it forks have its laws."""
     return [judge_one(cell, BASE_SEED, i) for cell in FEW for i in range(cell.n)]
 
 
@@ -142,6 +142,7 @@ def test_a_record_tells_everything(few):
             assert one["holds"] == (one["q05"] <= true <= one["q95"])
 
 
+@pytest.mark.slow
 def test_a_board_depends_neither_on_the_workers_nor_on_the_order(few, tmp_path):
     again = run(FEW[::-1], tmp_path / "other.jsonl", workers=2, quiet=True)
     order = {cell.name: place for place, cell in enumerate(FEW)}
@@ -150,6 +151,7 @@ def test_a_board_depends_neither_on_the_workers_nor_on_the_order(few, tmp_path):
     assert other_seed["truth"]["constants"] != few[0]["truth"]["constants"]
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on_to_the_same_records(few, tmp_path):
     """A process group is killed as soon as it has written a board."""
     out = tmp_path / "killed.jsonl"
@@ -161,7 +163,7 @@ def test_a_killed_run_goes_on_to_the_same_records(few, tmp_path):
     os.killpg(process.pid, signal.SIGKILL)
     process.join()
     n_done = sum(line.endswith("\n") for line in out.read_text().splitlines(keepends=True)) - 1
-    assert 1 <= n_done <= 4
+    assert 1 <= n_done <= len(few)
     with out.open("a") as file:
         file.write('{"cell": "one cant')  # killed while it wrote the next
     assert without_time(run(FEW, out, workers=1, quiet=True)) == without_time(few)
