@@ -259,11 +259,12 @@ def test_an_internal_error_is_one_line_without_debug(monkeypatch):
 
 def test_a_terminal_of_no_width_is_none(monkeypatch):
     """As some programs set it that run others."""
-    told = invoke("check", "fiemme-spruce-clamped").stdout
+    Path("my-board.toml").write_text(CARD, encoding="utf-8")
+    told = invoke("check", "my-board.toml").stdout
     monkeypatch.setenv("COLUMNS", "0")
 
     assert "E_x" in told
-    assert invoke("check", "fiemme-spruce-clamped").stdout == told
+    assert invoke("check", "my-board.toml").stdout == told
 
 
 LONG = "d" * 300
@@ -308,8 +309,8 @@ def test_the_commands_and_exit_codes_of_a_real_process():
 
 
 def test_a_reader_that_stops_early_is_no_error():
-    """`bayesplate check ... | head -1`: the pipe is closed before anything is printed."""
-    program = [sys.executable, "-m", "bayesplate", "check", "fiemme-spruce-clamped"]
+    """`bayesplate cite ... | head -1`: the pipe is closed before anything is printed."""
+    program = [sys.executable, "-m", "bayesplate", "cite", "fiemme-spruce-clamped"]
     with subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         process.stdout.close()

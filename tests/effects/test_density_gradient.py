@@ -18,7 +18,7 @@ GRADIENT = "density_gradient.gradient"
 
 
 @pytest.mark.parametrize("is_sheared", [False, True], ids=["thin", "shear-flexible"])
-@pytest.mark.parametrize("gradient", [0.05, -0.15, 0.6])
+@pytest.mark.parametrize("gradient", [0.6])
 @pytest.mark.parametrize("plate", [FINNISH, FREE], ids=["cantilever", "free"])
 def test_against_the_generator(plate, gradient, is_sheared):
     independent = generator.effects.DensityGradient(gradient)

@@ -107,7 +107,7 @@ class InAWiderRectangle(OutlineProfile):
 
 
 @pytest.mark.parametrize("plate", [FINNISH, FREE], ids=["cantilever", "free"])
-@pytest.mark.parametrize("factor", [1.003, 1.03, 1.3])
+@pytest.mark.parametrize("factor", [1.003, 1.3])
 def test_a_narrower_board_is_the_smaller_rectangle(plate, factor):
     """No rest of the ghost outside, and no mode of it."""
     cents = 1200 * np.log2(hertz(plate, [InAWiderRectangle(factor=factor)], {}, 8) / hertz(plate, [], {}, 8))

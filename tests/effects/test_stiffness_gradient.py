@@ -22,7 +22,7 @@ BEAM_ROOTS = (1.8751041, 4.6940911)
 
 
 @pytest.mark.parametrize("is_sheared", [False, True], ids=["thin", "shear-flexible"])
-@pytest.mark.parametrize("gradient", [0.05, 0.1, -0.2])
+@pytest.mark.parametrize("gradient", [-0.2])
 @pytest.mark.parametrize("plate", [FINNISH, FREE, FIEMME], ids=["cantilever", "free", "clamped"])
 def test_against_the_generator(plate, gradient, is_sheared):
     """There D_y falls where E_x grows, by a hundredth of its gradient: 0.4 cents at the largest of these."""

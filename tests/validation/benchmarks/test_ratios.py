@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 from validation.benchmarks import timing
 
+pytestmark = pytest.mark.slow
+
 BATCH = 4096
 BOARD = "finnish-spruce-cantilever"
 
@@ -40,7 +42,6 @@ def test_many_draws_at_once_are_cheaper_than_few(problem):
     assert few > 3 * many
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("board", "law", "least"), [("fiemme-spruce-clamped", "linear", 10), (BOARD, None, 5)])
 def test_effective_draws_come_many_times_faster_than_from_plain_emcee(board, law, least):
     """In the same process on the same density. Dozens are measured: noise of the machine does not decide."""

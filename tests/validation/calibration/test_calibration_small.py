@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import ritz
 from validation.calibration.layouts import EFFECTS, HELD_OUT, LABELS, TWICE
-from validation.calibration.mutants import FITTED, TWICE_COUNTED, counted_twice, flipped_sign, half_noise, narrowed
+from validation.calibration.mutants import FITTED, TWICE_COUNTED, counted_twice
 from validation.calibration.records import read_done
 from validation.calibration.run import FEWEST_OF_MUTANT, fitted_mutants, judge, run
 from validation.calibration.sbc import N_DRAWS, held_out, identity, quantities, simulate_one
@@ -18,15 +18,20 @@ from validation.calibration.truths import Design, draw_truth, make_problem
 from bayesplate.board.material import RIGIDITIES
 
 SMALL = Design(law="fixed-linear", resolution=0.0, thickness_sd=0.0, n_walkers=12)
-N_SMALL, N_FLIPPED = 24, 10
-"""The wrong sign is found in few: nearly every rank is at an end."""
+N_SMALL, N_HALF, N_FLIPPED = 96, 32, 10
+"""The wrong sign is found in few: nearly every rank is at an end. A spread of 0.7 takes all of them."""
+
+
+@pytest.fixture(scope="module")
+def two():
+    return [simulate_one(SMALL, i) for i in range(2)]
 
 
 @pytest.fixture(scope="module")
 def small():
     """The same simulations whenever they are made."""
-    flipped = ("sign of the Poisson ratio flipped",)
-    records = [simulate_one(SMALL, i, flipped[: i < N_FLIPPED]) for i in range(N_SMALL)]
+    both = ("noise fixed at half", "sign of the Poisson ratio flipped")
+    records = [simulate_one(SMALL, i, both[: (i < N_HALF) + (i < N_FLIPPED)]) for i in range(N_SMALL)]
     assert [record for record in records if "error" in record] == []
     return records
 
@@ -35,6 +40,7 @@ def ranks_of(records, kind):
     return [record["ranks"][kind] for record in records if kind in record["ranks"]]
 
 
+@pytest.mark.slow
 def test_ranks_of_the_truth_are_uniform(small):
     table = rows(ranks_of(small, "production"))
     assert {row.name for row in table} >= {"D_x", "D_y", "D_s", "E_x", "E_y", "G_xy", "noise", "held_out",
@@ -42,12 +48,16 @@ def test_ranks_of_the_truth_are_uniform(small):
     assert is_calibrated(table), table
 
 
-@pytest.mark.parametrize("mutant", ["likelihood omitted", "sign of the Poisson ratio flipped"])
+@pytest.mark.slow
+@pytest.mark.parametrize("mutant", [
+    "likelihood omitted", "noise fixed at half", "sign of the Poisson ratio flipped", "spread 0.7 of itself"
+])  # fmt: skip
 def test_a_wrong_posterior_is_caught(small, mutant):
     table = rows(ranks_of(small, mutant))
     assert is_caught(mutant, table), table
 
 
+@pytest.mark.slow
 def test_without_the_likelihood_only_the_likelihood_tells(small):
     """Draws from the prior are calibrated for every parameter: why the log likelihood is ranked."""
     table = {row.name: row for row in rows(ranks_of(small, "likelihood omitted"))}
@@ -89,32 +99,19 @@ def test_a_mode_counted_twice_adds_its_likelihood_once_more(with_effect):
     assert added == pytest.approx(once[:, LABELS["free"].index(TWICE["free"])], rel=1e-9)
 
 
-def test_beliefs_of_the_mutants_are_wrong_by_as_much_as_they_say(with_effect):
-    board = with_effect[2].board
-    assert half_noise(board).setups[0].noise.median == pytest.approx(0.5 * board.setups[0].noise.median)
-    assert flipped_sign(board).inputs["poisson_xy"].mean == -board.inputs["poisson_xy"].mean
+def test_a_simulation_is_the_same_whenever_it_is_made(two):
+    again = simulate_one(SMALL, 1)
+    assert again["ranks"] == two[1]["ranks"]
+    assert again["ranks"] != two[0]["ranks"]
 
 
-def test_narrowed_draws_keep_their_mean():
-    draws = np.random.default_rng(0).normal(3.0, 2.0, (99, 2))
-    narrow = narrowed(draws, 0.8)
-    assert narrow.mean(axis=0) == pytest.approx(draws.mean(axis=0))
-    assert narrow.std(axis=0) == pytest.approx(0.8 * draws.std(axis=0))
-
-
-def test_a_simulation_is_the_same_whenever_it_is_made(small):
-    again = simulate_one(SMALL, 20)
-    assert again["ranks"] == small[20]["ranks"]
-    assert again["ranks"] != small[21]["ranks"]
-
-
-def test_an_interrupted_run_goes_on(small, tmp_path):
+def test_an_interrupted_run_goes_on(two, tmp_path):
     out = tmp_path / "ranks.jsonl"
-    lines = [json.dumps(identity(SMALL)), *(json.dumps(record) for record in small)]
+    lines = [json.dumps(identity(SMALL)), *(json.dumps(record) for record in two)]
     out.write_text("\n".join(lines[:-1]) + "\n" + lines[-1][:40])  # killed while it wrote the last one
-    records = run(SMALL, N_SMALL - 1, 0, 1, out, quiet=True)
-    assert records == small[:-1]  # nothing was left to do
-    assert len(out.read_text().splitlines()) == N_SMALL
+    records = run(SMALL, 1, 0, 1, out, quiet=True)
+    assert records == two[:-1]  # nothing was left to do
+    assert len(out.read_text().splitlines()) == 2
     _, well = judge(records)
     assert not well  # too few simulations of the mutants to say that they would be caught
 

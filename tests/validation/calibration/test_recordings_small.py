@@ -8,6 +8,8 @@ import pytest
 from validation.calibration import run_recordings
 from validation.calibration.picked import WITHIN, is_calibrated, told
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def records(tmp_path_factory):

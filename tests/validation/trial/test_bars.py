@@ -106,13 +106,6 @@ def test_a_bar_from_below_at_its_edge(quantity, cell, wrong, limit):
     assert [by_name((cell,), with_wrong(cell, wrong, n))[quantity]["met"] for n in (most, most + 1)] == [True, False]
 
 
-def test_seventeen_cents_are_named_on_one_board_in_five_at_most():
-    """Named rightly: what has to be shown is that nothing is said."""
-    for n_quiet, met in ((fewest_allowed(0.80), True), (fewest_allowed(0.80) - 1, False)):
-        records = [quiet(LOUD, i) if i < n_quiet else right(LOUD, i) for i in range(N)]
-        assert by_name((LOUD,), records)["17 cents: not named"]["met"] is met
-
-
 @pytest.mark.parametrize("quantity", ["constants after tracing, cantilever-9, 2x: 90 % intervals",
                                       "size of what is named right: 90 % intervals"])  # fmt: skip
 def test_intervals_cover_within_their_bounds(quantity):
@@ -127,20 +120,6 @@ def test_intervals_cover_within_their_bounds(quantity):
             records.append(right(cell, i, averaged=[i < k] * 3, amplitudes={A: size}))
         met.append(by_name((cell,), records)[quantity]["met"])
     assert met == [False, True, True, False]
-
-
-def test_constants_are_judged_by_what_is_shown_first_and_set_beside_the_rest():
-    """The hypothesis of the verdict alone stands in the note; without tracing must be worse than the average."""
-    cell = large(SIX)
-    records = [right(cell, i, holds=[False] * 3, averaged=[i % 10 > 0] * 3) for i in range(N)]
-    found = by_name((cell,), records)
-    after = found["constants after tracing, cantilever-6, 2x: 90 % intervals"]
-    assert after["met"]
-    assert after["share"] == pytest.approx(0.9)
-    assert "by the hypothesis of the verdict alone 0.0 %" in after["note"]
-    assert found["constants without tracing, cantilever-6, 2x: visibly worse"]["met"]
-    none = by_name((cell,), [right(cell, i, holds=[False] * 3) for i in range(N)])
-    assert not none["constants without tracing, cantilever-6, 2x: visibly worse"]["met"]
 
 
 def test_sizes_err_by_a_quarter_at_most_with_their_upper_bound():
@@ -164,31 +143,6 @@ def test_sets_hold_two_and_a_half_effects_at_most():
         assert bar["met"] is met
 
 
-def test_claims_on_wrong_names_count_those_outside_the_library_too():
-    """Right names and one of two may be claimed: they stand in the note."""
-    one, two, outside = large(SIX), large(BOTH, "two"), large(BOTH, "outside")
-    quantity = "claim made on a wrong name, outside the library too"
-    most = most_allowed(0.10)
-    for n, met in ((most, True), (most + 1, False)):
-        records = [
-            *(claimed(one, i) for i in range(N)),
-            *(called("named", [A], [A])(two, i) | {"claim": True} for i in range(N)),
-            *(named_b(outside, i) | {"claim": i < n} for i in range(N)),
-        ]
-        bar = by_name((one, two, outside), records)[quantity]
-        assert (bar["count"], bar["n"], bar["met"]) == (n, N, met)
-        assert bar["note"].startswith("on a right name 400/400" if met else f"rib taken for {B} {n}; on a right name")
-        assert "on one of two 400/400" in bar["note"]
-
-
-def test_one_of_two_is_a_part_and_not_a_wrong_name():
-    cell = large(BOTH, "two")
-    records = [called("named", [A], [A])(cell, i) for i in range(N)]
-    found = by_name((cell,), records)
-    assert found[f"{cell.name}: unique and wrong"]["count"] == 0
-    assert found["two effects: both in the set"]["count"] == 0
-
-
 def test_a_bar_counts_all_classes_and_those_planned_first_stand_beside_it():
     assert FURTHER not in PLANNED
     cell = large(SIX)
@@ -197,12 +151,6 @@ def test_a_bar_counts_all_classes_and_those_planned_first_stand_beside_it():
     assert (bar["count"], bar["n"], bar["met"]) == (200, 400, False)
     assert "of the classes planned first 200/200 = 100.0 %" in bar["note"]
     assert "weakest: clamp_translation 0 %" in bar["note"]
-
-
-def test_loudnesses_of_a_null_design_count_together():
-    cells = tuple(Cell("null", SIX, 200, cents) for cents in (2.0, 5.0, 17.0))
-    records = [right(cell, i) for cell in cells for i in range(cell.n)]
-    assert by_name(cells, records)["null, cantilever-6, noise at its prior's median: uniquely named"]["n"] == 600
 
 
 def test_a_trial_that_finds_everything_meets_every_bar_and_one_without_truth_does_not():
@@ -234,22 +182,3 @@ def test_a_trial_that_finds_everything_meets_every_bar_and_one_without_truth_doe
 
 def quiet_if_loud(cell, record):
     return record | {"word": "none needed", "effects": [], "amplitudes": {}} if cell.noise_cents == 17.0 else record
-
-
-def test_a_missed_bar_on_alarms_says_which_rule_raised_them():
-    cell = null("drawn")
-    words = ["unexplained"] * 40 + ["named"] * 9 + [GROUP] * 3
-    records = [called(words[i] if i < len(words) else "none needed")(cell, i) for i in range(N)]
-    bar = by_name((cell,), records)[f"null, {SIX}, {NOISES['drawn']}: flagged at all"]
-    assert bar["note"] == "misfit of the plate too large for chance 40, an effect needed 12"
-
-
-def test_records_that_do_not_tell_of_parts_have_no_bar_for_them():
-    cell = large(SIX, "outside")
-    quantity = "outside the library, cantilever-6: named, or named in part"
-    told = with_wrong(cell, in_part_b, 3)
-    assert by_name((cell,), told)[quantity]["note"] == ""
-    older = [{key: value for key, value in record.items() if key != "in_part"} for record in told]
-    assert quantity not in by_name((cell,), older)
-    missed = by_name((cell,), with_wrong(cell, in_part_b, 60))[quantity]
-    assert (missed["met"], missed["note"]) == (False, "rib taken for attached_mass 60")

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 from validation.trial.cells import Cell
-from validation.trial.counts import is_best, is_covered, listed
+from validation.trial.counts import is_best
 from validation.trial.made_records import made
 from validation.trial.page import in_short, page, plain, write
 from validation.trial.published import as_text, publish_records, published_records
-from validation.trial.summary import by_class, confusion, summarise
+from validation.trial.summary import by_class, summarise
 
 ONE = Cell("one", "cantilever-6", 5, size=2.0)
 NULL = Cell("null", "cantilever-6", 4)
@@ -67,21 +67,6 @@ def test_sums_by_hand(by_hand):
     assert "alone 66.7 %" in found[title]["note"]
 
 
-def test_confusion_by_hand(by_hand):
-    rows = confusion(by_hand[:5])
-    assert list(rows) == ["air", "mass"]
-    assert (rows["air"]["named right"], rows["air"]["named wrong"], rows["air"]["wrong_names"]) == (1, 1, {"mass": 1})
-    assert [rows["mass"][key] for key in ("group with it", "group without it", "none needed")] == [1, 1, 1]
-    assert rows["mass"]["best"] == {"air": 1, "nothing": 1, "mass": 1}
-    assert not is_covered(by_hand[4])
-    assert listed(by_hand[4]) == frozenset()
-    assert listed(made(ONE, 5, ["air"], "indistinguishable group", ["air", "clamp"], ["mass"])) == {
-        "air",
-        "clamp",
-        "mass",
-    }
-
-
 def test_boards_without_an_answer_are_listed(by_hand, tmp_path):
     failed = {"cell": ONE.name, "index": 9, "truth": {"effects": ["air"]}, "error": "InputError: no", "seconds": 1.0}
     summary = write([*by_hand, failed], 1, tmp_path, (ONE, NULL))
@@ -106,17 +91,6 @@ def test_published_records_are_the_same_bytes_and_add_up_to_the_same(by_hand, tm
     digest = publish_records(by_hand, 4, tmp_path, most_bytes=len(packed))
     assert digest == kept | {"file": None}
     assert not (tmp_path / "trial-records.jsonl.gz").exists()
-
-
-def test_the_page_says_where_the_records_are(by_hand):
-    summary = summarise(by_hand, 4, (ONE, NULL))
-    kept = {"file": "trial-records.jsonl.gz", "lines": 9, "sha256": "abc", "command": "python make"}
-    for records, words in (
-        (kept, "in [trial-records.jsonl.gz](trial-records.jsonl.gz)"),
-        (kept | {"file": None}, "made by `python make`"),
-    ):
-        assert words in "\n".join(page(summary | {"records": records}))
-    assert "SHA-256" not in "\n".join(page(summary | {"records": None}))
 
 
 def test_records_in_the_repository_are_those_of_the_page():

@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from validation.benchmarks.peers import environments, measures, page, run, statement, trials
-from validation.benchmarks.peers.density import Density
 from validation.benchmarks.peers.package import COMMANDS
 from validation.benchmarks.peers.registry import PEERS
 
@@ -61,26 +60,6 @@ def test_a_board_that_the_file_cannot_say_is_refused(problem):
         statement.stated(problem.under("exact"))
 
 
-def test_columns_lead_there_and_back_and_the_parts_make_the_whole(content):
-    density = Density.of(content)
-    theta = density.starts(50, np.random.default_rng(1))
-    x = density.x(theta)
-
-    assert density.theta(x) == pytest.approx(theta, abs=1e-12)
-    assert density.log_prior(x) + density.log_likelihood_of_x(x) == pytest.approx(
-        density.log_posterior(theta), abs=1e-9
-    )
-    assert density.from_cube(np.full((1, 4), 0.5))[0] == pytest.approx(density.prior_mean)
-
-
-def test_where_no_material_is_the_density_is_zero(content):
-    density = Density.of(content)
-    elsewhere = np.array([[0.0, 9.0, 0.0, 0.0]])  # nu_xy nu_yx > 1
-
-    assert density.log_likelihood_of_x(density.x(density.centre[None]) + elsewhere) == -np.inf
-    assert density.log_posterior(density.centre[None] + elsewhere) == -np.inf
-
-
 def test_effective_draws_of_chains_and_of_weights():
     rng = np.random.default_rng(2)
     chains = rng.standard_normal((2000, 4, 2))
@@ -100,12 +79,6 @@ def test_a_difference_is_in_monte_carlo_errors_and_another_posterior_is_found():
     assert shifted.mean > page.AGREES
     assert shifted.mean_share == pytest.approx(0.2, abs=0.05)
     assert wide.sd > page.AGREES
-
-
-def test_a_run_is_lengthened_in_proportion_and_not_beyond_four_times():
-    assert trials.next_size(1000, 2000.0, 4000.0) == int(1000 * 2 * trials.MARGIN)
-    assert trials.next_size(1000, 8000.0, 4000.0) < 1000
-    assert trials.next_size(1000, 1.0, 4000.0) == 4000
 
 
 def test_a_peer_that_cannot_be_installed_says_why(tmp_path, monkeypatch):
@@ -191,14 +164,6 @@ def test_one_row_each_and_every_way_of_running_is_described():
     assert sum(row.startswith("| ") for row in text.splitlines()) == 1 + len(COMMANDS) + len(PEERS)
     assert all(f"- {peer.name}: {peer.aside}." in text for peer in PEERS)
     assert len({peer.name for peer in PEERS}) == len(PEERS)
-
-
-def test_results_are_read_back_and_a_line_that_was_cut_off_is_left_out(tmp_path, monkeypatch):
-    path = tmp_path / "results.jsonl"
-    kept = result("a sampler", warm=(0.25,) * 3)
-    path.write_text(json.dumps(trials.asdict(kept)) + '\n{"name": "cut o', encoding="utf-8")
-
-    assert run.read(path) == [kept]
 
 
 def test_there_is_no_page_of_half_a_comparison():
