@@ -141,22 +141,27 @@ def test_the_card_is_sound_before_it_is_spoiled():
     assert invoke("check", "my-board.toml").exit_code == 0
 
 
-@pytest.mark.parametrize("command", ["check", "fit"])
 @pytest.mark.parametrize("fault", BAD_CARDS)
-def test_a_bad_card_is_refused_with_all_its_faults(command, fault):
+def test_a_bad_card_is_refused_with_all_its_faults(fault):
     changes, wanted = BAD_CARDS[fault]
     Path("my-board.toml").write_text(spoiled(*changes), encoding="utf-8")
 
-    assert_refused(command, "my-board.toml", wanted)
+    assert_refused("check", "my-board.toml", wanted)
 
 
-@pytest.mark.parametrize("command", ["check", "fit"])
+def test_a_fit_refuses_what_a_check_refuses():
+    changes, wanted = BAD_CARDS["negative"]
+    Path("my-board.toml").write_text(spoiled(*changes), encoding="utf-8")
+
+    assert_refused("fit", "my-board.toml", wanted)
+
+
 @pytest.mark.parametrize("fault", BAD_FILES)
-def test_what_is_no_card_is_refused(command, fault):
+def test_what_is_no_card_is_refused(fault):
     content, message = BAD_FILES[fault]
     Path("my-board.toml").write_bytes(content)
 
-    assert_refused(command, "my-board.toml", [message])
+    assert_refused("check", "my-board.toml", [message])
 
 
 @pytest.mark.parametrize("command", ["check", "fit"])
