@@ -37,6 +37,8 @@ MORE = [
     (FREE, "fluid_loading"),
     (FREE, "grain_angle"),
     (CANTILEVER, "thickness_profile"),
+    (CANTILEVER, "density_gradient"),
+    (CANTILEVER, "stiffness_gradient"),
 ]
 ATTACHED = {(CANTILEVER, "attached_mass"): SENSOR, (FREE, "exciter"): KNOWN_DRIVE}
 """What the cards do not have; the clamped board's own exciter may be anywhere."""
