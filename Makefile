@@ -40,50 +40,50 @@ audit:
 	$(PYTHON) .ci/audit.py
 
 calibration: $(VENV)/tested-with
-	$(BIN)/python tests/calibration/run.py --workers 2 --out results/calibration.jsonl --publish docs/validation
+	$(BIN)/python tests/validation/calibration/run.py --workers 2 --out results/calibration.jsonl --publish docs/validation
 
 spectra: $(VENV)/tested-with
-	$(BIN)/python tests/calibration/run_spectra.py --boards 200 --workers 2 --out results/spectra.jsonl --publish docs/validation
+	$(BIN)/python tests/validation/calibration/run_spectra.py --boards 200 --workers 2 --out results/spectra.jsonl --publish docs/validation
 
 campaigns: $(VENV)/tested-with
-	$(BIN)/python tests/calibration/run_campaigns.py --campaigns 100 --workers 2 --out results/campaigns.jsonl --publish docs/validation
+	$(BIN)/python tests/validation/calibration/run_campaigns.py --campaigns 100 --workers 2 --out results/campaigns.jsonl --publish docs/validation
 
 recordings: $(VENV)/tested-with
-	$(BIN)/python tests/calibration/run_recordings.py --recordings 200 --workers 2 --out results/recordings.jsonl --publish docs/validation
+	$(BIN)/python tests/validation/calibration/run_recordings.py --recordings 200 --workers 2 --out results/recordings.jsonl --publish docs/validation
 
 roving: $(VENV)/tested-with
-	$(BIN)/python tests/calibration/run_roving.py --boards 50 --workers 2 --out results/roving.jsonl --publish docs/validation
+	$(BIN)/python tests/validation/calibration/run_roving.py --boards 50 --workers 2 --out results/roving.jsonl --publish docs/validation
 
 sand: $(VENV)/tested-with
-	$(BIN)/python tests/calibration/run_sand.py --pictures 20 --workers 2 --out results/sand.jsonl --publish docs/validation
+	$(BIN)/python tests/validation/calibration/run_sand.py --pictures 20 --workers 2 --out results/sand.jsonl --publish docs/validation
 
 measured: $(VENV)/tested-with
-	$(BIN)/python tests/calibration/run_measured.py --folder $(RECORDINGS) --publish docs/validation
+	$(BIN)/python tests/validation/calibration/run_measured.py --folder $(RECORDINGS) --publish docs/validation
 
 bars: $(VENV)/tested-with
-	$(BIN)/python tests/calibration/run_bars.py --publish docs/validation --workers 2
+	$(BIN)/python tests/validation/calibration/run_bars.py --publish docs/validation --workers 2
 
 plans: $(VENV)/tested-with
-	$(BIN)/python tests/calibration/run_plans.py --boards 214 --workers 2 --out results/plans.jsonl --publish docs/validation
+	$(BIN)/python tests/validation/calibration/run_plans.py --boards 214 --workers 2 --out results/plans.jsonl --publish docs/validation
 
 trial: $(VENV)/tested-with
-	$(BIN)/python tests/trial/run.py --workers 2 --out results/trial.jsonl
+	$(BIN)/python tests/validation/trial/run.py --workers 2 --out results/trial.jsonl
 
 coverage: $(VENV)/tested-with
-	$(BIN)/python tests/calibration/coverage.py --boards 40 --workers 2 --out results/coverage.jsonl --publish docs/validation
+	$(BIN)/python tests/validation/calibration/coverage.py --boards 40 --workers 2 --out results/coverage.jsonl --publish docs/validation
 
 two-setups: $(VENV)/tested-with
-	$(BIN)/python tests/calibration/coverage.py --boards 40 --effect "clamp_rotation, board free too" --workers 2 \
+	$(BIN)/python tests/validation/calibration/coverage.py --boards 40 --effect "clamp_rotation, board free too" --workers 2 \
 		--out results/coverage.jsonl --publish docs/validation --page two-setups
 
 benchmarks: $(VENV)/installed
-	$(BIN)/python tests/benchmarks/run.py --publish docs/validation --repeats 3
+	$(BIN)/python tests/validation/benchmarks/run.py --publish docs/validation --repeats 3
 
 batch: $(VENV)/tested-with
-	$(BIN)/python tests/benchmarks/batch.py --boards 10 50 200 --workers 1 2 --dask --many 10000 --out results/batch.jsonl --publish docs/validation
+	$(BIN)/python tests/validation/benchmarks/batch.py --boards 10 50 200 --workers 1 2 --dask --many 10000 --out results/batch.jsonl --publish docs/validation
 
 peers: $(VENV)/installed
-	$(BIN)/python tests/benchmarks/peers/run.py --publish docs/validation --environments build/peers
+	$(BIN)/python tests/validation/benchmarks/peers/run.py --publish docs/validation --environments build/peers
 
 # The stamps: an environment is made again when pyproject.toml changes. pip knows dependency groups from 25.1 on.
 $(VENV)/installed: pyproject.toml

@@ -141,22 +141,27 @@ def test_the_card_is_sound_before_it_is_spoiled():
     assert invoke("check", "my-board.toml").exit_code == 0
 
 
-@pytest.mark.parametrize("command", ["check", "fit"])
 @pytest.mark.parametrize("fault", BAD_CARDS)
-def test_a_bad_card_is_refused_with_all_its_faults(command, fault):
+def test_a_bad_card_is_refused_with_all_its_faults(fault):
     changes, wanted = BAD_CARDS[fault]
     Path("my-board.toml").write_text(spoiled(*changes), encoding="utf-8")
 
-    assert_refused(command, "my-board.toml", wanted)
+    assert_refused("check", "my-board.toml", wanted)
 
 
-@pytest.mark.parametrize("command", ["check", "fit"])
+def test_a_fit_refuses_what_a_check_refuses():
+    changes, wanted = BAD_CARDS["negative"]
+    Path("my-board.toml").write_text(spoiled(*changes), encoding="utf-8")
+
+    assert_refused("fit", "my-board.toml", wanted)
+
+
 @pytest.mark.parametrize("fault", BAD_FILES)
-def test_what_is_no_card_is_refused(command, fault):
+def test_what_is_no_card_is_refused(fault):
     content, message = BAD_FILES[fault]
     Path("my-board.toml").write_bytes(content)
 
-    assert_refused(command, "my-board.toml", [message])
+    assert_refused("check", "my-board.toml", [message])
 
 
 @pytest.mark.parametrize("command", ["check", "fit"])
@@ -259,11 +264,12 @@ def test_an_internal_error_is_one_line_without_debug(monkeypatch):
 
 def test_a_terminal_of_no_width_is_none(monkeypatch):
     """As some programs set it that run others."""
-    told = invoke("check", "fiemme-spruce-clamped").stdout
+    Path("my-board.toml").write_text(CARD, encoding="utf-8")
+    told = invoke("check", "my-board.toml").stdout
     monkeypatch.setenv("COLUMNS", "0")
 
     assert "E_x" in told
-    assert invoke("check", "fiemme-spruce-clamped").stdout == told
+    assert invoke("check", "my-board.toml").stdout == told
 
 
 LONG = "d" * 300
@@ -308,8 +314,8 @@ def test_the_commands_and_exit_codes_of_a_real_process():
 
 
 def test_a_reader_that_stops_early_is_no_error():
-    """`bayesplate check ... | head -1`: the pipe is closed before anything is printed."""
-    program = [sys.executable, "-m", "bayesplate", "check", "fiemme-spruce-clamped"]
+    """`bayesplate cite ... | head -1`: the pipe is closed before anything is printed."""
+    program = [sys.executable, "-m", "bayesplate", "cite", "fiemme-spruce-clamped"]
     with subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         process.stdout.close()

@@ -484,7 +484,7 @@ def test_what_cannot_be_a_batch_is_refused_and_nothing_is_written(cards, tmp_pat
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
 def test_memory_does_not_grow_with_the_number_of_boards(tmp_path):
     """Peaks over 10 and over 40 boards, of the command and of its worker: within 5 % and 5 MB of each other."""
-    from benchmarks.batch import measured, write_cards
+    from validation.benchmarks.batch import measured, write_cards
 
     few, many = (
         measured(write_cards(tmp_path / f"cards-{n}", n), tmp_path / f"out-{n}", ["--workers", "1"], "1")

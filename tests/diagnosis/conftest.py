@@ -12,6 +12,7 @@ from bayesplate.commands.diagnose import DiagnoseResult, diagnose
 from bayesplate.commands.problem import Problem
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.search import Ground, prepare_search
+from bayesplate.effects import EFFECTS
 from bayesplate.posterior.posing import PosedProblem
 
 N_NULL = 100
@@ -35,6 +36,12 @@ def grounded(name: str, tried: Sequence[str] | None = None) -> Grounded:
 def finnish() -> Grounded:
     """The paper's cantilever board: rounded readings, exact inputs, one candidate pair."""
     return grounded("finnish-spruce-cantilever")
+
+
+@pytest.fixture(scope="session")
+def finnish_most() -> Grounded:
+    """The same board without the candidates of many forms: a mass that may be anywhere, curvatures and a twist."""
+    return grounded("finnish-spruce-cantilever", [name for name in EFFECTS if name not in ("attached_mass", "warp")])
 
 
 @pytest.fixture(scope="session")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from generator.boards import plant
 from made_searches import decided, visible_of
-from trial.cells import SENSORS
-from trial.shared import baseline_of_card
+from validation.trial.cells import SENSORS
+from validation.trial.shared import baseline_of_card
 
 from bayesplate.diagnosis.joint import with_joint_pairs
 from bayesplate.diagnosis.search import prepare_search, search

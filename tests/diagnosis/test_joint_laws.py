@@ -118,6 +118,7 @@ def test_pairs_with_shear_are_left_to_the_sampler(finnish_few):
     assert joint._is_cheap(laws["clamp_rotation"])
 
 
+@pytest.mark.slow
 def test_air_and_exciter_keep_the_labels_of_the_board_without_either():
     """The air has an exact density: where both are absent it is too, or modes are followed from those of a board in it.
 

@@ -61,9 +61,9 @@ def compared(ground, rng, n_forms):
             yield name, float(np.abs(cents(found - exact)).max()), float(np.abs(moved).max()), exact
 
 
-def test_every_effect_on_the_cantilever_is_as_full_solves_have_it(finnish):
+def test_every_effect_on_the_cantilever_is_as_full_solves_have_it(finnish_most):
     shown = 0
-    for name, error, moved, exact in compared(finnish.ground, np.random.default_rng(1), 1):
+    for name, error, moved, exact in compared(finnish_most.ground, np.random.default_rng(1), 1):
         assert moved < FAR, name
         assert error < CENT, name
         shown += np.abs(cents(exact)).max() > 5.0 * CENT
@@ -99,29 +99,29 @@ def test_every_effect_on_the_clamped_board_is_as_full_solves_have_it(fiemme):
     assert all(error < CENT for _, error in near), near
 
 
-def test_another_size_is_not_within_a_cent(finnish):
+def test_another_size_is_not_within_a_cent(finnish_most):
     """Negative control: the comparison sees a change of the size by a tenth of its prior."""
-    (law,) = finnish.ground.candidates["fluid_loading"].laws
+    (law,) = finnish_most.ground.candidates["fluid_loading"].laws
     z = np.zeros((1, 1))
-    base = finnish.ground.baseline
+    base = finnish_most.ground.baseline
     exact, _ = full_refit(base, law.form.board, values_at(law.form, z + 0.3), 1 / base.scales)
     shift, _ = refitted(base, law, z)
     assert np.abs(cents(shift - exact)).max() > CENT
 
 
-def test_the_constants_absorb_nothing_of_what_is_tabulated(finnish):
+def test_the_constants_absorb_nothing_of_what_is_tabulated(finnish_most):
     """To a cent, at sizes up to one sd; beyond, the step that serves the bare board may not settle."""
-    base = finnish.ground.baseline
-    for one in finnish.ground.candidates.values():
+    base = finnish_most.ground.baseline
+    for one in finnish_most.ground.candidates.values():
         kept = np.abs(one.fine.z).max(axis=1, initial=0.0) <= 1.0
         assert np.abs(cents(one.fine.shift[kept] @ base.absorbing.T)).max() < CENT
         assert one.fine.weights.sum() == pytest.approx(1.0)
         assert one.coarse.weights.sum() == pytest.approx(1.0)
 
 
-def test_the_cells_hold_the_prior(finnish):
+def test_the_cells_hold_the_prior(finnish_most):
     """Mean of the size over cells is the prior's, at the accuracy of the middle rule and of a reach of three sd."""
-    one = finnish.ground.candidates["clamp_translation"]
+    one = finnish_most.ground.candidates["clamp_translation"]
     (free,) = one.laws[0].form.free
     mean = float(one.fine.weights @ free.prior.value(one.fine.z[:, 0]))
     assert mean == pytest.approx(free.prior.sd * np.sqrt(2 / np.pi), rel=0.01)
@@ -129,11 +129,10 @@ def test_the_cells_hold_the_prior(finnish):
     assert coarse == pytest.approx(free.prior.sd * np.sqrt(2 / np.pi), rel=0.02)
 
 
-def test_two_effects_add_on_the_cantilever(finnish):
+def test_two_effects_add_on_the_cantilever(finnish_most):
     """At nominal sizes, against the joint full solve: to a tenth of the noise there."""
-    ground, base = finnish.ground, finnish.ground.baseline
-    assert len(ground.paired) >= 2
-    for names in combinations(ground.paired, 2):
+    ground, base = finnish_most.ground, finnish_most.ground.baseline
+    for names in combinations(("transverse_shear", "fluid_loading", "thickness_profile"), 2):  # those best seen
         laws = [ground.candidates[name].laws[0] for name in names]
         total, at = np.zeros(base.n_modes), {}
         for law in laws:
@@ -147,26 +146,22 @@ def test_two_effects_add_on_the_cantilever(finnish):
 
 
 @pytest.mark.parametrize("name", ["fluid_loading", "thickness_profile", "grain_angle"])
-def test_a_law_made_for_another_board_serves_once_its_modes_are_placed(finnish, name):
+def test_a_law_made_for_another_board_serves_once_its_modes_are_placed(finnish_most, name):
     """The same sizes, constants half as large again: made there with a wide region, placed here."""
-    base = finnish.ground.baseline
+    base = finnish_most.ground.baseline
     elsewhere = base.log_rigidities + np.array([0.3, -0.2, 0.1])
     values = {**base.values, **dict(zip(("D_x", "D_y", "D_s"), np.exp(elsewhere), strict=True))}
     far = replace(base, log_rigidities=elsewhere, values=values)
-    form = finnish.ground.candidates[name].laws[0].form
+    form = finnish_most.ground.candidates[name].laws[0].form
     placed = form_law(far, form, half_width=0.8).placed(base)
-    own = finnish.ground.candidates[name].laws[0]
+    own = finnish_most.ground.candidates[name].laws[0]
     assert tabulate(base, [placed]).shift == pytest.approx(tabulate(base, [own]).shift, abs=CENT * np.log(2) / 1200)
 
 
-def test_signatures_and_tables_tell_the_same_of_every_effect(finnish):
+def test_signatures_and_tables_tell_the_same_of_every_effect(finnish_most):
     """`check` and `diagnose` show the same numbers, from full solves and from reduced models."""
-    ground, problem = finnish.ground, finnish.problem
+    ground, problem = finnish_most.ground, finnish_most.problem
     for name, one in ground.candidates.items():
-        if name == "attached_mass":  # the card names no item: the search tries places that signatures do not know
-            continue
-        if name == "warp":  # the search tries curvatures and a twist apart, a signature is that of all together
-            continue
         (here,) = signatures(problem, [name])
         assert one.signature.raw == pytest.approx(here.raw, abs=0.3), name
         assert one.signature.visible == pytest.approx(here.visible, abs=0.3), name

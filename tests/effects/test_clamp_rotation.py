@@ -20,7 +20,7 @@ def effect(plate):
 
 
 @pytest.mark.parametrize("is_sheared", [False, True], ids=["thin", "shear-flexible"])
-@pytest.mark.parametrize("compliance", [1e-3, 1 / 30, 1 / 3])
+@pytest.mark.parametrize("compliance", [1e-3, 1 / 3])
 @pytest.mark.parametrize("plate", [FINNISH, FIEMME], ids=["cantilever", "clamped"])
 def test_against_the_generator(plate, compliance, is_sheared):
     """All edges share k_R, which the compliance gives with the D and L along x."""

@@ -23,7 +23,7 @@ def effect(plate):
 
 
 @pytest.mark.parametrize("is_sheared", [False, True], ids=["thin", "shear-flexible"])
-@pytest.mark.parametrize("compliance", [1e-5, 1e-4, 1e-2])
+@pytest.mark.parametrize("compliance", [1e-5, 1e-2])
 @pytest.mark.parametrize("plate", [FINNISH, FIEMME], ids=["cantilever", "clamped"])
 def test_against_the_generator(plate, compliance, is_sheared):
     """All edges share k_T, which the compliance gives with the D and L along x."""

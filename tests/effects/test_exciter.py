@@ -63,9 +63,11 @@ def test_sizes_on_the_papers_clamped_board(resonance, printed):
     assert cents(DRIVEN, drive(QUARTER, resonance=resonance), BEAMS["clamped"]) == pytest.approx(printed, abs=0.2)
 
 
-@pytest.mark.parametrize("is_sheared", [False, True], ids=["thin", "shear-flexible"])
-@pytest.mark.parametrize("plate", [DRIVEN, FINNISH], ids=["clamped", "cantilever"])
-@pytest.mark.parametrize("resonance", [12.0, 38.6])
+@pytest.mark.parametrize(
+    ("plate", "resonance", "is_sheared"),
+    [(DRIVEN, 38.6, False), (FINNISH, 12.0, False), (DRIVEN, 12.0, True)],
+    ids=["clamped", "cantilever", "clamped, shear-flexible"],
+)
 def test_against_the_generator(plate, resonance, is_sheared):
     """Half a cent; of a weak drive, for polynomials converge on a point as the square of their number."""
     one = drive(QUARTER, mass=5e-3, coil=0.6e-3, resonance=resonance)
@@ -124,7 +126,7 @@ def test_a_drive_that_roved_is_the_mean_of_the_frequencies():
     assert by_law == pytest.approx(roved, rel=1e-9)  # at the point where the law is made it is exact
 
 
-@pytest.mark.parametrize("place", [(0.25, 0.25), (0.31, 0.12), (0.08, 0.44), (0.5, 0.5)])
+@pytest.mark.parametrize("place", [(0.31, 0.12), (0.08, 0.44)])
 def test_a_place_that_nobody_knows_is_a_weight(place):
     """Within 0.3 cents or a hundredth: what a polynomial of eight and nine nodes misses of a squared deflection."""
     known, anywhere = drive(place), drive()

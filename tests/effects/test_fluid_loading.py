@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import ritz
 from deflected import deflections, power, unknowns
-from effect_plates import MADE, hertz_apart, modes_of, posed, setup_of, shifts
+from effect_plates import MADE, hertz_apart, modes_of, setup_of, shifts
 from generator.known_boards import BEAMS, FIEMME, FINNISH, FREE
 from made_boards import board_of
 
@@ -18,7 +18,6 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.effects.fluid_loading import BAFFLES, DEFAULT_DENSITY, UNKNOWN_BAFFLE, FluidLoading
 from bayesplate.plate.air import air_mass
 from bayesplate.plate.line import line
-from bayesplate.posterior.laplace import law_tolerance, worst_cents
 
 OPEN = {"fluid_loading.density": 1.2, "fluid_loading.baffle": 0.0}
 WALL = {"fluid_loading.density": 1.2, "fluid_loading.baffle": 1.0}
@@ -75,9 +74,11 @@ def test_open_strip_carries_a_cylinder_of_air():
     assert masses[1] - masses[0] == pytest.approx(16.0 * np.pi / 4, rel=0.01)
 
 
-@pytest.mark.parametrize("baffle", [0.0, 0.4, 1.0])
-@pytest.mark.parametrize("density", [0.6, 1.2, 6.0])
-@pytest.mark.parametrize("plate", [FIEMME, FINNISH, FREE], ids=["clamped", "cantilever", "free"])
+@pytest.mark.parametrize(
+    ("plate", "density", "baffle"),
+    [(FIEMME, 1.2, 0.4), (FINNISH, 6.0, 0.0), (FREE, 6.0, 1.0)],
+    ids=["clamped", "cantilever", "free"],
+)
 def test_against_the_generator(plate, density, baffle):
     """At five times the density the air weighs more than the plate."""
     parameters = {"fluid_loading.density": density, "fluid_loading.baffle": baffle}
@@ -138,12 +139,6 @@ def test_a_setup_that_states_its_own_fluid_keeps_it():
 def test_people_call_it_air_or_water(density, word):
     density, _ = FluidLoading(MADE, density=Quantity.exact(density)).parameters()
     assert density.words == f"density of the {word} of fluid loading"
-
-
-@pytest.mark.parametrize("card", ["finnish-spruce-cantilever", "spruce-free-2R"])
-def test_reduced_order_model_is_exact(card):
-    problem = posed(card, ["fluid_loading"])
-    assert worst_cents(problem.posterior.models) <= law_tolerance(problem.board)
 
 
 def test_edges_make_the_air():

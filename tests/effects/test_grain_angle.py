@@ -7,7 +7,7 @@ from dataclasses import replace
 import generator.effects
 import numpy as np
 import pytest
-from effect_plates import MADE, SHEAR, hertz, hertz_apart, modes_of, posed, setup_of, shifts, values_of
+from effect_plates import MADE, SHEAR, hertz, hertz_apart, modes_of, setup_of, shifts, values_of
 from generator.known_boards import BEAMS, FINNISH, FREE
 from made_boards import board_of
 
@@ -20,7 +20,6 @@ from bayesplate.effects.grain_angle import GrainAngle
 from bayesplate.effects.transverse_shear import TransverseShear
 from bayesplate.frequencies.system import System
 from bayesplate.plate.naming import find
-from bayesplate.posterior.laplace import law_tolerance, worst_cents
 
 ANGLE = "grain_angle.angle"
 EXACT = [-17.6, 4.9, -8.9, -7.2, 4.5, -6.5]
@@ -28,11 +27,13 @@ FIRST_ORDER = [-4.7, 23.0, -4.6, 12.0, 10.0, 20.0]
 """physics.md 4, at 3 degrees on the cantilever."""
 
 
-@pytest.mark.parametrize("is_sheared", [False, True], ids=["thin", "shear-flexible"])
-@pytest.mark.parametrize("degrees", [3.0, 6.0, 12.0])
-@pytest.mark.parametrize("plate", [FINNISH, FREE], ids=["cantilever", "free"])
-def test_against_the_generator(plate, degrees, is_sheared):
-    angle = np.radians(degrees)
+@pytest.mark.parametrize(
+    ("plate", "is_sheared"),
+    [(FINNISH, True), (FREE, False)],
+    ids=["cantilever, shear-flexible", "free"],
+)
+def test_against_the_generator(plate, is_sheared):
+    angle = np.radians(12.0)
     independent = generator.effects.GrainAngle(angle)
     apart = hertz_apart(plate, [GrainAngle()], {ANGLE: angle}, [independent], 6, is_sheared)
     assert apart == pytest.approx(0.0, abs=0.5)
@@ -78,19 +79,6 @@ def test_the_sign_of_the_angle_is_not_seen():
 def test_a_material_alike_both_ways_has_no_grain():
     isotropic = replace(FINNISH, E_y=FINNISH.E_x, nu_xy=0.3, G_xy=FINNISH.E_x / 2.6)
     assert shifts(isotropic, [GrainAngle()], {ANGLE: 0.5}, BEAMS["cantilever"]) == pytest.approx(0.0, abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("card", "effects"),
-    [
-        ("finnish-spruce-cantilever", ["grain_angle"]),
-        ("spruce-free-2R", ["grain_angle"]),
-        pytest.param("finnish-spruce-cantilever", ["transverse_shear", "grain_angle"], marks=pytest.mark.slow),
-    ],
-)
-def test_reduced_order_model_is_exact(card, effects):
-    problem = posed(card, effects)
-    assert worst_cents(problem.posterior.models) <= law_tolerance(problem.board)
 
 
 CORNER, MIRRORED, MIDDLE = (0.97, 0.91), (0.97, 0.09), (0.97, 0.5)

@@ -17,7 +17,7 @@ EFFECT = SupportMass(MADE)
 
 
 @pytest.mark.parametrize("is_sheared", [False, True], ids=["thin", "shear-flexible"])
-@pytest.mark.parametrize("mass", [30.0, 8.0, 1.0, 0.3])
+@pytest.mark.parametrize("mass", [8.0, 0.3])
 def test_against_the_generator(mass, is_sheared):
     """Down to a frame as heavy as the board."""
     apart = hertz_apart(FIEMME, [EFFECT], {MASS: mass}, [generator.effects.SupportMass(mass)], 9, is_sheared)

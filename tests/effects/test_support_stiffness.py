@@ -20,7 +20,7 @@ STIFFNESS = "support_stiffness.stiffness"
 EFFECT = SupportStiffness(MADE)
 
 
-@pytest.mark.parametrize("stiffness", [2e3, 2e4, 1e6])
+@pytest.mark.parametrize("stiffness", [2e4, 1e6])
 @pytest.mark.parametrize("plate", [FINNISH, FIEMME, FREE], ids=["cantilever", "clamped", "free"])
 def test_adds_k_over_rho_h_to_every_mode(plate, stiffness):
     bare, resting = (modes_of(plate, e, {STIFFNESS: stiffness}, 9).eigenvalues for e in ([], [EFFECT]))
@@ -29,7 +29,7 @@ def test_adds_k_over_rho_h_to_every_mode(plate, stiffness):
 
 
 @pytest.mark.parametrize("is_sheared", [False, True], ids=["thin", "shear-flexible"])
-@pytest.mark.parametrize("stiffness", [3e3, 2e4, 2e5])
+@pytest.mark.parametrize("stiffness", [2e5])
 @pytest.mark.parametrize("plate", [FINNISH, FREE], ids=["cantilever", "free"])
 def test_against_the_generator(plate, stiffness, is_sheared):
     """A free board's rigid motions bounce, at up to 50 Hz here, and are left out as before."""

@@ -8,7 +8,7 @@ import generator.effects
 import numpy as np
 import pytest
 import ritz
-from effect_plates import hertz, hertz_apart, posed, setup_of, shifts, values_of
+from effect_plates import hertz, hertz_apart, setup_of, shifts, values_of
 from generator.known_boards import BEAMS, FIEMME, FINNISH, FREE
 from generator.plate import solve as solve_generator
 from made_boards import board_of
@@ -23,7 +23,7 @@ from bayesplate.effects.thickness_profile import ThicknessProfile
 from bayesplate.frequencies.full import full_log_frequencies
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.system import System
-from bayesplate.posterior.laplace import law_tolerance, worst_cents
+from bayesplate.posterior.laplace import law_tolerance
 from bayesplate.posterior.posing import pose
 
 
@@ -31,10 +31,13 @@ def taper(x, y=0.0):
     return {"thickness_profile.taper_x": x, "thickness_profile.taper_y": y}
 
 
-@pytest.mark.parametrize("is_sheared", [False, True], ids=["thin", "shear-flexible"])
-@pytest.mark.parametrize("tapers", [(0.05, 0.0), (-0.1, 0.06), (0.4, -0.3)])
-@pytest.mark.parametrize("plate", [FINNISH, FIEMME, FREE], ids=["cantilever", "clamped", "free"])
-def test_free_tapers_against_the_generator(plate, tapers, is_sheared):
+@pytest.mark.parametrize(
+    ("plate", "is_sheared"),
+    [(FINNISH, False), (FIEMME, False), (FREE, False), (FREE, True)],
+    ids=["cantilever", "clamped", "free", "free and shear-flexible"],
+)
+def test_free_tapers_against_the_generator(plate, is_sheared):
+    tapers = 0.4, -0.3
     independent = generator.effects.ThicknessProfile(*tapers)
     apart = hertz_apart(plate, [ThicknessProfile()], taper(*tapers), [independent], 6, is_sheared)
     assert apart == pytest.approx(0.0, abs=0.5)
@@ -189,13 +192,6 @@ def test_a_thickness_read_alike_everywhere_is_uniform():
     assert not ThicknessProfile.is_implied(board)
     assert ThicknessProfile.candidates(board, board.setups[0]) == ()
     assert "support no thickness_profile" in ThicknessProfile.notes(replace(board, effects=("thickness_profile",)))[0]
-
-
-@pytest.mark.parametrize("card", ["finnish-spruce-cantilever", "spruce-free-2R"])
-def test_reduced_order_model_is_exact(card):
-    """The second card has readings at places, the first tapers."""
-    problem = posed(card, ["thickness_profile"])
-    assert worst_cents(problem.posterior.models) <= law_tolerance(problem.board)
 
 
 @pytest.fixture(scope="module")

@@ -46,9 +46,16 @@ def test_sizes_on_a_half_top(rises):
     assert found == pytest.approx(SIZES[rises], abs=0.15)
 
 
-@pytest.mark.parametrize("is_sheared", [False, True], ids=["thin", "shear-flexible"])
-@pytest.mark.parametrize("rises", [(2e-3, 0.0, 0.0), (1.0e-3, -3e-3, 0.0), (0.0, 0.0, 8e-3), (1.3e-3, 2e-3, 16e-3)])
-@pytest.mark.parametrize("edges", [None, CANTILEVER, DRIVEN.edges], ids=["free", "cantilever", "clamped"])
+@pytest.mark.parametrize(
+    ("edges", "rises", "is_sheared"),
+    [
+        (None, (1.3e-3, 2e-3, 16e-3), True),
+        (CANTILEVER, (1.3e-3, 2e-3, 16e-3), False),
+        (CANTILEVER, (1.0e-3, -3e-3, 0.0), True),
+        (DRIVEN.edges, (1.3e-3, 2e-3, 16e-3), False),
+    ],
+    ids=["free, shear-flexible", "cantilever", "cantilever without a twist, shear-flexible", "clamped"],
+)
 def test_against_the_generator(edges, rises, is_sheared):
     """Half a cent: the production meshes are within 0.15 to 0.3 cents of converged (`bayesplate.plate.mesh`)."""
     plate = HALF_TOP if edges is None else replace(HALF_TOP, edges=edges)

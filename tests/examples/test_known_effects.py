@@ -56,6 +56,7 @@ def test_it_writes_its_table(example, tmp_path, monkeypatch, capsys):
     assert rows[2] == [first, "with fluid loading and attached mass", "42.75", "94.0", "1.25", "-2.5", "0.0"]
 
 
+@pytest.mark.slow
 def test_on_a_measured_board_the_air_raises_the_error(example):
     """The paper's clamped board: computed air alone makes it worse, as the reference figures of another program do."""
     ((name, models),) = example.known_effects(["fiemme-spruce-clamped"]).items()

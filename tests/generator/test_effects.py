@@ -22,7 +22,6 @@ from generator.effects import (
     OutlineProfile,
     PoissonRatio,
     StiffnessGradient,
-    SupportMass,
     SupportStiffness,
     ThicknessProfile,
     TransverseShear,
@@ -31,7 +30,6 @@ from generator.known_boards import BEAMS, FIEMME, FINNISH, FREE, cents, field
 from generator.naming import frequencies
 from generator.outside import Crack, Rib
 from generator.plate import EDGES, Plate, matrices, solve
-from generator.spring import Spring
 
 ALL_SUPPORTED = dict.fromkeys(EDGES, "supported")
 FREE_FINNISH = replace(FINNISH, edges=ALL_FREE)
@@ -78,16 +76,6 @@ def test_sizes_on_the_papers_boards(plate: Plate, effect: NoEffect, sizes: list[
         assert size is None or shift == pytest.approx(size, rel=0.15, abs=1.0)
 
 
-def test_sinking_frame_of_the_clamped_board() -> None:
-    """k_T L^3 / D = 1e4 with the D and L of each edge: -22 to -111 cents."""
-    scaled = {"x": 1e4 * FIEMME.D_x / FIEMME.L_x**3, "y": 1e4 * FIEMME.D_y / FIEMME.L_y**3}
-    sinking = replace(FIEMME, springs={edge: Spring(translation=scaled[edge[0]]) for edge in EDGES})
-    bare, found = (frequencies(plate, (), BEAMS["clamped"])[0] for plate in (FIEMME, sinking))
-    shifts = [1200.0 * np.log2(found[mode] / bare[mode]) for mode in BEAMS["clamped"]]
-
-    assert (max(shifts), min(shifts)) == (pytest.approx(-22.0, abs=1.0), pytest.approx(-111.0, abs=1.0))
-
-
 def test_mass_at_the_end_of_a_free_beam() -> None:
     """The transcendental equation, and for a tiny mass the first order: -4 m / M of omega^2."""
     beam = Plate(10e9, 10e9, 5e9, 0.0, 500.0, 2e-3, 0.3, 0.01, ALL_FREE)
@@ -109,21 +97,6 @@ def test_mass_at_the_end_of_a_free_beam() -> None:
         root = scipy.optimize.brentq(tip, 3.5, 4.74, args=(ratio,))
         assert square(ratio) / bare == pytest.approx((root / 4.7300407) ** 4, rel=1e-4)
     assert square(1e-4) / bare - 1.0 == pytest.approx(-4e-4, rel=2e-3)
-
-
-def test_mass_at_two_modes() -> None:
-    """Held to two modes of the plate, the exact pencil of two: the full answer lies just below it."""
-    mass = AttachedMass(0.2e-3, ((0.2, 0.1),))
-    modes = solve(FINNISH, (), 2)
-    moved = (modes.basis.deflection(np.array([0.2]), np.array([0.1])) @ modes.vectors)[0]
-    squares = scipy.linalg.eigh(
-        np.diag(modes.frequencies**2), np.eye(2) + mass.mass * np.outer(moved, moved), eigvals_only=True
-    )
-    drop = solve(FINNISH, [mass], 2).frequencies / modes.frequencies - 1.0
-    of_two = np.sqrt(squares) / modes.frequencies - 1.0
-
-    assert drop == pytest.approx(of_two, rel=0.03)
-    assert np.all(drop < of_two)
 
 
 def test_roving_mass_averages_the_frequencies_and_turns() -> None:
@@ -148,22 +121,6 @@ def test_tension_and_foundation_on_a_supported_plate() -> None:
         assert (2.0 * np.pi) ** 2 * (tight[m, n] ** 2 - bare[m, n] ** 2) == pytest.approx(added, rel=1e-6)
 
 
-def test_frame_on_a_soft_mount_is_one_more_free_mass() -> None:
-    """The same with the frame's own coordinate kept, and the two-mass estimate on the fundamental."""
-    frame = 8.0
-    modes = solve(FIEMME, (), 30)
-    x, y, weights = modes.basis.points
-    volume = FIEMME.rho * FIEMME.h * (weights @ modes.basis.deflection(x, y)) @ modes.vectors
-    total = frame + FIEMME.rho * FIEMME.h * FIEMME.L_x * FIEMME.L_y
-    mass = np.block([[np.eye(30), volume[:, None]], [volume[None, :], np.array([[total]])]])
-    squares = scipy.linalg.eigh(np.diag([*modes.frequencies**2, 0.0]), mass, eigvals_only=True)
-    shift = cents(FIEMME, [SupportMass(frame)], BEAMS["clamped"])
-
-    assert solve(FIEMME, [SupportMass(frame)], 6).frequencies == pytest.approx(np.sqrt(squares[1:7]), rel=1e-5)
-    assert shift[0] == pytest.approx(600.0 / np.log(2.0) * volume[0] ** 2 / total, rel=0.03)
-    assert shift[[1, 2, 3, 5]] == pytest.approx(0.0, abs=1e-3)
-
-
 def test_profiles_on_fields_integrated_by_hand() -> None:
     """w = x^2 / 2 bends along x by one everywhere; w = 1 only weighs."""
     L_x, area, D_x = FINNISH.L_x, FINNISH.L_x * FINNISH.L_y, FINNISH.D_x
@@ -184,14 +141,6 @@ def test_profiles_on_fields_integrated_by_hand() -> None:
     assert bent == pytest.approx(no_poisson.D_x * FINNISH.L_y * L_x**3 * (1.0 / 3.0 + 0.2 * (0.25 - 1.0 / 6.0)))
 
 
-def test_profiles_of_the_whole_board_reach_under_the_clamp() -> None:
-    short = replace(FREE_FINNISH, covered=0.03, whole=0.253)
-    _, weight = energy(short, lambda x, y: np.ones_like(x), DensityGradient(0.1))
-    mean = 1.0 + 0.1 * ((0.03 + 0.5 * 0.223) / 0.253 - 0.5)
-
-    assert weight == pytest.approx(mean * short.rho * short.h * short.L_x * short.L_y)
-
-
 def test_outlines() -> None:
     """A narrower rectangle inside a wider basis is the narrower plate; a trapezium weighs what it should."""
     narrow = replace(FREE, L_y=0.95 * FREE.L_y)
@@ -205,22 +154,6 @@ def test_outlines() -> None:
     assert weight == pytest.approx(FREE.rho * FREE.h * area)
     with pytest.raises(ValueError, match="wanted y0 and y1 free"):
         trapezium.changed(FIEMME)
-
-
-def test_a_quarter_turn_of_the_grain_exchanges_the_stiffnesses() -> None:
-    bent = {angle: energy(FREE_FINNISH, lambda x, y: 0.5 * x**2, GrainAngle(angle))[0] for angle in (0.0, 0.5 * np.pi)}
-
-    assert bent[0.0] / bent[0.5 * np.pi] == pytest.approx(FINNISH.E_x / FINNISH.E_y)
-
-
-def test_a_clamped_plate_sees_only_the_sum_of_twist_and_poisson() -> None:
-    """D_x and D_y kept, D_s + 2 nu_xy D_y kept: every frequency is the same."""
-    other = replace(FIEMME, nu_xy=0.3)
-    ratio = (1.0 - other.nu_xy**2 * FIEMME.E_y / FIEMME.E_x) / (1.0 - FIEMME.nu_xy**2 * FIEMME.E_y / FIEMME.E_x)
-    other = replace(other, E_x=FIEMME.E_x * ratio, E_y=FIEMME.E_y * ratio)
-    other = replace(other, G_xy=FIEMME.G_xy + 0.5 * FIEMME.in_plane[1, 1] * (FIEMME.nu_xy - other.nu_xy))
-
-    assert solve(other, (), 8).frequencies == pytest.approx(solve(FIEMME, (), 8).frequencies, rel=1e-9)
 
 
 def test_what_lies_outside_the_library() -> None:

@@ -77,21 +77,6 @@ def test_supported_shear_flexible_plate_is_the_closed_form() -> None:
     assert hertz(plate) == pytest.approx(np.sqrt(np.sort(squares)[:8]) / (2.0 * np.pi), rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("plate", "printed"),
-    [
-        (FINNISH, [51.24, 99.87, 315.08, 335.59, 394.40, 629.69]),
-        (FIEMME, [56.20, 97.91, 130.35, 161.47, 168.88, 221.53]),
-    ],
-    ids=["cantilever", "clamped"],
-)
-def test_shear_flexible_plates_reach_the_converged_finite_elements(plate: Plate, printed: list[float]) -> None:
-    """Two other elements gave these numbers; 0.4 cents is their own remaining error in the highest mode."""
-    found = np.sort(hertz(replace(plate, shear=SHEAR), 6))
-
-    assert 1200.0 * np.log2(found / printed) == pytest.approx(0.0, abs=0.4)
-
-
 @pytest.mark.parametrize("plate", [FINNISH, FIEMME, FREE], ids=["cantilever", "clamped", "free"])
 def test_shear_flexible_plate_does_not_lock(plate: Plate) -> None:
     """Very stiff in shear it is thin, but for its rotary inertia, known to first order from the thin modes."""
@@ -104,24 +89,6 @@ def test_shear_flexible_plate_does_not_lock(plate: Plate) -> None:
     shift = 1200.0 * np.log2(stiff.frequencies[elastic] / thin.frequencies[elastic])
 
     assert shift == pytest.approx(-600.0 / np.log(2.0) * rotary[elastic], abs=0.15)
-
-
-@pytest.mark.parametrize("shear", [None, SHEAR], ids=["thin", "shear-flexible"])
-@pytest.mark.parametrize("plate", [FINNISH, FREE], ids=["cantilever", "free"])
-def test_turning_the_board_by_a_right_angle_changes_nothing(plate: Plate, shear: tuple[float, float] | None) -> None:
-    """Sides and edges exchanged, and the grain turned by 90 degrees."""
-    plate = replace(plate, shear=shear)
-    turned = replace(
-        plate,
-        L_x=plate.L_y,
-        L_y=plate.L_x,
-        edges={edge: plate.edges[other] for edge, other in zip(EDGES, ("y0", "y1", "x0", "x1"), strict=True)},
-        grain=0.5 * np.pi,
-    )
-    counts = None if shear is None else (18, 18)
-    found, expected = (solve(p, n_modes=9, n=counts).frequencies[3:] for p in (turned, plate))
-
-    assert 1200.0 * np.log2(found / expected) == pytest.approx(0.0, abs=0.02)
 
 
 def test_turned_stiffness_keeps_the_invariants_and_the_sign_of_the_angle() -> None:
@@ -151,22 +118,9 @@ class TestSprings:
         stiff = self.released(shear, rotation=1e7, translation=1e12)[:8]
         assert 1200.0 * np.log2(stiff / clamped) == pytest.approx(0.0, abs=tolerance)
 
-    def test_without_resistance_to_rotation_an_edge_is_supported(self, shear: tuple[float, float] | None) -> None:
-        supported = hertz(replace(FIEMME, shear=shear, edges=ALL_SUPPORTED))
-
-        assert self.released(shear, rotation=0.0)[:8] == pytest.approx(supported, rel=1e-8)
-
     def test_without_any_resistance_it_is_free(self, shear: tuple[float, float] | None) -> None:
         free = hertz(replace(FIEMME, shear=shear, edges=ALL_FREE))
         found = self.released(shear, rotation=0.0, translation=0.0)
 
         assert found[:3] == pytest.approx(0.0, abs=1e-2)
         assert found[3:11] == pytest.approx(free, rel=1e-6)
-
-    def test_rotation_stays_held_when_the_edge_gives_way(self, shear: tuple[float, float] | None) -> None:
-        """Guided all round the modes are products of cosines: supported edges, counted from zero half waves."""
-        found = self.released(shear, translation=0.0)[:3]
-        first = np.array([FIEMME.D_y / FIEMME.L_y**4, FIEMME.D_x / FIEMME.L_x**4]) / (FIEMME.rho * FIEMME.h)
-
-        assert found[0] == pytest.approx(0.0, abs=0.05)
-        assert found[1:] == pytest.approx(0.5 * np.pi * np.sqrt(first), rel=1e-5 if shear is None else 2e-3)

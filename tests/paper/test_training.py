@@ -67,12 +67,11 @@ def assert_printed(mode, printed):
     assert abs(mode.b - printed[1]) * MIDDLE[1] < 0.002 * plane(mode) @ MIDDLE
 
 
-@pytest.mark.parametrize("label", [label for label in CANTILEVER_TABLE if label not in VEERING], ids=str)
-def test_cantilever_coefficients_are_the_printed_ones(cantilever, label):
-    mode = cantilever.modes[beams(label)]
-
-    assert_printed(mode, CANTILEVER_TABLE[label])
-    assert mode.n_plates == 25
+def test_cantilever_coefficients_are_the_printed_ones(cantilever):
+    for label in CANTILEVER_TABLE.keys() - VEERING:
+        mode = cantilever.modes[beams(label)]
+        assert_printed(mode, CANTILEVER_TABLE[label])
+        assert mode.n_plates == 25
 
 
 @pytest.mark.parametrize("label", VEERING, ids=str)
@@ -96,12 +95,11 @@ def test_thin_plates_do_not_give_the_cantilever_table(thin_cantilever):
     assert mode.b / CANTILEVER_TABLE[2, 2][1] == pytest.approx(1.14, abs=0.01)
 
 
-@pytest.mark.parametrize("label", CLAMPED_TABLE, ids=str)
-def test_clamped_coefficients_are_the_printed_ones(clamped, label):
-    mode = clamped.modes[label]
-
-    assert (mode.a, mode.b) == pytest.approx(CLAMPED_TABLE[label][:2], rel=0.01)
-    assert mode.c == pytest.approx(CLAMPED_TABLE[label][2], rel=0.035)
+def test_clamped_coefficients_are_the_printed_ones(clamped):
+    for label, (a, b, c) in CLAMPED_TABLE.items():
+        mode = clamped.modes[label]
+        assert (mode.a, mode.b) == pytest.approx((a, b), rel=0.01), label
+        assert mode.c == pytest.approx(c, rel=0.035), label
 
 
 def test_clamped_training_agrees_with_the_energy_shares_of_one_solve(clamped):

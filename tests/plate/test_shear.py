@@ -170,7 +170,7 @@ def test_rigid_motions_are_left_out_and_nothing_else(support, n_rigid, slenderne
     np.testing.assert_allclose(found.eigenvalues, expected[n_rigid:][:5], rtol=1e-6)
 
 
-@pytest.mark.parametrize("slenderness", [10, 20, 50, 200, 2000])
+@pytest.mark.parametrize("slenderness", [10, 2000])
 @pytest.mark.parametrize(
     ("board", "shear_moduli"), [(ISOTROPIC, G_ISOTROPIC), (ritz.FREE_SPRUCE, G_SPRUCE)], ids=["isotropic", "spruce"]
 )

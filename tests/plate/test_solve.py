@@ -83,15 +83,14 @@ def test_supported_orthotropic_plate_has_the_exact_spectrum(board):
     meets("V10", "closed form, supported all round, 12 modes", cents(frequencies, exact), at_most=0.346, unit="cents")
 
 
-@pytest.mark.parametrize("is_swapped", [False, True], ids=["", "swapped"])
 @pytest.mark.parametrize("support", SUPPORTS)
 @pytest.mark.parametrize("board_name", BOARDS)
-def test_twelve_modes_agree_with_ritz_on_the_production_mesh(board_name, support, is_swapped):
-    """First mode within 0.01 %, twelve within 0.02 % (a third of a cent), whichever way the board lies."""
+def test_twelve_modes_agree_with_ritz_on_the_production_mesh(board_name, support):
+    """First mode within 0.01 %, twelve within 0.02 % (a third of a cent)."""
     board = replace(BOARDS[board_name], edges=SUPPORTS[support])
     expected = reference(board_name, support)
 
-    frequencies = hertz(board.swapped if is_swapped else board, 12)
+    frequencies = hertz(board, 12)
 
     assert frequencies[0] == pytest.approx(expected[0], rel=1e-4)
     meets("V10", "Ritz in Legendre polynomials, 12 modes", cents(frequencies, expected), at_most=0.346, unit="cents")
@@ -162,20 +161,17 @@ def test_energies_sum_to_the_eigenvalue(board):
     np.testing.assert_allclose(modes.mass_coefficients[:, 0], 1.0, rtol=1e-8)
 
 
-@pytest.mark.parametrize("board", [ritz.FINNISH, ritz.FIEMME, ritz.FREE_SPRUCE], ids=["cantilever", "clamped", "free"])
-@pytest.mark.parametrize("term", range(4))
-def test_energies_are_the_slopes_of_the_eigenvalues(board, term):
+@pytest.mark.parametrize("board", [ritz.FINNISH, ritz.FREE_SPRUCE], ids=["cantilever", "free"])
+def test_energies_are_the_slopes_of_the_eigenvalues(board):
     """Against exact solves on both sides; the step is small beside the gaps, the rest is of second order in it."""
     weights, plate = weights_of(board), thin_plate(*board.ends, 12, 12)
-    step = 1e-4 * np.eye(4)[term] * weights.stiffness
-
     modes = solve(plate, weights, 6)
-    above, below = (
-        solve(plate, weights._replace(stiffness=weights.stiffness + s), 6).eigenvalues for s in (step, -step)
-    )
-
-    slopes = modes.coefficients[:, term] * 2.0 * step[term]
-    np.testing.assert_allclose(above - below, slopes, atol=1e-4 * np.abs(slopes).max())
+    for term, step in enumerate(1e-4 * np.diag(weights.stiffness)):
+        above, below = (
+            solve(plate, weights._replace(stiffness=weights.stiffness + s), 6).eigenvalues for s in (step, -step)
+        )
+        slopes = modes.coefficients[:, term] * 2.0 * step[term]
+        np.testing.assert_allclose(above - below, slopes, atol=1e-4 * np.abs(slopes).max())
 
 
 @pytest.mark.parametrize("support", SUPPORTS)

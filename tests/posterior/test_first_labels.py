@@ -40,7 +40,7 @@ TRUE = {round(hertz, 3): label for label, hertz in HERTZ.items()}
 ALL = [*HERTZ.values()]
 
 
-@pytest.mark.parametrize("n_labelled", [4, 2, 0])
+@pytest.mark.parametrize("n_labelled", [4, 0])
 def test_peaks_get_the_labels_of_their_modes(n_labelled):
     labelled = LABELS[:n_labelled]
     rest = [hertz for label, hertz in HERTZ.items() if label not in labelled]

@@ -82,7 +82,7 @@ def test_control_exchanged_rigidities_differ(known):
     assert found_differences(inference, mean, covariance, inference.chains.pooled[:, [1, 0, 2]])
 
 
-@pytest.mark.parametrize("mode", range(6))
+@pytest.mark.parametrize("mode", [0, 3, 5])
 def test_control_a_posterior_without_one_mode_differs(known, mode):
     inference, data, *_ = known
     scales = np.full(6, NOISE)
@@ -90,7 +90,7 @@ def test_control_a_posterior_without_one_mode_differs(known, mode):
     assert found_differences(inference, *closed_form(data, scales))
 
 
-@pytest.fixture(scope="module", params=[1, 2, 3])
+@pytest.fixture(scope="module", params=[1])
 def unknown(request):
     """Draws of a problem of unknown noise, and its closed form: Student's marginals."""
     problem, truth = unknown_noise(request.param)
@@ -118,6 +118,7 @@ def test_control_a_normal_posterior_of_the_same_width_is_not_student_s(unknown):
     assert differences(draws, np.full(4, 1e5), truth)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3])
 def test_other_normal_posteriors_are_recovered(seed):
     board, law, _, mean, covariance = conjugate(seed)

@@ -16,7 +16,7 @@ from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.posterior import slips
 from bayesplate.posterior.posing import PosedProblem, pose
-from bayesplate.posterior.slips import LARGE_NOISE, RARITY, Readings, noise_remarks, reading_remarks
+from bayesplate.posterior.slips import LARGE_NOISE, RARITY, Readings, Slip, noise_remarks, reading_remarks
 
 PLATE = ritz.Plate.from_moduli(11e9, 0.95e9, 0.67e9, 0.4, rho=406.0, h=2.8e-3, L_x=0.55, L_y=0.2, edges=ritz.ALL_FREE)
 NOISE = 0.003
@@ -48,7 +48,6 @@ def told(problem: PosedProblem) -> str:
 
 CASES = {
     "an octave": ({(2, 1): 2 * HERTZ[2, 1]}, "(2,1)", "1200 cents above", "an octave, or another mode?"),
-    "a decimal place": ({(2, 1): 0.1 * HERTZ[2, 1]}, "(2,1)", "3986 cents below", "a decimal place, or another mode?"),
     "a stray": ({(3, 1): 1.25 * HERTZ[3, 1]}, "(3,1)", "386 cents above", "misread, or another mode?"),
 }
 
@@ -67,6 +66,14 @@ def test_one_wrong_reading_is_named_with_what_the_others_expect(case):
     assert f"{stated} cents {direction}" in sentence
     assert sentence.endswith("--robust gives it less say")
     assert "do not trust the constants" in found
+
+
+@pytest.mark.parametrize(("factor", "kind"), [(10.0, "a decimal place"), (0.5, "an octave"), (1.0, "misread")])
+def test_what_a_factor_may_be_is_asked(factor, kind):
+    readings = Readings(as_read().posterior, as_read().centre)
+    sentence = slips._stray(readings, Slip((0,), factor, 9.0, np.log(1.25)))
+    assert "386 cents above" in sentence
+    assert f": {kind}, or another mode?" in sentence
 
 
 def exchanged(one: tuple[int, int], other: tuple[int, int]) -> dict:
@@ -128,7 +135,7 @@ def test_a_reading_is_told_from_the_stated_rarity_on(monkeypatch):
     assert Readings(problem.posterior, problem.centre).likeliest() is None
 
 
-@pytest.mark.parametrize("seed", [2, 6])
+@pytest.mark.parametrize("seed", [2])
 def test_what_an_effect_may_do_to_all_readings_is_no_slip_however_well_the_noise_is_known(seed, monkeypatch):
     """Every reading 1.5 % off, a noise of 0.3 % known to 5 %: were that believed, one reading would be blamed."""
     off = np.exp(0.015 * np.random.default_rng(seed).standard_normal(len(HERTZ)))

@@ -10,10 +10,10 @@ import made_boards
 import numpy as np
 import pytest
 import ritz
-from calibration.sbc import random_lines
-from calibration.truths import Design, draw_truth, make_problem
 from scipy import stats
 from scipy.optimize import minimize
+from validation.calibration.sbc import random_lines
+from validation.calibration.truths import Design, draw_truth, make_problem
 
 from bayesplate.board.prior import load_prior
 from bayesplate.frequencies.laws import LawName
@@ -77,7 +77,7 @@ def test_beside_the_veering_it_is_sure():
 
 
 @pytest.mark.parametrize(
-    ("label", "factor", "left_out"), [((2, 1), 2.0, ()), ((2, 1), 10.0, (SECOND,)), ((3, 0), 1.25, ())]
+    ("label", "factor", "left_out"), [((2, 1), 2.0, ()), pytest.param((2, 1), 10.0, (SECOND,), marks=pytest.mark.slow)]
 )
 def test_a_misread_frequency_puts_no_label_in_doubt(label, factor, left_out):
     """It makes the estimate wrong, and the plates that look plausible with it; what is misread is told instead."""
@@ -107,7 +107,7 @@ def test_a_truth_on_the_other_side_of_the_veering_is_as_likely_as_it_should_be(m
             lambda x: -float(problem.posterior(x[None])[0]),
             problem.centre,
             method="Nelder-Mead",
-            options={"maxfev": 300},  # what it leaves to be found makes no distance larger
+            options={"maxfev": 150},  # what it leaves to be found makes no distance larger
         )
         return 2.0 * (max(-best.fun, at_truth) - at_truth)
 

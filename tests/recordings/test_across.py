@@ -62,7 +62,7 @@ def likely_of(found: Picked) -> np.ndarray:
     return np.array([mode.frequency for mode in found.likely if mode.frequency < 0.98 * HIGHEST])
 
 
-@pytest.mark.parametrize(("shift", "damping"), [(1.0012, 1.0), (1.004, 1.0), (0.991, 1.0), (1.0, 1.15), (1.002, 0.7)])
+@pytest.mark.parametrize(("shift", "damping"), [(1.0012, 1.0), (0.991, 1.0), (1.0, 1.15)])
 def test_two_recordings_that_differ_give_each_mode_once(shift, damping):
     """Laid down anew, or held otherwise: the mean, and half the difference as its error."""
     rng = np.random.default_rng(11)

@@ -102,7 +102,7 @@ def read_wav_file(data: bytes, options: dict[str, Any]) -> None:
 
 
 WAVS = st.one_of(st.binary(max_size=120), headers(), spliced(SOUND_WAV, WORDS, 60), spliced(SOUND_WAV, WORDS, 6000))
-test_wav, test_wav_at_length = fuzzed(read_wav_file, 250, data=WAVS, options=OPTIONS)
+test_wav, test_wav_at_length = fuzzed(read_wav_file, 80, data=WAVS, options=OPTIONS)
 
 NUMBERS = ["0", "1", "-1", "0.5", "1e308", "-1e308", "1e-320", "nan", "inf", "-inf", "1e999", "0x1", "1_0", "١", ""]
 NAMES = ["time", "t", "force", "Force", "acceleration", "velocity", "sound", "f_hz", "re", "im", "coherence", "x", ""]
@@ -151,7 +151,7 @@ def read_csv_file(data: bytes, options: dict[str, Any]) -> None:
 
 
 TABLES = st.one_of(st.binary(max_size=80), tables(), small_tables())
-test_csv, test_csv_at_length = fuzzed(read_csv_file, 250, data=TABLES, options=OPTIONS)
+test_csv, test_csv_at_length = fuzzed(read_csv_file, 80, data=TABLES, options=OPTIONS)
 
 
 def flac() -> bytes:
@@ -191,7 +191,7 @@ def read_other_file(ending: str, cut: int, put: list[tuple[int, bytes]], options
 PUT = st.lists(st.tuples(st.integers(0, 700), st.binary(min_size=1, max_size=6)), max_size=3)
 test_extras, test_extras_at_length = fuzzed(
     read_other_file,
-    80,
+    40,
     ending=st.sampled_from([".flac", ".uff", ".unv"]),
     cut=st.sampled_from([0, 1, 10, 50, 90, 100, 100, 100]),
     put=PUT,

@@ -49,8 +49,7 @@ LINES = {
 }
 
 
-@pytest.mark.parametrize("decibels", [45.0, 75.0], ids=["a room", "a quiet room"])
-@pytest.mark.parametrize("name", LINES)
+@pytest.mark.parametrize(("name", "decibels"), [*((name, 45.0) for name in LINES), ("a faint tone", 75.0)])
 def test_a_steady_tone_takes_no_mode_with_it_and_is_named(name, decibels):
     added, kind = LINES[name]
     found = picked(added, decibels)

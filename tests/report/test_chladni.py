@@ -86,8 +86,8 @@ def test_edges_are_drawn_as_they_are_held():
     assert panel.patches[0].get_x() < 0
 
 
-@pytest.mark.parametrize("aspect_ratio", [0.2, 0.36, 1.0, 1.5, 1.96, 2.7, 6.0])
-@pytest.mark.parametrize("n_modes", [12, 20])
+@pytest.mark.parametrize("aspect_ratio", [0.2, 1.0, 6.0])
+@pytest.mark.parametrize("n_modes", [20])
 def test_nothing_overlaps_or_leaves_the_page(aspect_ratio, n_modes):
     figure = chladni_sheet(made(aspect_ratio, "A long title of a board that somebody wrote " * 3, n_modes=n_modes))
     figure.draw_without_rendering()

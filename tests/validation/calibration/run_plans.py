@@ -1,0 +1,160 @@
+"""Calibrate plans: `python tests/validation/calibration/run_plans.py --boards 200 --out results/plans.jsonl`.
+
+Prints how often the first proposal of a plan settles which of two explanations is true, beside a random proposal, a
+random line of the plan and the next modes up, and whether expected gains are realised. Exit code 0: every bar met; 1:
+some are missed, and stay there as missed; 2: usage. A run that was interrupted goes on where it stopped if it is given
+the same file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # one board a core; before numpy is imported
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from validation.calibration.plans import (
+    ASKED,
+    CHOSEN,
+    NEXT,
+    NOISE_CENTS,
+    WAYS,
+    Settings,
+    bars,
+    calibration,
+    foremost,
+    is_group,
+    judged,
+    settled,
+    shares,
+    simulate_one,
+    wrongly,
+)
+from validation.calibration.records import Record, add_to, publish, read_done
+
+from bayesplate.diagnosis.verdict import WITHIN
+
+SEED = 2
+"""Boards of seed 1 were looked at while the trial was written."""
+ABOUT = (
+    "Boards whose readings leave two explanations, two effects or an effect and none; each is measured further, in one "
+    f"of four ways. Settled: the true explanation is then at least {WITHIN:g} times as probable as the other; wrongly: "
+    "the false one is. Min: mean minutes that it takes, by the plan's own costs. Boards passed over left more "
+    "explanations than two, or fewer, or not the true one, or had a label in doubt. The doubt is the entropy of the "
+    "probabilities of the two."
+)
+_WORDS = {
+    "first": "the plan's first proposal",
+    "random": "a random proposal",
+    "listed": "a random line of the plan",
+    "next": f"the next {NEXT} modes up",
+}
+
+
+def run(settings: Settings, n_boards: int, workers: int, out: Path, *, quiet: bool = False) -> list[Record]:
+    """Do what is not done yet, and return the records of all boards asked for, in their order."""
+    asked = {design: list(effects) for design, effects in ASKED.items()}
+    identity = {
+        "format": 6, "settings": asdict(settings), "designs": list(CHOSEN), "asked": asked, "noise_cents": NOISE_CENTS,
+    }  # fmt: skip
+    records = read_done(out, identity)
+    done = {record["simulation"] for record in records}
+    jobs = [(settings, i) for i in range(n_boards) if i not in done]
+    records += add_to(out, simulate_one, jobs, workers, quiet=quiet)
+    return sorted((one for one in records if one["simulation"] < n_boards), key=lambda one: one["simulation"])
+
+
+def told(records: Sequence[Record]) -> list[str]:
+    """What came out, line by line."""
+    every = judged(records)
+    silent = [record for record in records if "silent" in record]
+    failed = [record for record in records if "error" in record]
+    passed_over = sum(one["boards"] for one in every) - len(every)
+    stated, true = foremost(records)
+    lines = [
+        f"{len(every)} boards with two surviving explanations, {passed_over} passed over, {len(failed)} failed; of "
+        f"{len(silent)} more the plan says that nothing would help",
+        f"before: the more probable explanation is the true one on {100 * true:.0f} % of the boards, stated "
+        f"{100 * stated:.0f} %",
+        "",
+    ]
+    kinds = {
+        "all": every,
+        "two effects": [one for one in every if is_group(one)],
+        "an effect or none": [one for one in every if not is_group(one)],
+    }
+    for words, some in kinds.items():
+        if not some:
+            continue
+        lines.append(f"{f'{words}, {len(some)} boards':36s}  settled  wrongly  min")
+        for way in WAYS:
+            n, false = sum(settled(one, way) for one in some), sum(wrongly(one, way) for one in some)
+            minutes = sum(one[way]["cost"] for one in some) / len(some)
+            share = 100.0 * n / len(some)
+            lines.append(f"  {_WORDS[way]:34s} {share:6.1f} % {100.0 * false / len(some):6.1f} % {minutes:4.0f}")
+        lines.append("")
+    lines += ["what the plan puts first: " + _counted(every, "first"), ""]
+    lines += ["drop of the doubt, share of the entropy: first and random proposals and lines", "  expected  realised"]
+    lines += [f"  {row['expected']:8.3f}  {row['realised']:8.3f} +- {row['sd']:.3f}  n = {row['n']}"
+              for row in calibration(records)]  # fmt: skip
+    lines += ["", *(f"{'met   ' if met else 'MISSED'} {bar}" for bar, met in bars(records).items())]
+    return [*lines, "first error: " + failed[0]["error"][:200]] if failed else lines
+
+
+def _counted(records: Sequence[Record], way: str) -> str:
+    counts = Counter(one[way]["what"] for one in records)
+    return ", ".join(f"{what} {n}" for what, n in counts.most_common())
+
+
+def draw(records: Sequence[Record], path: Path) -> None:
+    """The calibration plot: realised against expected drop, and the share that each way settles."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.2, 3.2), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    rows = calibration(records)
+    left.plot([0, 1], [0, 1], color="0.6", lw=1)
+    left.errorbar(
+        [row["expected"] for row in rows], [row["realised"] for row in rows], [2 * row["sd"] for row in rows],
+        fmt="o", color="#0072B2", capsize=3,
+    )  # fmt: skip
+    left.set(xlabel="expected drop of the doubt", ylabel="realised drop", xlim=(0, 1), ylim=(-0.1, 1.05))
+    left.set_title("Expected and realised, two standard errors", fontsize=9)
+    found = shares(records)
+    colours = ["#0072B2", "0.7", "0.5", "#E69F00"]
+    right.barh(range(len(WAYS)), [100 * found[way] for way in WAYS], color=colours)
+    right.set_yticks(range(len(WAYS)), [_WORDS[way] for way in WAYS], fontsize=8)
+    right.invert_yaxis()
+    right.set(xlabel="boards settled, %", xlim=(0, 100))
+    right.set_title("Which explanation is true, settled", fontsize=9)
+    figure.savefig(path, dpi=150, metadata={"Software": None})
+
+
+def main() -> int:
+    """Run the command."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--boards", type=int, default=200)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--out", type=Path, required=True, help="JSON lines; gone on with if it exists")
+    parser.add_argument("--base-seed", type=int, default=SEED)
+    parser.add_argument("--publish", type=Path, help="folder of the page")
+    options = parser.parse_args()
+    records = run(Settings(options.base_seed), options.boards, options.workers, options.out)
+    lines = told(records)
+    print("\n".join(lines))
+    if options.publish is not None:
+        publish(options.publish, "plans", "Plans, calibrated", "make plans", lines, ABOUT)
+        draw(records, options.publish / "plans.png")
+        with (options.publish / "plans.md").open("a", encoding="utf-8") as page:
+            page.write("\n![Realised against expected drop of the doubt, and boards settled](plans.png)\n")
+    return 0 if all(bars(records).values()) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
