@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+_SINGULAR = 1e-13
+"""Share of the largest eigenvalue of a mass, below which the least is rounding: positive or not, it has no factor."""
+
 
 def pencil_values(stiffness: Floats, mass: Floats) -> Floats:
     """All eigenvalues of pencils of (n, r, r) arrays, increasing: (n, r); not numbers where no mass is positive."""
@@ -33,7 +36,8 @@ def _whitened(stiffness: Floats, mass: Floats) -> tuple[Floats, NDArray[np.bool_
     try:
         factors = np.linalg.cholesky(np.where(is_mass[:, None, None], mass, one))
     except np.linalg.LinAlgError:
-        is_mass &= np.linalg.eigvalsh(np.where(is_mass[:, None, None], mass, one))[:, 0] > 0.0
+        values = np.linalg.eigvalsh(np.where(is_mass[:, None, None], mass, one))
+        is_mass &= values[:, 0] > _SINGULAR * values[:, -1]
         factors = np.linalg.cholesky(np.where(is_mass[:, None, None], mass, one))
     inverse = np.linalg.inv(factors)
     with np.errstate(over="ignore", invalid="ignore"):

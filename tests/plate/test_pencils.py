@@ -76,6 +76,19 @@ def test_no_positive_mass_is_no_number_and_the_other_draws_stay(function):
     np.testing.assert_allclose(found[[0, 2, 4]], expected[[0, 2, 4]], rtol=1e-12, atol=1e-12)
 
 
+def test_a_mass_that_is_singular_but_for_rounding_is_no_number():
+    """Of its least eigenvalue rounding decides whether it is positive, and otherwise whether there is a factor."""
+    rng = np.random.default_rng(0)
+    turned = np.linalg.qr(rng.standard_normal((2000, 6, 6)))[0]
+    mass = (turned * np.r_[1e-16, np.ones(5)]) @ np.swapaxes(turned, 1, 2)
+    mass[0] = np.eye(6)
+
+    found = pencil_values(np.broadcast_to(np.eye(6), mass.shape), mass)
+
+    np.testing.assert_allclose(found[0], 1.0)
+    assert np.isnan(found[1:]).all()
+
+
 @pytest.mark.parametrize("nothing", [np.nan, np.inf])
 @pytest.mark.parametrize("n_kept", [N_KEPT, R])
 @pytest.mark.parametrize("spoilt", [0, 1], ids=["stiffness", "mass"])
