@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from bayesplate.commands.arguments import checked
 from bayesplate.commands.fragment import fragment_text
 from bayesplate.commands.options import FilePath, Force
+from bayesplate.commands.pick_labels import Labels, label_peaks, pictures_of, upright
 from bayesplate.commands.pick_options import (
     CardOrNone,
     Channels,
@@ -27,11 +28,11 @@ from bayesplate.commands.pick_options import (
     SensorMass,
     SweepOption,
     band,
+    given_places,
     places_beside_files,
+    require_on_board,
 )
-from bayesplate.commands.pick_sand import pictures_of, upright
 from bayesplate.commands.pick_words import moved_between_hits, show_pick
-from bayesplate.commands.places import given_places, require_on_board
 from bayesplate.commands.prepare import Prepared, prepare
 from bayesplate.errors import Fault, InputError, NotIdentifiableError, plain
 from bayesplate.files import make_folder, require_new, write_text
@@ -46,7 +47,6 @@ from bayesplate.results.contract import json_text
 from bayesplate.results.folder import FIGURES
 
 if TYPE_CHECKING:
-    from bayesplate.commands.pick_labels import Labels
     from bayesplate.recordings.hits import Hit
     from bayesplate.recordings.reading import Read
     from bayesplate.recordings.sand import Floats
@@ -256,8 +256,6 @@ def _summary(
 def _labelled(
     prepared: Prepared, picked: Picked, flips: bool | None, shown: Mapping[int, Sequence[Floats]]
 ) -> tuple[Labels | None, list[str]]:
-    from bayesplate.commands.pick_labels import label_peaks
-
     try:
         labels = label_peaks(prepared.board, prepared.prior, picked, flips, shown)
         return labels, [*labels.doubts]
