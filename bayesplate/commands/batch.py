@@ -23,7 +23,18 @@ from bayesplate.commands.batch_options import (
 from bayesplate.commands.batch_pool import dask_cluster, processes
 from bayesplate.commands.batch_run import Run
 from bayesplate.commands.fit_board import FitRequest
-from bayesplate.commands.options import ANY_PATH, Effects, FilePath, Force, Law, Report, Resume, Robust, Seed, Told
+from bayesplate.commands.options import (
+    ANY_PATH,
+    Effects,
+    FilePath,
+    Force,
+    Law,
+    OnProgress,
+    Report,
+    Resume,
+    Robust,
+    Seed,
+)
 from bayesplate.errors import (
     BatchError,
     CheckpointError,
@@ -88,7 +99,7 @@ def batch(
     report: Report = True,
     force: Force = False,
     resume: Resume = False,
-    progress: Told = None,
+    progress: OnProgress = None,
 ) -> BatchResult:
     """Fit many boards, each for itself.
 

@@ -11,7 +11,7 @@ from bayesplate.commands.arguments import checked
 from bayesplate.commands.check import expected_sd
 from bayesplate.commands.fitting import not_converged
 from bayesplate.commands.one_thread import one_thread_each
-from bayesplate.commands.options import CARD, Coefficients, Effects, Force, OutOfComparison, Seed, Told
+from bayesplate.commands.options import CARD, Coefficients, Effects, Force, OnProgress, OutOfComparison, Seed
 from bayesplate.commands.prepare import Card
 from bayesplate.commands.problem import Problem, as_problem
 from bayesplate.commands.shown import show_compare
@@ -97,7 +97,7 @@ def compare(
     effects: Effects = None,
     out: OutOfComparison = None,
     force: Force = False,
-    progress: Told = None,
+    progress: OnProgress = None,
 ) -> CompareResult:
     """Compare all methods on a board, as a thin and as a shear-flexible plate.
 
@@ -179,7 +179,7 @@ def compare(
 
 
 def _posteriors(
-    problem: PosedProblem, settings: SamplerSettings, progress: Told
+    problem: PosedProblem, settings: SamplerSettings, progress: OnProgress
 ) -> tuple[list[Method], Inference, Draws]:
     """The posteriors of both laws: the wider, exact one sampled, the linear one by weights where these leave enough.
 
@@ -198,7 +198,7 @@ def _posteriors(
     return methods, inference, draws
 
 
-def _sampled(problem: PosedProblem, settings: SamplerSettings, progress: Told) -> tuple[Inference, Draws]:
+def _sampled(problem: PosedProblem, settings: SamplerSettings, progress: OnProgress) -> tuple[Inference, Draws]:
     inference = infer(problem, settings, progress=progress)
     if not inference.convergence.passed:
         raise not_converged(inference.convergence, problem.doubts, so="nothing is compared")

@@ -19,7 +19,7 @@ from bayesplate.commands.campaign import Campaign, problem_or_campaign
 from bayesplate.commands.fit import refuse_unconverged, write_fit, write_page
 from bayesplate.commands.fitting import Fitted, fitted, opened, with_board
 from bayesplate.commands.one_thread import one_thread_each
-from bayesplate.commands.options import CARD, Effects, Force, Out, Report, Resume, Seed, SetupFile, Told
+from bayesplate.commands.options import CARD, Effects, Force, OnProgress, Out, Report, Resume, Seed, SetupFile
 from bayesplate.commands.prepare import Card
 from bayesplate.commands.problem import Problem
 from bayesplate.commands.stages import Stages
@@ -120,7 +120,7 @@ def diagnose(
     force: Force = False,
     resume: Resume = False,
     n_null: Annotated[int, Key(whole(FEWEST_NULL))] = N_SETS,
-    progress: Told = None,
+    progress: OnProgress = None,
 ) -> DiagnoseResult | CampaignDiagnoseResult:
     """Trace the residual of a fit to an effect that the model lacks, add it, and report the error before and after.
 

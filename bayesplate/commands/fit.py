@@ -11,7 +11,19 @@ from bayesplate.commands.arguments import checked
 from bayesplate.commands.campaign import Campaign, problem_or_campaign
 from bayesplate.commands.fitting import Fitted, fitted, not_converged, opened
 from bayesplate.commands.one_thread import one_thread_each
-from bayesplate.commands.options import CARD, Effects, Force, Law, Out, Report, Resume, Robust, Seed, SetupFile, Told
+from bayesplate.commands.options import (
+    CARD,
+    Effects,
+    Force,
+    Law,
+    OnProgress,
+    Out,
+    Report,
+    Resume,
+    Robust,
+    Seed,
+    SetupFile,
+)
 from bayesplate.commands.prepare import Card
 from bayesplate.commands.problem import Problem
 from bayesplate.commands.shown import show_fit
@@ -69,7 +81,7 @@ def fit(
     setup: SetupFile = None,
     force: Force = False,
     resume: Resume = False,
-    progress: Told = None,
+    progress: OnProgress = None,
 ) -> FitResult | CampaignFitResult:
     """Fit the elastic constants of a board, or of all boards of a campaign and what they share.
 

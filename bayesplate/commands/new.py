@@ -44,7 +44,7 @@ def _read_numbers(value: object) -> object:
     return value
 
 
-def _told_frequencies(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:
+def _frequencies_from_text(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:
     """Frequencies "LABEL=HZ" by their label."""
     found = {}
     for text in given:
@@ -72,7 +72,7 @@ _OPTIONS_OF_SIZES = Joined(
 _OPTION_OF_FREQUENCIES = Option(
     "--frequency",
     multiple=True,
-    callback=_told_frequencies,
+    callback=_frequencies_from_text,
     metavar="LABEL=HZ",
     help='As often as there are modes: "(1,1)=35".',
 )

@@ -108,7 +108,7 @@ def refuse_both(one: object, other: object, why: str) -> None:
         raise click.UsageError(f"{why}: give one of them.")
 
 
-def _effects(context: click.Context, option: click.Parameter, effects: str | None) -> list[str] | None:
+def _effects_from_text(context: click.Context, option: click.Parameter, effects: str | None) -> list[str] | None:
     """Effects from a comma-separated list; none at all from "none"."""
     if effects is None:
         return None
@@ -122,7 +122,7 @@ def _law(linear: bool, exact: bool) -> str | None:
     return "linear" if linear else "exact" if exact else None
 
 
-def _told_costs(context: click.Context, option: click.Parameter, costs: tuple[str, ...]) -> dict[str, Any] | None:
+def _costs_from_text(context: click.Context, option: click.Parameter, costs: tuple[str, ...]) -> dict[str, Any] | None:
     """Minutes by class from CLASS=MINUTES, as often as there are classes."""
     told: dict[str, Any] = {}
     for one in costs:
@@ -173,7 +173,11 @@ Seed = Annotated[int, Key(whole(0)), Option("--seed", type=click.IntRange(0), sh
 Effects = Annotated[
     Sequence[str] | None,
     Key(effect_list("effects")),
-    Option("--effects", callback=_effects, help="Declared effects, comma separated, in place of the card's; or none."),
+    Option(
+        "--effects",
+        callback=_effects_from_text,
+        help="Declared effects, comma separated, in place of the card's; or none.",
+    ),
 ]
 SetupFile = Annotated[
     FilePath | None,
@@ -199,7 +203,7 @@ Report = Annotated[
 ]
 Force = Annotated[bool, _SWITCH, Option("--force", is_flag=True, help="Replace the results in the output folder.")]
 Resume = Annotated[bool, _SWITCH, Option("--resume", is_flag=True, help="Continue an interrupted run.")]
-Told = Annotated[Callable[[Progress], None] | None, Key(read_function)]
+OnProgress = Annotated[Callable[[Progress], None] | None, Key(read_function)]
 Coefficients = Annotated[
     CoefficientSource | None,
     Key(word(*get_args(CoefficientSource))),
@@ -221,12 +225,12 @@ Minutes = Annotated[
         "--cost",
         multiple=True,
         metavar="CLASS=MINUTES",
-        callback=_told_costs,
+        callback=_costs_from_text,
         help="Minutes that a reading (1), a new clamping (10) or another board (30) takes.",
     ),
 ]
 Between = Annotated[
     Sequence[str] | None,
     Key(_read_between),
-    Option("--between", callback=_effects, help="Effects to be told apart, comma separated."),
+    Option("--between", callback=_effects_from_text, help="Effects to be told apart, comma separated."),
 ]

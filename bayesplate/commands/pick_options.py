@@ -29,7 +29,7 @@ from bayesplate.recordings.signals import MOTIONS, Motion
 Place = tuple[float, float]
 
 
-def _told_places(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> list[Place]:
+def _places_from_text(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> list[Place]:
     """Places "X,Y" in mm as m."""
     found = []
     for text in given:
@@ -41,7 +41,7 @@ def _told_places(context: click.Context, option: click.Parameter, given: tuple[s
     return found
 
 
-def _told_mass(context: click.Context, option: click.Parameter, given: str | None) -> tuple[float, float] | None:
+def _mass_from_text(context: click.Context, option: click.Parameter, given: str | None) -> tuple[float, float] | None:
     """A mass "G" or "G,SD" in g as kg."""
     if given is None:
         return None
@@ -55,7 +55,7 @@ def _told_mass(context: click.Context, option: click.Parameter, given: str | Non
     return 1e-3 * grams, 1e-3 * sd
 
 
-def _told_pictures(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> dict[float, str]:
+def _pictures_from_text(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> dict[float, str]:
     """Pictures "HZ=FILE" by their frequency."""
     found = {}
     for text in given:
@@ -198,19 +198,21 @@ Hammer = Annotated[
     Option(
         "--hammer",
         multiple=True,
-        callback=_told_places,
+        callback=_places_from_text,
         metavar="X,Y",
         help="Where it was hit, mm; once, or per file.",
     ),
 ]
 Sensor = Annotated[
     Sequence[Place],
-    Option("--sensor", multiple=True, callback=_told_places, metavar="X,Y", help="Where the sensor was, mm; likewise."),
+    Option(
+        "--sensor", multiple=True, callback=_places_from_text, metavar="X,Y", help="Where the sensor was, mm; likewise."
+    ),
 ]
 SensorMass = Annotated[
     tuple[float, float] | None,
     Key(or_none(_read_mass)),
-    Option("--sensor-mass", callback=_told_mass, metavar="G", help="Of the accelerometer in g, or G,SD."),
+    Option("--sensor-mass", callback=_mass_from_text, metavar="G", help="Of the accelerometer in g, or G,SD."),
 ]
 Channels = Annotated[str, Key(_read_channels), Option("--channels", show_default=True, help=_OF_CHANNELS)]
 MotionWord = Annotated[Motion, Key(word(*MOTIONS)), Option("--motion", show_default=True, help=_OF_MOTION)]
@@ -230,7 +232,7 @@ Sand = Annotated[
     Option(
         "--sand",
         multiple=True,
-        callback=_told_pictures,
+        callback=_pictures_from_text,
         metavar="HZ=FILE",
         help="Picture of sand, cropped to the board.",
     ),

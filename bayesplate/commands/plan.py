@@ -16,7 +16,7 @@ from bayesplate.campaign.shared import Shared
 from bayesplate.commands.arguments import checked
 from bayesplate.commands.campaign import Campaign, problem_or_campaign
 from bayesplate.commands.one_thread import one_thread_each
-from bayesplate.commands.options import CARD, Between, Effects, Force, Goal, Minutes, Out, Seed, Told
+from bayesplate.commands.options import CARD, Between, Effects, Force, Goal, Minutes, OnProgress, Out, Seed
 from bayesplate.commands.prepare import Card, Prepared, prepare
 from bayesplate.commands.problem import Problem, as_problem
 from bayesplate.commands.shown import show_plan
@@ -93,7 +93,7 @@ def plan(
     effects: Effects = None,
     seed: Seed = 1,
     force: Force = False,
-    progress: Told = None,
+    progress: OnProgress = None,
 ) -> PlanResult:
     """Rank what could be measured next by what it is expected to give.
 
@@ -187,7 +187,7 @@ class _Asked:
     between: Sequence[str] | None
     seed: int
     out: Path | None
-    progress: Told
+    progress: OnProgress
 
     def of_board(self, prepared: Prepared) -> Beliefs:
         """What is believed of a board: from a search, from a finished one, or from the prior."""

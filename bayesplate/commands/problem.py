@@ -278,17 +278,7 @@ def as_problem(
     robust: bool = False,
     setup: str | os.PathLike[str] | None = None,
 ) -> Problem:
-    """What a command was given, as a problem.
-
-    Parameters
-    ----------
-    given : Problem, str, path or Board
-    effects, law, robust, setup
-        As of `Problem.from_card`; of a problem that is there already they may not be given.
-
-    Returns
-    -------
-    Problem
+    """What a command was given, as a problem; the options are those of `Problem.from_card`.
 
     Raises
     ------
