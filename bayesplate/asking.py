@@ -1,4 +1,4 @@
-"""What `new` is told on the command line: options, or answers to questions, each of which may be skipped."""
+"""What `new` is told on the terminal: answers to questions, each of which may be skipped."""
 
 from __future__ import annotations
 
@@ -17,20 +17,17 @@ SIZES = {
 }
 
 
-def answers(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Arguments of `bayesplate.commands.new.new` from options that were given."""
-    told = {name: value for name, value in options.items() if name not in SIZES}
-    return {"frequencies": {}, **told, "sizes": {name: options[name] for name in SIZES if name in options}}
-
-
 def asked_answers(path: str | None) -> dict[str, Any]:
-    """The same from questions on the terminal, a name too where there is none; an empty answer leaves a matter open."""
+    """Arguments of `bayesplate.new` from questions on the terminal, a path too where there is none.
+
+    An empty answer leaves a matter open.
+    """
     from bayesplate.commands.new import example_labels, require_edges, require_path
 
     if path is not None:
         require_path(path)  # before anything is asked in vain
     click.echo("An empty answer skips a question; an example stands in for it, marked on the card.", err=True)
-    told: dict[str, Any] = {"name": path or _asked("Name", "my-board", require_path)}
+    told: dict[str, Any] = {"path": path or _asked("Name", "my-board", require_path)}
     told["sizes"] = _answered({name: _number(question) for name, question in SIZES.items()})
     told["edges"] = _asked("Edges: free, cantilever, clamped, supported", "free", require_edges)
     told["prior"] = click.prompt("Wood: spruce, or weakly-informative", default="weakly-informative", err=True)

@@ -142,6 +142,8 @@ def reporting(*, as_json: bool, debug: bool) -> Iterator[None]:
     except BrokenPipeError:
         _close_output()
         sys.exit(0)
+    except click.ClickException:
+        raise  # click tells of options that exclude each other
     except Exception as error:
         if debug:
             traceback.print_exc(file=_TOLD)

@@ -34,6 +34,10 @@ class Refusal(ValueError):
         super().__init__("; ".join(f"wanted {one.wanted}, got {one.got}" for one in complaints))
         self.complaints = complaints
 
+    def inside(self, *keys: str | int) -> list[Complaint]:
+        """The complaints about a part of a value."""
+        return [replace(one, inside=(*keys, *one.inside)) for one in self.complaints]
+
 
 def _same(value: Any) -> Any:
     return value
@@ -73,7 +77,7 @@ def read_each(items: Iterable[tuple[str | int, Any]], read: Callable[[Any], T]) 
         try:
             good.append(read(value))
         except Refusal as refusal:
-            bad.extend(replace(one, inside=(key, *one.inside)) for one in refusal.complaints)
+            bad += refusal.inside(key)
     if bad:
         raise Refusal(*bad)
     return good
@@ -93,7 +97,7 @@ def read_table(
         try:
             good[key] = readers[key](value)
         except Refusal as refusal:
-            bad.extend(replace(one, inside=(key, *one.inside)) for one in refusal.complaints)
+            bad += refusal.inside(key)
     bad += [Complaint("a value", "nothing", inside=(key,)) for key in needed if key not in table]
     if bad:
         raise Refusal(*bad)

@@ -3,27 +3,47 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from bayesplate.commands.arguments import require_arguments
+from bayesplate.commands.arguments import checked
 from bayesplate.commands.batch_boards import boards_of
+from bayesplate.commands.batch_options import (
+    Dask,
+    Folders,
+    GradingOptions,
+    NumberOfWorkers,
+    OutOfBatch,
+    Table,
+    Template,
+)
 from bayesplate.commands.batch_pool import dask_cluster, processes
 from bayesplate.commands.batch_run import Run
 from bayesplate.commands.fit_board import FitRequest
+from bayesplate.commands.options import (
+    ANY_PATH,
+    Effects,
+    FilePath,
+    Force,
+    Law,
+    OnProgress,
+    Report,
+    Resume,
+    Robust,
+    Seed,
+)
 from bayesplate.errors import (
     BatchError,
     CheckpointError,
     RunInterrupted,
 )
 from bayesplate.files import write_text
-from bayesplate.frequencies.laws import LawName
 from bayesplate.grading.boards import FORMAT, BatchSummary, BoardRow, Doubt, Failure, told_rows
 from bayesplate.grading.matching import Grading, GradingRequest, grade
-from bayesplate.grading.storage import Journal, TableKind, require_table_kind, write_table
-from bayesplate.posterior.sampling import Progress
+from bayesplate.grading.storage import Journal, require_table_kind, write_table
 from bayesplate.results.contract import json_text
 from bayesplate.results.folder import OutputFolder, run_of_its_own
 
@@ -60,31 +80,26 @@ class BatchResult:
         return f"<BatchResult: {self.summary.n_fitted} of {self.summary.n_boards} boards fitted, {self.table}>"
 
 
-def default_batch_folder(source: str | os.PathLike[str]) -> Path:
-    """Where the command line writes a batch unless it is told: results/NAME, of the folder or the table."""
-    path = Path(source).resolve()
-    return Path("results") / ((path.name if os.path.isdir(path) else path.stem) or "batch")
-
-
 @run_of_its_own()
+@checked()
 def batch(
-    source: str | os.PathLike[str],
-    out: str | os.PathLike[str],
+    source: Annotated[FilePath, ANY_PATH],
+    out: OutOfBatch,
     *,
-    template: str | os.PathLike[str] | None = None,
-    workers: int | None = None,
-    dask: str | None = None,
-    folders: bool = False,
-    table: TableKind = "csv",
-    seed: int = 1,
-    effects: Sequence[str] | None = None,
-    law: LawName | None = None,
-    robust: bool = False,
-    grading: GradingRequest | None = None,
-    report: bool = True,
-    force: bool = False,
-    resume: bool = False,
-    progress: Callable[[Progress], None] | None = None,
+    template: Template = None,
+    workers: NumberOfWorkers = None,
+    dask: Dask = None,
+    folders: Folders = False,
+    table: Table = "csv",
+    grading: GradingOptions = None,
+    seed: Seed = 1,
+    effects: Effects = None,
+    law: Law = None,
+    robust: Robust = False,
+    report: Report = True,
+    force: Force = False,
+    resume: Resume = False,
+    progress: OnProgress = None,
 ) -> BatchResult:
     """Fit many boards, each for itself.
 
@@ -128,11 +143,6 @@ def batch(
     CheckpointError
         If there is nothing to resume, or another run is at work in the folder.
     """
-    require_arguments(
-        source=source, out_folder=out, template=template, workers=workers, dask=dask, folders=folders, table=table,
-        seed=seed, effects=effects, law=law, robust=robust, grading=grading, report=report,
-        force=force, resume=resume, progress=progress,
-    )  # fmt: skip
     require_table_kind(table)
     boards = boards_of(source, template)
     folder = OutputFolder(Path(out))

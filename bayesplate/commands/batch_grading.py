@@ -7,7 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from bayesplate.board.material import MODULI
+from bayesplate.board.values import Complaint, Refusal
 from bayesplate.board.words import did_you_mean, quoted
+from bayesplate.commands.arguments import is_positive
 from bayesplate.errors import Fault, InputError, plain
 from bayesplate.grading.figures import FIGURES, MOST
 from bayesplate.grading.matching import GradingRequest
@@ -18,14 +20,14 @@ _MOST_PERCENT = 1000.0
 _PERCENTS = f"positive per cents up to {_MOST_PERCENT:g}, as 10 or E_x=10,E_y=15, of {', '.join(_MATCHED)}"
 
 
-def grading_request(match: str | None, limits: Sequence[str], rigidity: float | None) -> GradingRequest:
+def grading_request(match: str | None, limit: Sequence[str], rigidity: float | None) -> GradingRequest:
     """Read what boards are graded by.
 
     Parameters
     ----------
     match : str or None
         Tolerances in per cent: "10", or "E_x=10,E_y=15,G_xy=15".
-    limits : sequence of str
+    limit : sequence of str
         "E_x=10:14", either end may be left away; in the unit that the tables show.
     rigidity : float or None
         D_x, N m.
@@ -42,7 +44,7 @@ def grading_request(match: str | None, limits: Sequence[str], rigidity: float | 
     faults: list[Fault] = []
     percent = _matched(match, faults)
     found: dict[str, tuple[float | None, float | None]] = {}
-    for one in limits:
+    for one in limit:
         name, _, ends = one.partition("=")
         key = name.strip()
         if key in found:
@@ -118,48 +120,46 @@ def _number(text: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def grading_faults(name: str, value: object) -> Iterator[Fault]:
-    """What is wrong with a request made in Python."""
+def read_grading(value: object) -> object:
+    """A request made in Python, or None."""
     if value is None:
-        return
+        return None
     if not isinstance(value, GradingRequest):
-        yield Fault(name, "a GradingRequest or None", type(value).__name__)
-        return
+        raise Refusal(Complaint("a GradingRequest or None", type(value).__name__))
+    wrong = [*_complaints(value)]
+    if wrong:
+        raise Refusal(*wrong)
+    return value
+
+
+def _complaints(value: GradingRequest) -> Iterator[Complaint]:
     both: tuple[object, ...] = (value.match_percent, value.limits)
     if not all(isinstance(one, Mapping) for one in both):
         got = " and ".join(type(one).__name__ for one in both)
-        yield Fault(f"{name} match_percent and limits", "dicts by the name of a figure", got)
+        yield Complaint("dicts by the name of a figure", got, inside=("match_percent and limits",))
         return
     for key, percent in value.match_percent.items():
         if key not in _MATCHED:
-            yield Fault(f"{name} match_percent", f"names of {', '.join(_MATCHED)}", quoted(str(key)))
-        elif not _is_positive(percent):
-            yield Fault(f"{name} match_percent {key}", "a positive number of per cent", repr(percent))
-    for key, limit in value.limits.items():
+            yield Complaint(f"names of {', '.join(_MATCHED)}", quoted(str(key)), inside=("match_percent",))
+        elif not is_positive(percent):
+            yield Complaint("a positive number of per cent", repr(percent), inside=("match_percent", key))
+    limits: Mapping[str, Any] = value.limits
+    for key, limit in limits.items():
         if key not in FIGURES:
-            yield Fault(f"{name} limits", f"names of {', '.join(FIGURES)}", quoted(str(key)))
-        else:
-            yield from _limit_faults(f"{name} limits {key}", limit)
+            yield Complaint(f"names of {', '.join(FIGURES)}", quoted(str(key)), inside=("limits",))
+        elif not isinstance(limit, tuple) or len(limit) != 2:
+            wanted = "a pair (least, greatest), SI, None for no limit"
+            yield Complaint(wanted, repr(limit), inside=("limits", key))
+        elif not _is_range(limit):
+            yield Complaint(_RANGE, repr(limit), inside=("limits", key))
     if len(value.limits) > MOST:
-        yield Fault(f"{name} limits", f"at most {MOST}", str(len(value.limits)))
-    if value.rigidity is not None and not _is_positive(value.rigidity):
-        yield Fault(f"{name} rigidity", "a positive number of N m, or None", repr(value.rigidity))
-
-
-def _limit_faults(place: str, limit: object) -> Iterator[Fault]:
-    if not isinstance(limit, tuple) or len(limit) != 2:
-        yield Fault(place, "a pair (least, greatest), SI, None for no limit", repr(limit))
-    elif not _is_range(limit):
-        yield Fault(place, _RANGE, repr(limit))
+        yield Complaint(f"at most {MOST}", str(len(value.limits)), inside=("limits",))
+    if value.rigidity is not None and not is_positive(value.rigidity):
+        yield Complaint("a positive number of N m, or None", repr(value.rigidity), inside=("rigidity",))
 
 
 def _is_range(limit: tuple[Any, Any]) -> bool:
     """Whether at least one end is there, and those that are there are as they should be."""
     low, high = limit
     given = [one for one in limit if one is not None]
-    return bool(given) and all(map(_is_positive, given)) and (len(given) < 2 or low < high)
-
-
-def _is_positive(value: object) -> bool:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return is_number and math.isfinite(value) and value > 0.0  # type: ignore[arg-type, operator]
+    return bool(given) and all(map(is_positive, given)) and (len(given) < 2 or low < high)

@@ -6,13 +6,15 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 from bayesplate.board.campaign import CampaignCard, is_campaign, load_campaign
 from bayesplate.board.checks import readings_sha256
 from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.campaign.population import require_moduli
 from bayesplate.campaign.shared import Shared, shared_by
-from bayesplate.commands.arguments import require_arguments
+from bayesplate.commands.arguments import checked
+from bayesplate.commands.options import CARD, Effects, Law, Robust
 from bayesplate.commands.prepare import Card, Prepared, prepare
 from bayesplate.commands.problem import Problem, as_problem
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
@@ -42,12 +44,13 @@ class Campaign:
     population: PriorCard | None
 
     @classmethod
+    @checked()
     def from_card(
         cls,
-        card: CampaignPath,
-        effects: Sequence[str] | None = None,
-        law: LawName | None = None,
-        robust: bool = False,
+        card: Annotated[CampaignPath, CARD],
+        effects: Effects = None,
+        law: Law = None,
+        robust: Robust = False,
     ) -> Campaign:
         """The campaign of a card.
 
@@ -73,7 +76,6 @@ class Campaign:
             With every fault of the card; if there is none, with those of all boards; if there is none, with what cannot
             be shared.
         """
-        require_arguments(card=card, effects=effects, law=law, robust=robust)
         read = load_campaign(card)
         prepared, population = _prepared(read, effects)
         shared = shared_by(read, [one.board for one in prepared])

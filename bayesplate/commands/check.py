@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
 from bayesplate.board.material import MODULI, moduli
 from bayesplate.campaign.checking import CampaignCheck
-from bayesplate.commands.arguments import require_arguments
+from bayesplate.commands.arguments import checked
 from bayesplate.commands.campaign import Campaign, problem_or_campaign
 from bayesplate.commands.one_thread import one_thread_each
+from bayesplate.commands.options import CARD, Effects, SetupFile
 from bayesplate.commands.prepare import Card
 from bayesplate.commands.problem import Problem
 from bayesplate.commands.shown import show_check
@@ -60,11 +61,12 @@ class CheckResult(CheckReport):
 
 
 @one_thread_each()
+@checked()
 def check(
-    card: Problem | Card | Campaign,
+    card: Annotated[Problem | Card | Campaign, CARD],
     *,
-    effects: Sequence[str] | None = None,
-    setup: str | os.PathLike[str] | None = None,
+    effects: Effects = None,
+    setup: SetupFile = None,
 ) -> CheckResult | CampaignCheck:
     """Say what would be fitted, and what it can identify; nothing is sampled or written.
 
@@ -86,7 +88,6 @@ def check(
     InputError, NotIdentifiableError
         As `fit` would.
     """
-    require_arguments(card=card, effects=effects, setup=setup)
     given = problem_or_campaign(card, effects=effects, setup=setup)
     if isinstance(given, Campaign):
         from bayesplate.commands.campaign_check import check_campaign  # which checks boards in turn

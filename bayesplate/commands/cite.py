@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from textwrap import fill
+from typing import Annotated
 
-from bayesplate.commands.arguments import require_arguments
+from bayesplate.commands.arguments import checked
+from bayesplate.commands.options import CARD, Effects
 from bayesplate.commands.prepare import Card
 from bayesplate.commands.problem import Problem, as_problem
 from bayesplate.results.references import Section, references
@@ -13,7 +15,8 @@ from bayesplate.results.references import Section, references
 _WIDTH = 100
 
 
-def cite(card: Problem | Card, *, effects: Sequence[str] | None = None) -> tuple[Section, ...]:
+@checked()
+def cite(card: Annotated[Problem | Card, CARD], *, effects: Effects = None) -> tuple[Section, ...]:
     """References of a fit, by section.
 
     Parameters
@@ -32,7 +35,6 @@ def cite(card: Problem | Card, *, effects: Sequence[str] | None = None) -> tuple
     InputError
         As `fit` would.
     """
-    require_arguments(card=card, effects=effects)
     prepared = as_problem(card, effects=effects).prepared
     return references(prepared.card, prepared.prior, prepared.board)
 

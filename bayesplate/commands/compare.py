@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, get_args
+from typing import Annotated, Any, get_args
 
-from bayesplate.commands.arguments import require_arguments
+from bayesplate.commands.arguments import checked
 from bayesplate.commands.check import expected_sd
 from bayesplate.commands.fitting import not_converged
 from bayesplate.commands.one_thread import one_thread_each
+from bayesplate.commands.options import CARD, Coefficients, Effects, Force, OnProgress, OutOfComparison, Seed
 from bayesplate.commands.prepare import Card
 from bayesplate.commands.problem import Problem, as_problem
 from bayesplate.commands.shown import show_compare
 from bayesplate.effects import EFFECTS
-from bayesplate.estimates.coefficients import CoefficientSource, named_table
+from bayesplate.estimates.coefficients import named_table
 from bayesplate.estimates.leave_one_out import CarryingMode, united
 from bayesplate.estimates.paper import paper_system
 from bayesplate.files import make_folder, require_new, write_text
@@ -28,7 +28,7 @@ from bayesplate.posterior.methods import Method, point_methods, posterior_method
 from bayesplate.posterior.mode_errors import carried_in_fit, mode_errors
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.reweighting import law_weights
-from bayesplate.posterior.sampling import Progress, SamplerSettings
+from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.posterior.statistics import effective_draws
 from bayesplate.report.plots import ComparePlots
 from bayesplate.results.archive import posterior_tree, to_arviz
@@ -42,7 +42,6 @@ FEWEST_DRAWS = 1000
 
 _SHEAR = tuple(name for name, effect in EFFECTS.items() if effect.theory == "shear-flexible")
 """Effects that make the plate shear-flexible."""
-Tell = Callable[[Progress], None] | None
 
 
 @dataclass(frozen=True, repr=False)
@@ -89,15 +88,16 @@ class CompareResult(Comparison):
 
 
 @one_thread_each()
+@checked()
 def compare(
-    card: Problem | Card,
+    card: Annotated[Problem | Card, CARD],
     *,
-    coefficients: CoefficientSource | None = None,
-    seed: int = 1,
-    effects: Sequence[str] | None = None,
-    out: str | os.PathLike[str] | None = None,
-    force: bool = False,
-    progress: Tell = None,
+    coefficients: Coefficients = None,
+    seed: Seed = 1,
+    effects: Effects = None,
+    out: OutOfComparison = None,
+    force: Force = False,
+    progress: OnProgress = None,
 ) -> CompareResult:
     """Compare all methods on a board, as a thin and as a shear-flexible plate.
 
@@ -134,9 +134,6 @@ def compare(
     NotConvergedError
         If the sampler fails its gate.
     """
-    require_arguments(
-        card=card, coefficients=coefficients, seed=seed, effects=effects, out=out, force=force, progress=progress
-    )
     files = require_new(Path(out), [COMPARISON], force=force) if out is not None else ()
     given = as_problem(card, effects=effects)
     others = [name for name in given.prepared.board.effects if name not in _SHEAR]
@@ -182,7 +179,7 @@ def compare(
 
 
 def _posteriors(
-    problem: PosedProblem, settings: SamplerSettings, progress: Tell
+    problem: PosedProblem, settings: SamplerSettings, progress: OnProgress
 ) -> tuple[list[Method], Inference, Draws]:
     """The posteriors of both laws: the wider, exact one sampled, the linear one by weights where these leave enough.
 
@@ -201,7 +198,7 @@ def _posteriors(
     return methods, inference, draws
 
 
-def _sampled(problem: PosedProblem, settings: SamplerSettings, progress: Tell) -> tuple[Inference, Draws]:
+def _sampled(problem: PosedProblem, settings: SamplerSettings, progress: OnProgress) -> tuple[Inference, Draws]:
     inference = infer(problem, settings, progress=progress)
     if not inference.convergence.passed:
         raise not_converged(inference.convergence, problem.doubts, so="nothing is compared")

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Sequence
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.board.material import MODULI
 from bayesplate.board.prior import PriorCard
-from bayesplate.commands.arguments import require_arguments
+from bayesplate.board.values import Key
+from bayesplate.commands.arguments import checked, whole
 from bayesplate.commands.campaign import Campaign, problem_or_campaign
 from bayesplate.commands.fit import refuse_unconverged, write_fit, write_page
 from bayesplate.commands.fitting import Fitted, fitted, opened, with_board
 from bayesplate.commands.one_thread import one_thread_each
+from bayesplate.commands.options import CARD, Effects, Force, OnProgress, Out, Report, Resume, Seed, SetupFile
 from bayesplate.commands.prepare import Card
 from bayesplate.commands.problem import Problem
 from bayesplate.commands.stages import Stages
@@ -28,7 +29,7 @@ from bayesplate.diagnosis.findings import Case, Side, diagnosis_of
 from bayesplate.diagnosis.folds import carrying
 from bayesplate.diagnosis.joint import full_search
 from bayesplate.diagnosis.known import known_fits
-from bayesplate.diagnosis.null_control import N_SETS, made_to_choose, null_control
+from bayesplate.diagnosis.null_control import BY_CHANCE, FALSE_ALARMS, N_SETS, made_to_choose, null_control
 from bayesplate.diagnosis.readings import wrong_reading
 from bayesplate.diagnosis.result import Diagnosis, diagnosis_json
 from bayesplate.diagnosis.search import Found
@@ -43,7 +44,6 @@ from bayesplate.planning.drawn_up import first_of
 from bayesplate.planning.explained import believed, survivors
 from bayesplate.planning.proposals import BELIEFS, Planner
 from bayesplate.posterior.inference import Inference
-from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import DiagnosePlots
 from bayesplate.results.contract import json_text
 from bayesplate.results.folder import BEFORE, DIAGNOSIS, run_of_its_own
@@ -53,6 +53,8 @@ from bayesplate.streams import stream
 if TYPE_CHECKING:
     from bayesplate.commands.campaign_diagnose import CampaignDiagnoseResult
 
+FEWEST_NULL = math.ceil(1.0 / min(BY_CHANCE, FALSE_ALARMS)) - 1
+"""Among n simulated boards the one at hand is first by chance in a share of 1 / (n + 1), which is to be that small."""
 _NULL_LINE = 7
 _MOST_FINALISTS = 3
 _FIT, _SEARCH, _KNOWN, _CONTROL, _CHOICE = 3.0, 3.0, 0.5, 0.5, 0.5
@@ -106,18 +108,19 @@ class DiagnoseResult:
 
 @one_thread_each()
 @run_of_its_own()
+@checked()
 def diagnose(
-    card: Problem | Card | Campaign,
+    card: Annotated[Problem | Card | Campaign, CARD],
     *,
-    out: str | os.PathLike[str] | None = None,
-    report: bool = True,
-    seed: int = 1,
-    effects: Sequence[str] | None = None,
-    setup: str | os.PathLike[str] | None = None,
-    force: bool = False,
-    resume: bool = False,
-    n_null: int = N_SETS,
-    progress: Callable[[Progress], None] | None = None,
+    out: Out = None,
+    report: Report = True,
+    seed: Seed = 1,
+    effects: Effects = None,
+    setup: SetupFile = None,
+    force: Force = False,
+    resume: Resume = False,
+    n_null: Annotated[int, Key(whole(FEWEST_NULL))] = N_SETS,
+    progress: OnProgress = None,
 ) -> DiagnoseResult | CampaignDiagnoseResult:
     """Trace the residual of a fit to an effect that the model lacks, add it, and report the error before and after.
 
@@ -155,10 +158,6 @@ def diagnose(
     InputError, NotIdentifiableError, NotConvergedError, CheckpointError
         As `bayesplate.fit`, of the fit without further effects; also if a problem asks for robust noise.
     """
-    require_arguments(
-        card=card, out=out, report=report, seed=seed, effects=effects, setup=setup, force=force, resume=resume,
-        n_null=n_null, progress=progress,
-    )  # fmt: skip
     problem = problem_or_campaign(card, effects=effects, setup=setup)
     if isinstance(problem, Campaign):
         from bayesplate.commands.campaign_diagnose import diagnose_campaign

@@ -2,25 +2,34 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from bayesplate.commands.arguments import require_arguments
+from bayesplate.commands.arguments import checked
 from bayesplate.commands.campaign import Campaign, problem_or_campaign
 from bayesplate.commands.fitting import Fitted, fitted, not_converged, opened
 from bayesplate.commands.one_thread import one_thread_each
+from bayesplate.commands.options import (
+    CARD,
+    Effects,
+    Force,
+    Law,
+    OnProgress,
+    Out,
+    Report,
+    Resume,
+    Robust,
+    Seed,
+    SetupFile,
+)
 from bayesplate.commands.prepare import Card
 from bayesplate.commands.problem import Problem
 from bayesplate.commands.shown import show_fit
 from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.files import write_text, writing
-from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.inference import Inference
-from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import FitPlots
 from bayesplate.results.archive import write_tree
 from bayesplate.results.contract import json_text
@@ -59,19 +68,20 @@ class FitResult(Fitted):
 
 @one_thread_each()
 @run_of_its_own()
+@checked()
 def fit(
-    card: Problem | Card | Campaign,
+    card: Annotated[Problem | Card | Campaign, CARD],
     *,
-    out: str | os.PathLike[str] | None = None,
-    report: bool = True,
-    seed: int = 1,
-    effects: Sequence[str] | None = None,
-    law: LawName | None = None,
-    robust: bool = False,
-    setup: str | os.PathLike[str] | None = None,
-    force: bool = False,
-    resume: bool = False,
-    progress: Callable[[Progress], None] | None = None,
+    out: Out = None,
+    report: Report = True,
+    seed: Seed = 1,
+    effects: Effects = None,
+    law: Law = None,
+    robust: Robust = False,
+    setup: SetupFile = None,
+    force: Force = False,
+    resume: Resume = False,
+    progress: OnProgress = None,
 ) -> FitResult | CampaignFitResult:
     """Fit the elastic constants of a board, or of all boards of a campaign and what they share.
 
@@ -116,10 +126,6 @@ def fit(
     CheckpointError
         If a run cannot be resumed.
     """
-    require_arguments(
-        card=card, out=out, report=report, seed=seed, effects=effects, law=law, robust=robust,
-        setup=setup, force=force, resume=resume, progress=progress,
-    )  # fmt: skip
     problem = problem_or_campaign(card, effects=effects, law=law, robust=robust, setup=setup)
     if isinstance(problem, Campaign):
         from bayesplate.commands.campaign_fit import fit_campaign  # which writes boards as this file does

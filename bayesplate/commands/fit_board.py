@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated, get_args
 
 from bayesplate.board.board import Board
 from bayesplate.board.coefficients import CoefficientCard
 from bayesplate.board.named import NamedCards
 from bayesplate.board.prior import PriorCard
-from bayesplate.commands.arguments import require_arguments
+from bayesplate.board.values import Key, read_table
+from bayesplate.commands.arguments import checked, effect_list, instance_of, read_switch, refused, whole, word
 from bayesplate.commands.fit import fit
 from bayesplate.commands.fitting import fitted
 from bayesplate.commands.one_thread import one_thread_each
@@ -47,8 +49,25 @@ class FitRequest:
     tables: Mapping[str, CoefficientCard] = field(default_factory=dict)
 
 
+_ASKED = {"seed": whole(0), "effects": effect_list("effects"), "law": word(*get_args(LawName)), "robust": read_switch}
+
+
+def _read_request(value: object) -> object:
+    """What a fit is asked for: its entries are read as the arguments of that name are."""
+    if value is not None and not all(hasattr(value, key) for key in _ASKED):
+        raise refused("a FitRequest", value)
+    if value is not None:
+        read_table({key: getattr(value, key) for key in _ASKED}, _ASKED)
+    return value
+
+
 @one_thread_each()
-def fit_board(board: Board, prior: PriorCard, request: FitRequest | None = None) -> Summary:
+@checked()
+def fit_board(
+    board: Annotated[Board, Key(instance_of(Board))],
+    prior: Annotated[PriorCard, Key(instance_of(PriorCard))],
+    request: Annotated[FitRequest | None, Key(_read_request)] = None,
+) -> Summary:
     """Fit one board; nothing is read, written or remembered, and the same arguments give the same bytes anywhere.
 
     Parameters
@@ -70,7 +89,6 @@ def fit_board(board: Board, prior: PriorCard, request: FitRequest | None = None)
         As of `fit`.
     """
     request = FitRequest() if request is None else request
-    require_arguments(board=board, prior_card=prior, request=request)
     return fitted(_problem(board, prior, request), request.seed, None, _refuse).summary
 
 

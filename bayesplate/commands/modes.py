@@ -6,12 +6,14 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from bayesplate.board.board import Board, Values
-from bayesplate.commands.arguments import require_arguments
+from bayesplate.commands.arguments import checked
 from bayesplate.commands.one_thread import one_thread_each
+from bayesplate.commands.options import CARD, Effects, Force, Out, Seed, SetupFile
 from bayesplate.commands.prepare import Card, Prepared, prepare
 from bayesplate.commands.problem import Problem, as_problem
 from bayesplate.commands.shown import show_modes
@@ -65,14 +67,15 @@ class ModesResult:
 
 
 @one_thread_each()
+@checked()
 def modes(
-    card: Problem | Card,
+    card: Annotated[Problem | Card, CARD],
     *,
-    out: str | os.PathLike[str] | None = None,
-    effects: Sequence[str] | None = None,
-    setup: str | os.PathLike[str] | None = None,
-    seed: int = 1,
-    force: bool = False,
+    out: Out = None,
+    effects: Effects = None,
+    setup: SetupFile = None,
+    seed: Seed = 1,
+    force: Force = False,
 ) -> ModesResult:
     """Compute the lowest modes of a board and draw them.
 
@@ -104,7 +107,6 @@ def modes(
     InputError
         If the card or the folder cannot be used; then nothing is written.
     """
-    require_arguments(card=card, out=out, effects=effects, setup=setup, seed=seed, force=force)
     prepared = _prepared(card, effects, setup)
     board = prepared.board
     stems = ["modes"] if len(board.setups) == 1 else [f"modes-{setup.name}" for setup in board.setups]

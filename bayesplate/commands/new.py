@@ -5,14 +5,19 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Annotated
+
+import click
 
 from bayesplate.board.board import Board
 from bayesplate.board.checks import physical_faults
 from bayesplate.board.prior import load_prior
 from bayesplate.board.setup_keys import End, edge_words
 from bayesplate.board.starter import HALF_TOP, Starter, starter_text
-from bayesplate.board.values import Number, Refusal
+from bayesplate.board.values import Complaint, Key, Number, Refusal
 from bayesplate.board.words import EDGES, did_you_mean, name_complaint, shown
+from bayesplate.commands.arguments import checked
+from bayesplate.commands.options import Joined, Option
 from bayesplate.errors import Fault, InputError, plain
 from bayesplate.files import write_text, writing
 from bayesplate.frequencies.labels import label_faults, lowest_labels
@@ -27,15 +32,62 @@ _N_EXAMPLES = 8
 SIZES = (*HALF_TOP, "mass")
 
 
+def _read_text(value: object) -> object:
+    if not isinstance(value, str):
+        raise Refusal(Complaint("a text", repr(value)))
+    return value
+
+
+def _read_numbers(value: object) -> object:
+    if not isinstance(value, Mapping | None):
+        raise Refusal(Complaint("a dict of numbers", repr(value)))
+    return value
+
+
+def _frequencies_from_text(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:
+    """Frequencies "LABEL=HZ" by their label."""
+    found = {}
+    for text in given:
+        label, sign, hertz = text.rpartition("=")
+        if not sign:
+            raise click.UsageError(f'--frequency {text!r}: write a label and its frequency, "(1,1)=35".')
+        found[label.strip()] = hertz.strip()
+    return found
+
+
+def _sizes_given(**sizes: str | None) -> dict[str, str]:
+    return {name: size for name, size in sizes.items() if size}
+
+
+_TEXT, _NUMBERS = Key(_read_text), Key(_read_numbers)
+_OF_EDGES = "free, cantilever, clamped, supported, or letters like CFFF."
+_OF_PRIOR = "Prior card, spruce or weakly-informative."
+_OPTIONS_OF_SIZES = Joined(
+    _sizes_given,
+    length_x=Option("--length-x", metavar="MM", help="Length along the grain."),
+    length_y=Option("--length-y", metavar="MM", help="Length across the grain."),
+    thickness=Option("--thickness", metavar="MM"),
+    mass=Option("--mass", metavar="G"),
+)
+_OPTION_OF_FREQUENCIES = Option(
+    "--frequency",
+    multiple=True,
+    callback=_frequencies_from_text,
+    metavar="LABEL=HZ",
+    help='As often as there are modes: "(1,1)=35".',
+)
+
+
+@checked()
 def new(
-    path: str | os.PathLike[str],
+    path: Annotated[str | os.PathLike[str], Option("path", required=False)],
     *,
-    sizes: Mapping[str, float | str] | None = None,
-    edges: str = "free",
-    prior: str = "weakly-informative",
-    title: str = "",
-    notes: str = "",
-    frequencies: Mapping[str, float | str] | None = None,
+    sizes: Annotated[Mapping[str, float | str] | None, _NUMBERS, _OPTIONS_OF_SIZES] = None,
+    edges: Annotated[str, _TEXT, Option("--edges", metavar="WORD", help=_OF_EDGES)] = "free",
+    prior: Annotated[str, _TEXT, Option("--prior", metavar="NAME", help=_OF_PRIOR)] = "weakly-informative",
+    title: Annotated[str, _TEXT, Option("--title", help="A line for people.")] = "",
+    notes: Annotated[str, _TEXT, Option("--notes", help="Free text.")] = "",
+    frequencies: Annotated[Mapping[str, float | str] | None, _NUMBERS, _OPTION_OF_FREQUENCIES] = None,
 ) -> Path:
     """Write a first card.
 
@@ -63,12 +115,6 @@ def new(
     InputError
         If there is a file of that name, or what was given cannot stand on a card; then nothing is written.
     """
-    texts = {"edges": edges, "prior": prior, "title": title, "notes": notes}
-    wrong = [Fault(name, "a text", repr(one)) for name, one in texts.items() if not isinstance(one, str)]
-    by_name = {"sizes": sizes, "frequencies": frequencies}
-    wrong += [Fault(k, "a dict of numbers", repr(v)) for k, v in by_name.items() if not isinstance(v, Mapping | None)]
-    if wrong:
-        raise InputError(wrong)
     card = _free_path(path)
     words = edge_words(_ARRANGEMENTS.get(edges, edges))
     faults = [

@@ -8,11 +8,31 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bayesplate.commands.arguments import require_arguments
+from bayesplate.commands.arguments import checked
 from bayesplate.commands.fragment import fragment_text
-from bayesplate.commands.pick_sand import pictures_of, upright
+from bayesplate.commands.options import FilePath, Force
+from bayesplate.commands.pick_labels import Labels, label_peaks, pictures_of, upright
+from bayesplate.commands.pick_options import (
+    CardOrNone,
+    Channels,
+    Files,
+    Hammer,
+    Highest,
+    Lowest,
+    MotionWord,
+    OutOfPick,
+    Polarity,
+    Rate,
+    Sand,
+    Sensor,
+    SensorMass,
+    SweepOption,
+    band,
+    given_places,
+    places_beside_files,
+    require_on_board,
+)
 from bayesplate.commands.pick_words import moved_between_hits, show_pick
-from bayesplate.commands.places import given_places, require_on_board
 from bayesplate.commands.prepare import Prepared, prepare
 from bayesplate.errors import Fault, InputError, NotIdentifiableError, plain
 from bayesplate.files import make_folder, require_new, write_text
@@ -20,23 +40,19 @@ from bayesplate.recordings.contract import PickReport, rows
 from bayesplate.recordings.picking import HIGHEST, LOWEST, Picked, pick_modes
 from bayesplate.recordings.reading import read_recordings
 from bayesplate.recordings.sand import read_picture
-from bayesplate.recordings.signals import Motion, Recording
+from bayesplate.recordings.signals import Recording
 from bayesplate.recordings.sweeps import Sweep, impulse_response, read_sweep
 from bayesplate.recordings.taking import Heard, take, take_impulses
 from bayesplate.results.contract import json_text
 from bayesplate.results.folder import FIGURES
 
 if TYPE_CHECKING:
-    from bayesplate.commands.pick_labels import Labels
     from bayesplate.recordings.hits import Hit
     from bayesplate.recordings.reading import Read
     from bayesplate.recordings.sand import Floats
 
 FRAGMENT, PAGE, SUMMARY = "setup.toml", "recordings.html", "pick.json"
 _RATE_OFF = 1e-6
-
-FilePath = str | os.PathLike[str]
-Place = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -65,23 +81,24 @@ class PickResult:
         return show_pick(self.summary).html("Picked modes")
 
 
+@checked(places_beside_files, lambda given: band(given, LOWEST, HIGHEST))
 def pick(
-    files: Sequence[FilePath],
+    files: Files,
     *,
-    card: FilePath | None = None,
-    rate: float | None = None,
-    hammer: Sequence[Place] = (),
-    sensor: Sequence[Place] = (),
-    sensor_mass: tuple[float, float] | None = None,
-    channels: str = "force,response",
-    motion: Motion = "acceleration",
-    polarity: str | None = None,
-    sweep: str | None = None,
-    sand: Mapping[float, FilePath] | None = None,
-    lowest: float = LOWEST,
-    highest: float = HIGHEST,
-    out: FilePath | None = None,
-    force: bool = False,
+    card: CardOrNone = None,
+    rate: Rate = None,
+    hammer: Hammer = (),
+    sensor: Sensor = (),
+    sensor_mass: SensorMass = None,
+    channels: Channels = "force,response",
+    motion: MotionWord = "acceleration",
+    polarity: Polarity = None,
+    sweep: SweepOption = None,
+    sand: Sand = None,
+    lowest: Lowest = LOWEST,
+    highest: Highest = HIGHEST,
+    out: OutOfPick = None,
+    force: Force = False,
 ) -> PickResult:
     """Pick the modes of a board from recordings of hits, taps or sweeps.
 
@@ -126,10 +143,6 @@ def pick(
     InputError
         With every fault of the arguments, then of all files, then of all hits; nothing is written then.
     """
-    require_arguments(
-        files=files, card_or_none=card, rate=rate, places=(hammer, sensor, len(files)), sensor_mass=sensor_mass,
-        channels=channels, motion=motion, polarity=polarity, band=(lowest, highest), sand=sand, out=out, force=force,
-    )  # fmt: skip
     targets = () if out is None else require_new(Path(out), (FRAGMENT, PAGE, SUMMARY), force=force)
     prepared = None if card is None else _one_setup(prepare(card, may_lack_frequencies=True))
     if prepared is not None:
@@ -243,8 +256,6 @@ def _summary(
 def _labelled(
     prepared: Prepared, picked: Picked, flips: bool | None, shown: Mapping[int, Sequence[Floats]]
 ) -> tuple[Labels | None, list[str]]:
-    from bayesplate.commands.pick_labels import label_peaks
-
     try:
         labels = label_peaks(prepared.board, prepared.prior, picked, flips, shown)
         return labels, [*labels.doubts]

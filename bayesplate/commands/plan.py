@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from bayesplate.board.board import Board
 from bayesplate.board.campaign import is_campaign
 from bayesplate.board.prior import PriorCard
-from bayesplate.board.words import EFFECT_NAMES, effect_named
+from bayesplate.board.words import EFFECT_NAMES
 from bayesplate.campaign.shared import Shared
-from bayesplate.commands.arguments import require_arguments
+from bayesplate.commands.arguments import checked
 from bayesplate.commands.campaign import Campaign, problem_or_campaign
 from bayesplate.commands.one_thread import one_thread_each
+from bayesplate.commands.options import CARD, Between, Effects, Force, Goal, Minutes, OnProgress, Out, Seed
 from bayesplate.commands.prepare import Card, Prepared, prepare
 from bayesplate.commands.problem import Problem, as_problem
 from bayesplate.commands.shown import show_plan
@@ -38,7 +38,6 @@ from bayesplate.planning.plan import Plan
 from bayesplate.planning.proposals import BELIEFS, Costs, Planner
 from bayesplate.planning.together import beliefs_together
 from bayesplate.planning.unmeasured import prior_beliefs
-from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import PlanPlots
 from bayesplate.results.contract import json_text
 from bayesplate.results.folder import DIAGNOSIS
@@ -83,17 +82,18 @@ class PlanResult:
 
 
 @one_thread_each()
+@checked()
 def plan(
-    card: Problem | Card | Campaign,
+    card: Annotated[Problem | Card | Campaign, CARD],
     *,
-    goal: str | None = None,
-    costs: Mapping[str, float] | None = None,
-    between: Sequence[str] | None = None,
-    out: str | os.PathLike[str] | None = None,
-    effects: Sequence[str] | None = None,
-    seed: int = 1,
-    force: bool = False,
-    progress: Callable[[Progress], None] | None = None,
+    goal: Goal = None,
+    costs: Minutes = None,
+    between: Between = None,
+    out: Out = None,
+    effects: Effects = None,
+    seed: Seed = 1,
+    force: Force = False,
+    progress: OnProgress = None,
 ) -> PlanResult:
     """Rank what could be measured next by what it is expected to give.
 
@@ -133,11 +133,6 @@ def plan(
     NotIdentifiableError
         If explanations are to be told apart on a board whose frequencies do not even tell the constants.
     """
-    require_arguments(
-        card=card, goal=goal, costs=costs, between=between, out=out, effects=effects, seed=seed, force=force,
-        progress=progress,
-    )  # fmt: skip
-    between = None if between is None else [effect_named(name) for name in between]
     given = _given(card, effects)
     files = () if out is None else require_new(Path(out), _names(), force=force)
     asked = _Asked(goal, between, seed, None if out is None else Path(out), progress)
@@ -192,7 +187,7 @@ class _Asked:
     between: Sequence[str] | None
     seed: int
     out: Path | None
-    progress: Callable[[Progress], None] | None
+    progress: OnProgress
 
     def of_board(self, prepared: Prepared) -> Beliefs:
         """What is believed of a board: from a search, from a finished one, or from the prior."""

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from bayesplate.board.board import Board
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.sessions import sessions
-from bayesplate.commands.arguments import require_arguments
+from bayesplate.board.values import Key
+from bayesplate.commands.arguments import checked, or_none, read_prior
+from bayesplate.commands.options import CARD, Effects, Law, Robust, SetupFile
 from bayesplate.commands.prepare import Card, Prepared, prepare
 from bayesplate.errors import Fault, InputError
 from bayesplate.frequencies.laws import LawName
@@ -57,14 +60,15 @@ class Problem:
     robust: bool = False
 
     @classmethod
+    @checked()
     def from_card(
         cls,
-        card: Card,
-        effects: Sequence[str] | None = None,
-        prior: str | os.PathLike[str] | PriorCard | None = None,
-        law: LawName | None = None,
-        robust: bool = False,
-        setup: str | os.PathLike[str] | None = None,
+        card: Annotated[Card, CARD],
+        effects: Effects = None,
+        prior: Annotated[str | os.PathLike[str] | PriorCard | None, Key(or_none(read_prior))] = None,
+        law: Law = None,
+        robust: Robust = False,
+        setup: SetupFile = None,
     ) -> Problem:
         """The problem of a card, or of a board made in Python.
 
@@ -92,7 +96,6 @@ class Problem:
         InputError
             With every fault of the card, or of the card that the board would have.
         """
-        require_arguments(card=card, effects=effects, prior=prior, law=law, robust=robust, setup=setup)
         return cls(prepare(card, effects, prior=prior, setup=setup), law, robust)
 
     @property
@@ -275,17 +278,7 @@ def as_problem(
     robust: bool = False,
     setup: str | os.PathLike[str] | None = None,
 ) -> Problem:
-    """What a command was given, as a problem.
-
-    Parameters
-    ----------
-    given : Problem, str, path or Board
-    effects, law, robust, setup
-        As of `Problem.from_card`; of a problem that is there already they may not be given.
-
-    Returns
-    -------
-    Problem
+    """What a command was given, as a problem; the options are those of `Problem.from_card`.
 
     Raises
     ------

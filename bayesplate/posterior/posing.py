@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.board.board import Board
+from bayesplate.board.material import RIGIDITIES
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.sessions import with_discrepancies
 from bayesplate.errors import InputError, NotIdentifiableError
@@ -75,7 +76,9 @@ class PosedProblem:
     @cached_property
     def doubts(self) -> tuple[str, ...]:
         """What is unusual about the constants and the readings, before anything is sampled: a sentence each."""
-        constants = unusual(self.board, self.prior, self.estimate.rigidities)
+        # where the uncertain inputs have moved: at their nominal sizes a soft core looks like another board
+        there = self.parameters.values_at(self.centre)
+        constants = unusual(self.board, self.prior, np.array([there[name] for name in RIGIDITIES]))
         return (*constants, *self.slips, *self._readings.others)
 
     @property

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import bayesplate
-from bayesplate.commands.arguments import require_arguments
+from bayesplate.commands.arguments import read_arguments
 from bayesplate.errors import InputError
 
 BOARD = "fiemme-spruce-clamped"
@@ -38,7 +38,7 @@ BAD = [
     ({"resume": True, "out": None}, "resume: wanted the folder of the run that is continued, as out, got no out"),
     ({"robust": 1}, "robust: wanted True or False, got 1"),
     ({"report": "no"}, 'report: wanted True or False, got "no"'),
-    ({"force": True, "resume": True}, "force and resume: wanted one of them, got both"),
+    ({"force": True, "resume": True, "out": "x"}, "force and resume: wanted one of them, got both"),
     ({"coefficients": "trained"}, "(did you mean training?)"),
     ({"progress": "yes"}, "progress: wanted a function or None"),
     ({"goal": "E_z"}, "(did you mean E_y?)"),
@@ -47,14 +47,25 @@ BAD = [
     ({"between": ["grain_angel"]}, "(did you mean grain_angle?)"),
 ]
 GOOD = [
-    {"law": None, "seed": 0, "effects": None, "out": None, "progress": None, "coefficients": None},
-    {"law": "linear", "seed": np.int64(3), "effects": (), "out": Path("x"), "progress": print},
-    {"law": "exact", "effects": ["fluid_loading", "grain_angle"], "card": Path("x.toml"), "n_null": 49},
-    {"coefficients": "published", "force": True, "resume": False},
-    {"resume": True, "out": "results/x"},
-    {"goal": "constants", "costs": {"board": 45}, "between": ["fluid_loading"]},
-    {"goal": None, "costs": None, "between": None},
+    (bayesplate.fit, {"law": None, "seed": 0, "effects": None, "out": None, "progress": None}),
+    (bayesplate.fit, {"law": "linear", "seed": 3, "effects": [], "out": Path("x"), "progress": print}),
+    (bayesplate.fit, {"law": "exact", "effects": ["fluid_loading", "grain_angle"], "card": Path("x.toml")}),
+    (bayesplate.fit, {"resume": True, "out": "results/x"}),
+    (bayesplate.diagnose, {"n_null": 49}),
+    (bayesplate.compare, {"coefficients": "published", "force": True}),
+    (bayesplate.compare, {"coefficients": None}),
+    (bayesplate.plan, {"goal": "constants", "costs": {"board": 45}, "between": ["fluid_loading"]}),
+    (bayesplate.plan, {"goal": None, "costs": None, "between": None}),
 ]
+TAKEN_BY = {
+    "n_null": bayesplate.diagnose,
+    "coefficients": bayesplate.compare,
+    "prior": bayesplate.Problem.from_card,
+    **dict.fromkeys(("goal", "costs", "between"), bayesplate.plan),
+    **dict.fromkeys(
+        ("law", "effects", "seed", "out", "card", "resume", "robust", "report", "progress"), bayesplate.fit
+    ),
+}
 FUNCTIONS = {
     "fit": (bayesplate.fit, "seed law robust effects report force resume out progress"),
     "diagnose": (bayesplate.diagnose, "seed effects report force resume out n_null progress"),
@@ -68,15 +79,30 @@ FUNCTIONS = {
 
 @pytest.mark.parametrize(("given", "said"), BAD)
 def test_what_cannot_be_used_is_refused(given, said) -> None:
+    function = next(one for name, one in TAKEN_BY.items() if name in given)
     with pytest.raises(InputError, match=re.escape(said)) as caught:
-        require_arguments(**given)
+        function(**{"card": BOARD, **given})
     assert len(caught.value.faults) == 1
     assert caught.value.exit_code == 3
 
 
-@pytest.mark.parametrize("given", GOOD)
-def test_what_can_be_used_is_let_through(given) -> None:
-    require_arguments(**given)
+@pytest.mark.parametrize(("function", "given"), GOOD)
+def test_what_can_be_used_is_let_through(function, given) -> None:
+    assert read_arguments(function, given) == given
+
+
+def test_other_words_and_numbers_are_read_as_what_they_mean() -> None:
+    read = read_arguments(bayesplate.fit, {"effects": ("air_loading",), "seed": np.int64(3)})
+
+    assert read == {"effects": ["fluid_loading"], "seed": 3}
+    assert type(read["seed"]) is int
+
+
+def test_a_call_that_python_refuses_is_refused_as_python_does() -> None:
+    with pytest.raises(TypeError, match="unexpected keyword argument 'sed'"):
+        bayesplate.fit(BOARD, sed=3)
+    with pytest.raises(TypeError, match="missing a required argument: 'card'"):
+        bayesplate.fit(seed=-1)
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

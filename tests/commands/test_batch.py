@@ -30,8 +30,8 @@ from bayesplate.board.board import Board
 from bayesplate.board.named import load_named
 from bayesplate.board.prior import load_prior
 from bayesplate.cli import main
-from bayesplate.commands.batch import default_batch_folder
 from bayesplate.commands.batch_boards import boards_of
+from bayesplate.commands.batch_options import default_batch_folder
 from bayesplate.commands.batch_pool import Call, WorkerDied, Workers, computed, processes
 from bayesplate.errors import BatchError, CheckpointError, InputError
 from bayesplate.results.contract import json_text

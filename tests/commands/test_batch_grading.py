@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from bayesplate.commands.arguments import require_arguments
+import bayesplate
 from bayesplate.commands.batch_grading import grading_request
 from bayesplate.errors import InputError
 from bayesplate.grading.figures import limit_told
@@ -81,4 +81,4 @@ BAD = [
 @pytest.mark.parametrize(("request_", "said"), BAD)
 def test_a_request_that_cannot_be_used_is_refused(request_, said):
     with pytest.raises(InputError, match=re.escape(said)):
-        require_arguments(grading=request_)
+        bayesplate.batch("boards", "out", grading=request_)

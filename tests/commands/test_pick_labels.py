@@ -8,8 +8,7 @@ import pytest
 from generator.sand import photograph
 from made_recordings import CARD, SIDES, board
 
-from bayesplate.commands.pick_labels import Labels, label_peaks
-from bayesplate.commands.pick_sand import upright
+from bayesplate.commands.pick_labels import Labels, label_peaks, upright
 from bayesplate.commands.pick_words import moved_between_hits
 from bayesplate.commands.prepare import prepare
 from bayesplate.recordings.contract import LabelChance, PickedRow

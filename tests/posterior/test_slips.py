@@ -14,6 +14,7 @@ from scipy import stats
 from bayesplate.board.board import Board
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
+from bayesplate.estimates.unusual import unusual
 from bayesplate.posterior import slips
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.slips import LARGE_NOISE, RARITY, Readings, Slip, noise_remarks, reading_remarks
@@ -183,6 +184,15 @@ def test_a_noise_far_above_its_prior_is_told_and_one_that_is_allowed_is_not():
     sure = with_noise(board, Quantity.from_median(0.003, 1.01))
     assert noise_remarks(sure, np.log(0.99 * LARGE_NOISE)) == ()
     assert noise_remarks(sure, np.log(1.01 * LARGE_NOISE)) != ()
+
+
+def test_constants_are_judged_at_the_centre_and_not_where_least_squares_begin():
+    """Uncertain inputs move between the two, as far as a soft core makes a sandwich another board."""
+    problem = as_read()
+    other = replace(problem.estimate, rigidities=problem.estimate.rigidities * [1.0, 20.0, 1.0])
+
+    assert "is x along the grain?" in unusual(problem.board, problem.prior, other.rigidities)[0]
+    assert replace(problem, estimate=other).doubts == ()
 
 
 def with_noise(board: Board, noise: Quantity) -> Board:

@@ -6,6 +6,7 @@ import ast
 import re
 from pathlib import Path
 
+import click
 import pytest
 
 from bayesplate.cli import main
@@ -27,7 +28,8 @@ DRAWN = set("┏┃┡│└━")
 
 def known_options() -> set[str]:
     """Every option of every command."""
-    return {word for command in main.commands.values() for parameter in command.params for word in parameter.opts}
+    of_all = (command.get_params(click.Context(command)) for command in main.commands.values())
+    return {word for parameters in of_all for one in parameters for word in one.opts}
 
 
 def faults_of(text: str) -> list[str]:

@@ -1,0 +1,236 @@
+"""Arguments that several commands take, each with its reader and the option of the command line that gives it."""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Annotated, Any, get_args
+
+import click
+
+from bayesplate.board.values import Key, Refusal
+from bayesplate.board.words import did_you_mean
+from bayesplate.commands.arguments import (
+    annotations_of,
+    effect_list,
+    is_positive,
+    or_none,
+    read_card,
+    read_function,
+    read_path,
+    read_switch,
+    refused,
+    whole,
+    word,
+)
+from bayesplate.commands.prepare import default_folder
+from bayesplate.estimates.coefficients import CoefficientSource
+from bayesplate.frequencies.laws import LawName
+from bayesplate.planning.gains import GOALS
+from bayesplate.planning.proposals import Costs
+from bayesplate.posterior.sampling import Progress
+
+
+class Option:
+    """An option of the command line, or what stands there without a name, that gives an argument of a function.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Words of the command line, as click takes them.
+    otherwise : callable or None
+        Of the first argument of the command, where the option is not given.
+    settings : dict
+        Of `click.Option` or `click.Argument`; a default that is shown is that of the function.
+    """
+
+    def __init__(self, *names: str, otherwise: Callable[[str], Any] | None = None, **settings: Any) -> None:
+        self.names, self.otherwise, self.settings = names, otherwise, settings
+
+    def parameters(self, name: str, default: object) -> Iterator[click.Parameter]:
+        """For click, from the name of the argument and its default."""
+        settings = {"default": default, **self.settings} if self.settings.get("show_default") else self.settings
+        if self.names[0].startswith("-"):
+            yield click.Option([*self.names, name], **settings)
+        else:
+            yield click.Argument([name], **settings)
+
+    def value(self, name: str, told: Mapping[str, Any], about: Any) -> Any:
+        """The argument, from all that was given; None where the function's own default holds."""
+        return self.otherwise(about) if told[name] is None and self.otherwise is not None else told[name]
+
+
+class Joined:
+    """Several options that give one argument.
+
+    Attributes
+    ----------
+    options : dict of Option
+        By the names under which they are joined.
+    join : callable
+        Of the values by name; raises click.UsageError where they exclude each other.
+    """
+
+    def __init__(self, join: Callable[..., Any], **options: Option) -> None:
+        self.options, self.join = options, join
+
+    def parameters(self, name: str, default: object) -> Iterator[click.Parameter]:
+        """For click."""
+        for own, option in self.options.items():
+            yield from option.parameters(own, None)
+
+    def value(self, name: str, told: Mapping[str, Any], about: Any) -> Any:
+        """The argument, from all that was given."""
+        return self.join(**{own: told[own] for own in self.options})
+
+
+def options_of(function: Callable[..., Any]) -> dict[str, Option | Joined]:
+    """The options of a function, by argument; an argument without a default stands on the command line by itself."""
+    found: dict[str, Option | Joined] = {}
+    annotations = annotations_of(function)
+    for name, parameter in inspect.signature(function).parameters.items():
+        parts = getattr(annotations[name], "__metadata__", ())
+        stated = [one for one in parts if isinstance(one, Option | Joined)]
+        if stated or parameter.default is parameter.empty:
+            found[name] = stated[0] if stated else Option(name)
+    return found
+
+
+def path_option(*names: str, **settings: Any) -> Option:
+    """A path as it is given: what cannot be read is invalid input, told by those who read it, and no fault of usage."""
+    return Option(*names, type=click.Path(readable=False), **settings)
+
+
+def refuse_both(one: object, other: object, why: str) -> None:
+    """Refuse options that exclude each other; raises click.UsageError."""
+    if one and other:
+        raise click.UsageError(f"{why}: give one of them.")
+
+
+def _effects_from_text(context: click.Context, option: click.Parameter, effects: str | None) -> list[str] | None:
+    """Effects from a comma-separated list; none at all from "none"."""
+    if effects is None:
+        return None
+    names = [name.strip() for name in effects.split(",") if name.strip()]
+    refuse_both("none" in names, len(names) > 1, "--effects none declares nothing and a name declares an effect")
+    return [] if "none" in names else names
+
+
+def _law(linear: bool, exact: bool) -> str | None:
+    refuse_both(linear, exact, "--linear and --exact force different laws")
+    return "linear" if linear else "exact" if exact else None
+
+
+def _costs_from_text(context: click.Context, option: click.Parameter, costs: tuple[str, ...]) -> dict[str, Any] | None:
+    """Minutes by class from CLASS=MINUTES, as often as there are classes."""
+    told: dict[str, Any] = {}
+    for one in costs:
+        name, _, minutes = one.partition("=")
+        try:
+            told[name.strip()] = float(minutes)
+        except ValueError:
+            raise click.BadParameter(f"{one!r}: wanted CLASS=MINUTES, as reading=2", context, option) from None
+    return told or None
+
+
+def _read_costs(value: object) -> object:
+    if not isinstance(value, Mapping):
+        raise refused(f"minutes by class: {', '.join(Costs.names())}", value)
+    wrong = []
+    for key, minutes in value.items():
+        if key not in Costs.names():
+            near = did_you_mean(key, Costs.names()) if isinstance(key, str) else ""
+            wrong += refused(f"one of {', '.join(Costs.names())}", key, near).inside(str(key))
+        elif not is_positive(minutes):
+            wrong += refused("a positive number of minutes", minutes).inside(key)
+    if wrong:
+        raise Refusal(*wrong)
+    return value
+
+
+def _read_between(value: object) -> object:
+    if isinstance(value, list | tuple) and not value:
+        raise refused("one name of an effect or more, or None", [])
+    return effect_list("between")(value)
+
+
+FilePath = str | os.PathLike[str]
+CARD = Key(read_card)
+ANY_PATH = Key(read_path)
+_PATH_OR_NONE = Key(or_none(read_path))
+_SWITCH = Key(read_switch)
+
+Out = Annotated[
+    FilePath | None,
+    _PATH_OR_NONE,
+    path_option("--out", otherwise=default_folder, help="Output folder (default results/NAME)."),
+]
+OutOfComparison = Annotated[
+    FilePath | None, _PATH_OR_NONE, path_option("--out", help="Folder for compare.json (default: not written).")
+]
+Seed = Annotated[int, Key(whole(0)), Option("--seed", type=click.IntRange(0), show_default=True, help="Random seed.")]
+Effects = Annotated[
+    Sequence[str] | None,
+    Key(effect_list("effects")),
+    Option(
+        "--effects",
+        callback=_effects_from_text,
+        help="Declared effects, comma separated, in place of the card's; or none.",
+    ),
+]
+SetupFile = Annotated[
+    FilePath | None,
+    _PATH_OR_NONE,
+    path_option("--setup", help="File with a [setup] that completes the card: what pick writes."),
+]
+Law = Annotated[
+    LawName | None,
+    Key(word(*get_args(LawName))),
+    Joined(
+        _law,
+        linear=Option("--linear", is_flag=True, help="Force the linear frequency law."),
+        exact=Option("--exact", is_flag=True, help="Force the exact frequency law."),
+    ),
+]
+Robust = Annotated[
+    bool, _SWITCH, Option("--robust", is_flag=True, help="Student-t noise: one wrong mode has less say.")
+]
+Report = Annotated[
+    bool,
+    _SWITCH,
+    Option("--no-report", is_flag=True, default=True, flag_value=False, help="Write no page and no figures."),
+]
+Force = Annotated[bool, _SWITCH, Option("--force", is_flag=True, help="Replace the results in the output folder.")]
+Resume = Annotated[bool, _SWITCH, Option("--resume", is_flag=True, help="Continue an interrupted run.")]
+OnProgress = Annotated[Callable[[Progress], None] | None, Key(read_function)]
+Coefficients = Annotated[
+    CoefficientSource | None,
+    Key(word(*get_args(CoefficientSource))),
+    Option(
+        "--coefficients",
+        type=click.Choice(get_args(CoefficientSource)),
+        help="Source of the paper's coefficients (default: the table that the card names, else sensitivity).",
+    ),
+]
+Goal = Annotated[
+    str | None,
+    Key(word(*GOALS)),
+    Option("--for", metavar="WHAT", help="E_x, E_y, G_xy, constants or explanations."),
+]
+Minutes = Annotated[
+    Mapping[str, float] | None,
+    Key(or_none(_read_costs)),
+    Option(
+        "--cost",
+        multiple=True,
+        metavar="CLASS=MINUTES",
+        callback=_costs_from_text,
+        help="Minutes that a reading (1), a new clamping (10) or another board (30) takes.",
+    ),
+]
+Between = Annotated[
+    Sequence[str] | None,
+    Key(_read_between),
+    Option("--between", callback=_effects_from_text, help="Effects to be told apart, comma separated."),
+]
