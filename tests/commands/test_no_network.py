@@ -125,8 +125,9 @@ def test_who_asks_for_the_network_is_noticed(asked):
 
 def test_a_command_that_asked_for_it_would_fail():
     """The negative control of the commands themselves: one line more in the package is enough."""
-    line = "import bayesplate.commands.check as home, socket\nwhole = home.check\n"
-    line += "home.check = lambda *a, **k: (socket.getaddrinfo('localhost', 80), whole(*a, **k))[1]\n"
+    line = "import bayesplate.commands.check as home, functools, socket\nwhole = home.check\n"
+    line += "asking = lambda *a, **k: (socket.getaddrinfo('localhost', 80), whole(*a, **k))[1]\n"
+    line += "home.check = functools.wraps(whole)(asking)\n"
     code, messages = ended([["check", BOARD]], program=line + PROGRAM)["check"]
 
     assert code == 70
