@@ -107,6 +107,11 @@ class Command(click.Command):
         return found
 
     @cached_property
+    def _arguments(self) -> Mapping[str, inspect.Parameter]:
+        """Those that the function itself states, whatever a tool writes on what is wrapped around it."""
+        return inspect.signature(inspect.unwrap(self._function)).parameters
+
+    @cached_property
     def _options(self) -> dict[str, Option | Joined]:
         from bayesplate.commands.options import options_of
 
@@ -117,9 +122,8 @@ class Command(click.Command):
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         """Those of the function, and those of the printing."""
         if not self.params:
-            own = inspect.signature(self._function).parameters
             for name, part in self._options.items():
-                self.params += part.parameters(name, own[name].default)
+                self.params += part.parameters(name, self._arguments[name].default)
             self.params += _printing()
         return super().get_params(ctx)
 
@@ -130,7 +134,7 @@ class Command(click.Command):
         return super().parse_args(ctx, args)
 
     def _run(self, as_json: bool, quiet: bool, debug: bool, **told: Any) -> None:
-        has_progress = "progress" in inspect.signature(self._function).parameters
+        has_progress = "progress" in self._arguments
         with reporting(as_json=as_json, debug=debug):
             about = told[next(iter(self._options))]
             given = {name: part.value(name, told, about) for name, part in self._options.items()}
