@@ -16,10 +16,6 @@ def stream(seed: int, *names: str | int) -> np.random.Generator:
         Of the run.
     *names : str or int
         What the numbers are for, as "walkers", 2.
-
-    Returns
-    -------
-    numpy.random.Generator
     """
     key = tuple(crc32(name.encode()) if isinstance(name, str) else name for name in names)
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))

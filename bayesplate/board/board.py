@@ -505,7 +505,6 @@ def made_board(
 
     Parameters
     ----------
-    name : str
     inputs : dict of Quantity
         length_x, length_y, thickness (m), mass (kg) or density (kg m^-3), and poisson_xy. A thickness or a width that
         was read at places becomes the mean over the board of the field that the readings tell of.
@@ -515,10 +514,6 @@ def made_board(
         A Poisson ratio that nobody stated, where `inputs` has none.
     **more
         Other attributes of `Board`.
-
-    Returns
-    -------
-    Board
     """
     inputs = {**inputs, **_means_of_fields(inputs)}
     assumed = {} if assumed_poisson is None else {"poisson_xy": assumed_poisson}

@@ -132,7 +132,6 @@ def read_board(
 
     Parameters
     ----------
-    card : CardFile
     may_lack_frequencies : bool
         Whether a board that was not measured yet will do.
     setup : str or path, optional

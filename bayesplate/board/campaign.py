@@ -58,8 +58,6 @@ class SharedSection(Section):
 
     Attributes
     ----------
-    effect : str
-    way : "value" or "ratio"
     scatter_percent : float
         Scale of what the boards' own are believed to differ by from what they have in common; 0 if by nothing.
     """
@@ -120,10 +118,6 @@ def load_campaign(name_or_path: str | os.PathLike[str]) -> CampaignCard:
     ----------
     name_or_path : str or path
         Name of a shipped card, or a path: it contains a separator or ends in .toml.
-
-    Returns
-    -------
-    CampaignCard
 
     Raises
     ------

@@ -22,7 +22,6 @@ class CardFile:
 
     Attributes
     ----------
-    table : dict
     name : str
         Of the file.
     folder : Path or None

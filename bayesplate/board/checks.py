@@ -47,10 +47,6 @@ _STEPS = {
 def physical_faults(board: Board) -> list[Fault]:
     """Every physical fault of a board.
 
-    Parameters
-    ----------
-    board : Board
-
     Returns
     -------
     list of Fault
@@ -79,13 +75,8 @@ def remarks(board: Board, effects: Collection[str]) -> tuple[str, ...]:
 
     Parameters
     ----------
-    board : Board
     effects : collection of str
         Names of the declared effects.
-
-    Returns
-    -------
-    tuple of str
     """
     rows = [*_assumed(board)]
     for setup in board.setups:

@@ -20,7 +20,6 @@ def csv_table(data: bytes, file: str) -> tuple[list[str], list[list[str]]]:
 
     Parameters
     ----------
-    data : bytes
     file : str
         As messages show it.
 

@@ -30,11 +30,6 @@ def merged(table: Mapping[str, Any], file: str, fragment: str | os.PathLike[str]
         A TOML file with a table [setup]. It takes the place of the card's setup of its name, or of the only one, key by
         key; one with a new name and its edges joins them.
 
-    Returns
-    -------
-    table : dict
-    name : str
-
     Raises
     ------
     InputError

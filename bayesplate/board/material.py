@@ -168,7 +168,6 @@ def derived_quantities(constants: Moduli, density: ArrayLike) -> dict[str, Deriv
 
     Parameters
     ----------
-    constants : Moduli
     density : array_like, kg m^-3
 
     Returns

@@ -42,15 +42,10 @@ def load_named(
 
     Parameters
     ----------
-    board : Board
     prior : PriorCard, optional
         In place of the one that the card names.
     tables : dict of CoefficientCard, optional
         By setup, in place of those that the card names.
-
-    Returns
-    -------
-    NamedCards
     """
     file, beside = board.file, board.folder
     faults: list[Fault] = []

@@ -54,7 +54,6 @@ class Parameter:
     ----------
     key : str
         What it is called among its owner's own parameters, or among those of its effect.
-    owner : Owner
     prior : Quantity
         In SI units; sign and range are its bounds. An exact quantity fixes the parameter.
     unit : str

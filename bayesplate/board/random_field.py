@@ -114,14 +114,12 @@ class PlacedReadings:
 
     Attributes
     ----------
-    values : tuple of float
     x, y : tuple of float
         Fractions of the sides.
     resolution : float
         In the unit of the readings.
     place_sd : (float, float)
         Standard deviations of the places along x and y, fractions of the sides.
-    usual : UsualSizes
     is_along_x_only : bool
         Whether the field varies along x alone.
     """
@@ -197,7 +195,6 @@ def sd_after(read: PlacedReadings, x: Floats, y: Floats) -> float:
 
     Parameters
     ----------
-    read : PlacedReadings
     x, y : (n,) array
         The further places, fractions of the sides.
     """

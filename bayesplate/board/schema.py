@@ -40,8 +40,6 @@ def validated(
 
     Parameters
     ----------
-    model : subclass of Section
-    card : CardFile
     faults_of : callable
         What is wrong with keys beside one another, from the raw table and the file's name as messages show it: these
         faults are reported together with those of single keys.

@@ -150,7 +150,6 @@ def under_prior_scales(board: Board, values: Values, slopes: Floats, inputs: Flo
 
     Parameters
     ----------
-    board : Board
     values : dict of float
         Where the slopes were taken.
     slopes : (n_modes, n_inputs) array

@@ -29,13 +29,10 @@ class Starter:
 
     Attributes
     ----------
-    name : str
-    title, notes : str
     sizes : dict of float
         Any of length_x, length_y, thickness (mm), mass (g).
     edges : dict of str
         Condition of x0, x1, y0 and y1.
-    prior : str
     frequencies : dict of float
         Label to Hz.
     """
@@ -54,13 +51,8 @@ def starter_text(starter: Starter, examples: Sequence[Label]) -> str:
 
     Parameters
     ----------
-    starter : Starter
     examples : sequence of Label
         Modes that a board with these edges has; those without a frequency become lines to be filled in.
-
-    Returns
-    -------
-    str
     """
     edges = ", ".join(f"{edge} = {_quoted(starter.edges[edge])}" for edge in EDGES)
     free_texts = {"title": starter.title, "notes": starter.notes}

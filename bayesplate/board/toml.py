@@ -30,10 +30,6 @@ _QUOTED = re.compile(r"\"[^\"]*\"|'[^']*'|#.*")
 def read_file(path: str | Path) -> bytes:
     """The bytes of a card file.
 
-    Parameters
-    ----------
-    path : str or Path
-
     Raises
     ------
     InputError
@@ -64,7 +60,6 @@ def read_table(data: bytes, file: str) -> dict[str, Any]:
 
     Parameters
     ----------
-    data : bytes
     file : str
         The file's name, as messages show it.
 

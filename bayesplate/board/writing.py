@@ -24,10 +24,6 @@ def toml_text(content: Mapping[str, Any]) -> str:
     ----------
     content : mapping
         Of texts, numbers, truth values, dates, lists and tables.
-
-    Returns
-    -------
-    str
     """
     return "\n".join(_lines(content, ())).lstrip("\n") + "\n"
 

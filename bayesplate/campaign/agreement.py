@@ -23,7 +23,6 @@ class LeftOut:
 
     Attributes
     ----------
-    name : str
     log_score : float
         ln of the probability of its readings, the shared parameters learned from the others.
     p_value : float

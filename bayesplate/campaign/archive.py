@@ -24,7 +24,6 @@ def shared_tree(learnt: Learnt, attributes: Mapping[str, str]) -> Any:
 
     Parameters
     ----------
-    learnt : Learnt
     attributes : dict of str
         What is said of their origin.
 

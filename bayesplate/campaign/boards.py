@@ -91,14 +91,7 @@ class Sample:
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """A board that was fitted alone, the shared effects declared under their own priors.
-
-    Attributes
-    ----------
-    inference : Inference
-    draws : Draws
-    shared : tuple of Shared
-    """
+    """A board that was fitted alone, the shared effects declared under their own priors."""
 
     inference: Inference
     draws: Draws
@@ -181,7 +174,6 @@ class Member:
             From which the walkers learn how the board's own parameters go with the shared ones.
         aim : (n_shared,) and (n_shared, n_shared) arrays
             Mean and covariance of the shared parameters, nearly.
-        seed : int
         """
         own, surrogate = self.given.own_columns, self.inference.surrogate
         start = _moved(np.column_stack([before.theta[:, own], before.z]), before.weights, aim)
@@ -240,12 +232,10 @@ class Member:
 
         Parameters
         ----------
-        drawn : Sample
         log_density : callable
             ln of the density that the others are drawn from.
         z : (n, n_shared) array
             Standard coordinates to go to.
-        rng : numpy.random.Generator
         """
         own = self.given.own_columns
         _, covariance = moments(np.column_stack([drawn.theta[:, own], drawn.z]), drawn.weights)

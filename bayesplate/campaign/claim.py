@@ -39,7 +39,6 @@ class TaughtBoard:
         Error of its labelled modes, its own constants fitted: without the effect, and with the others' effect.
     p_value : float
         Of the board against the others.
-    refuses : bool
     others : dict of Spread
         The shared numbers as the others teach them.
     """
@@ -95,7 +94,6 @@ def taught_boards(learnt: Learnt, before: Mapping[str, Member], seed: int) -> di
         With the shared effect.
     before : dict of Member
         By board: fitted without the effect, nothing shared.
-    seed : int
     """
     refused = refusing(learnt.together)
     together = learnt.together

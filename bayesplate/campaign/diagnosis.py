@@ -107,10 +107,8 @@ def named(found: Sequence[Explanation]) -> tuple[str, tuple[str, ...], str]:
 
     Returns
     -------
-    verdict : str
     effects : tuple of str
         Shared ones; in a group those of any alternative, the most probable first.
-    reason : str
     """
     none = next(one.probability for one in found if one.way == "none")
     if none >= IMPROBABLE:

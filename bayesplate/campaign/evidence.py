@@ -37,13 +37,8 @@ def bridge_sampling(
         From (n, n_dim) points to (n,) logarithms; -inf where it is zero.
     draws : (n_draws, n_dim) array
         From that density, in random order.
-    rng : numpy.random.Generator
     n_points : int
         At which the density is looked at, among the draws and beside them.
-
-    Returns
-    -------
-    float
     """
     half = len(draws) // 2
     mixture = Mixture.fitted(draws[:half])

@@ -23,7 +23,6 @@ class GivenShared:
     ----------
     posterior : Posterior
         Of the board by itself, under its law or a surrogate of it.
-    shared : tuple of Shared
     """
 
     posterior: Posterior

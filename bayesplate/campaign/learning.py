@@ -30,13 +30,10 @@ class Learnt:
 
     Attributes
     ----------
-    members : tuple of Member
     samples : tuple of Sample
         Of each board, where what all boards teach is among them.
-    together : Together
     chains : Chains
         Of the standard coordinates of what is learned: `Together.coordinates`.
-    convergence : Convergence
     """
 
     members: tuple[Member, ...]
@@ -59,14 +56,11 @@ class Learnt:
         ----------
         index : int
             Of the board.
-        rng : numpy.random.Generator
         seed : int
             Of the predictive draws.
 
         Returns
         -------
-        inference : Inference
-        draws : Draws
         effective : float
             How many independent draws the result rests on.
         """
@@ -96,12 +90,6 @@ def learn(
     A likelihood is first found from a board's own draws, then from the same draws weighted to be halfway to where all
     boards together are: there it matters, and a polynomial of low order follows it the better. A board that has too few
     draws there is walked anew; one that still has too few keeps the likelihood that its own draws gave.
-
-    Parameters
-    ----------
-    members : sequence of Member
-    settings : SamplerSettings
-    progress : callable, optional
 
     Returns
     -------

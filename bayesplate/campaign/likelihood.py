@@ -65,7 +65,6 @@ class SharedLikelihood:
         Minus that of ln L beyond the draws, in coordinates of unit spread.
     coefficients : (n_terms,) array
         Of the terms of first, second, ... order.
-    level : float
     """
 
     centre: Floats

@@ -45,7 +45,6 @@ class BoardConstants:
 
     Attributes
     ----------
-    name : str
     mean : (3,) array
     covariance : (3, 3) array
         Where the shared numbers are known.
@@ -64,8 +63,6 @@ class BoardConstants:
 
         Parameters
         ----------
-        inference : Inference
-        draws : Draws
         shared : (n_draws, n_shared) array, optional
             Standard coordinates of the shared numbers at the draws.
         """
@@ -87,11 +84,9 @@ class Population:
 
     Attributes
     ----------
-    boards : tuple of BoardConstants
     chains : Chains
         Of mean of ln E_x, ln E_y, ln G_xy, then ln of their standard deviations, then how far the shared numbers are
         off their mean.
-    convergence : Convergence
     common : (n_shared, n_shared) array
         Covariance of the standard coordinates of the shared numbers, from all boards.
     """
@@ -135,18 +130,12 @@ def find_population(
 
     Parameters
     ----------
-    boards : sequence of BoardConstants
     prior : PriorCard
         Of E_x, E_y, G_xy. Its medians and factors are believed of the mean; the standard deviation of ln E is
         half-normal on the scale of the factor.
-    settings : SamplerSettings
     common : (n_shared, n_shared) array, optional
         Covariance of the standard coordinates of what all boards share, which is off by the same on all of them: the
         mean of many boards does not average it out.
-
-    Returns
-    -------
-    Population
     """
     common = np.zeros((0, 0)) if common is None else common
     away = np.array([one.slopes @ np.linalg.cholesky(common) for one in boards])

@@ -78,7 +78,6 @@ def widths(shared: Sequence[Shared], hyper: Floats) -> Floats:
 
     Parameters
     ----------
-    shared : sequence of Shared
     hyper : (n, n_shared + n_scatters) array
         Standard coordinates of the numbers, then of their scatters.
     """
@@ -101,7 +100,6 @@ class ScatteredLikelihood:
 
     Attributes
     ----------
-    shared : tuple of Shared
     own : SharedLikelihood
         The board's, of its own numbers.
     pull : Pull

@@ -55,8 +55,6 @@ class Explanation:
         Empty for none; two where both are shared or the second is each board's own.
     board : str
         The one board; otherwise empty.
-    log_evidence : float
-    probability : float
     """
 
     way: Way
@@ -72,7 +70,6 @@ class BoardSearch:
 
     Attributes
     ----------
-    name : str
     ground : Ground
         With the labels of each hypothesis.
     """
@@ -135,9 +132,6 @@ def search_board(
 
     Parameters
     ----------
-    name : str
-    baseline : Baseline
-    effects : sequence of str
     tell : callable, optional
         Told which share of the effects is done.
     """
@@ -166,7 +160,6 @@ def explanations(boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...
 
     Parameters
     ----------
-    boards : sequence of BoardSearch
     effects : sequence of tuple of str
         Those of `shareable`: single ones, and pairs.
     """

@@ -81,7 +81,6 @@ def shared_by(card: CampaignCard, boards: Sequence[Board]) -> tuple[Shared, ...]
 
     Parameters
     ----------
-    card : CampaignCard
     boards : sequence of Board
         With the shared effects declared.
 

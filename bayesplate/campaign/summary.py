@@ -213,7 +213,6 @@ def learning_warnings(learnt: Learnt, effective: Mapping[str, float]) -> tuple[s
 
     Parameters
     ----------
-    learnt : Learnt
     effective : dict of float
         By board: draws of equal weight that its posterior under all boards rests on.
     """

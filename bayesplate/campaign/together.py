@@ -39,7 +39,6 @@ class Together:
 
     Attributes
     ----------
-    shared : tuple of Shared
     names : tuple of str
         Of the boards.
     likelihoods : tuple of Likelihood
@@ -209,7 +208,6 @@ def walk(
     -------
     chains : Chains
         Of standard coordinates: the shared numbers, then their scatters.
-    convergence : Convergence
     """
     names = [one.name for one in together.coordinates]
     return sample(together.log_density, *together.moments(), settings, names=names, progress=progress)

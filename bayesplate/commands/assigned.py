@@ -53,7 +53,6 @@ class MostlyKnown:
     ----------
     model : SetupModel
         Of the setup with nothing but bare peaks.
-    values : dict of float
     log_rigidities : (n_draws, n_constants) array
         Of the free ones.
     noise : float
@@ -160,13 +159,8 @@ def mostly_known(way: Way, bare: Board) -> MostlyKnown:
 
     Parameters
     ----------
-    way : Way
     bare : Board
         With all the peaks, bare.
-
-    Returns
-    -------
-    MostlyKnown
     """
     estimate = weighted_least_squares(way.board)
     scales = estimate.scales

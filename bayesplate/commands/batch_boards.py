@@ -44,10 +44,6 @@ class Source(Protocol):
 class Folder:
     """The board cards of a folder; priors, campaigns, coefficient tables and what `pick` writes are left aside.
 
-    Parameters
-    ----------
-    path : Path
-
     Raises
     ------
     InputError
@@ -108,7 +104,6 @@ class Table:
 
     Parameters
     ----------
-    path : Path
     template : str or path
         A board card.
 

@@ -32,10 +32,6 @@ def grading_request(match: str | None, limit: Sequence[str], rigidity: float | N
     rigidity : float or None
         D_x, N m.
 
-    Returns
-    -------
-    GradingRequest
-
     Raises
     ------
     InputError

@@ -169,7 +169,6 @@ def computed(workers: Workers, calls: Iterable[tuple[Key, Call]]) -> Answers[Key
 
     Parameters
     ----------
-    workers : Workers
     calls : iterable of (key, Call)
 
     Yields

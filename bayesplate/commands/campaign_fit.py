@@ -106,8 +106,6 @@ def fit_boards(campaign: Campaign, seed: int, checkpoints: Path | None, stages: 
 
     Parameters
     ----------
-    campaign : Campaign
-    seed : int
     checkpoints : Path or None
         Folder of the unfinished run's chunks, one subfolder per board; None keeps none.
     stages : Stages

@@ -35,7 +35,6 @@ class Fitted:
 
     Attributes
     ----------
-    problem : Problem
     inference : Inference
         Chains and the verdict of the convergence gate.
     draws : Draws
@@ -71,8 +70,6 @@ class Opened:
 
     Attributes
     ----------
-    problem : Problem
-    seed : int
     folder : OutputFolder or None
         None if nothing is to be written.
     """
@@ -112,18 +109,12 @@ def opened(
 
     Parameters
     ----------
-    problem : Problem
-    seed : int
     out : path or None
         Output folder; None writes nothing.
     force, resume : bool
         Replace the results in the folder, or continue an interrupted run.
     first : str
         Which of several fits comes first: the subfolder of its checkpoint.
-
-    Returns
-    -------
-    Opened
 
     Raises
     ------
@@ -158,17 +149,10 @@ def fitted(
 
     Parameters
     ----------
-    problem : Problem
-    seed : int
     checkpoints : Path or None
         Folder of the unfinished run's chunks, one subfolder per law; None keeps none.
     refuse : callable
         Called with an inference that failed the convergence gate; raises.
-    progress : callable, optional
-
-    Returns
-    -------
-    Fitted
     """
 
     def sampled(under: PosedProblem) -> tuple[Inference, Draws]:
@@ -197,7 +181,6 @@ def not_converged(
 
     Parameters
     ----------
-    convergence : Convergence
     doubts : sequence of str
         What is unusual about the board that they are of: the likeliest cause.
     of : str

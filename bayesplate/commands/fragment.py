@@ -37,15 +37,10 @@ def fragment_text(
         Number of a peak to the label that is stated, and the confidence in it.
     spectra : Spectra
         With the places of hammer and sensor.
-    files : sequence of str
     name : str
         Of the card's setup; empty if it has none.
     sensor_mass : (float, float), optional, kg
         Of the accelerometer, and its standard deviation.
-
-    Returns
-    -------
-    str
     """
     likely = [(i, peak) for i, peak in enumerate(peaks) if peak.is_likely]
     told = ", ".join("".join(c for c in one if c.isprintable()) for one in files[:3]) + (

@@ -94,16 +94,10 @@ def label_peaks(
     ----------
     board : Board
         With one setup; what was read in it before is not used.
-    prior : PriorCard
-    picked : Picked
     flips : bool or None
         Whether force and response have opposite polarity; None if that is to be found.
     pictures : mapping
         Number of a likely peak to pictures of sand at its frequency.
-
-    Returns
-    -------
-    Labels
 
     Raises
     ------

@@ -141,7 +141,6 @@ def given_places(
     ----------
     hammer, sensor : sequence of (float, float), m
         None, one, or as many as there are files.
-    files : sequence
     """
     columns = []
     for given in (hammer, sensor):

@@ -34,7 +34,6 @@ class Prepared:
 
     Attributes
     ----------
-    named : NamedCards
     stated : Board
         As its card states it, and the prior what the card does not: what to vary by `dataclasses.replace`. A board made
         in Python is read from its own table.
@@ -101,10 +100,6 @@ def prepare(
         Whether a board that was not measured yet will do.
     setup : str or path, optional
         A file with a table [setup] that takes the place of the card's, key by key: what `pick` writes.
-
-    Returns
-    -------
-    Prepared
 
     Raises
     ------

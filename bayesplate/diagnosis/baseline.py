@@ -92,7 +92,6 @@ class Baseline:
 
     Attributes
     ----------
-    board : Board
     values : dict of float
         Rigidities and inputs at the estimate, SI.
     log_rigidities : (n_constants,) array

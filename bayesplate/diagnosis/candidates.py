@@ -19,12 +19,10 @@ class Amplitude:
 
     Attributes
     ----------
-    parameter : str
     form : str
         Which form of the effect, empty if it has one.
     q05, q50, q95 : float
         In `unit`.
-    unit : str
     """
 
     parameter: str
@@ -53,15 +51,12 @@ class EffectEntry:
         Whether these readings could not show it even if it were there.
     bias_percent : dict of float
         What ignoring it does to each modulus.
-    inclusion_probability, inclusion_probability_with_doubled_priors : float
     log_bayes_factor, ockham_log_factor : float
         Against no effect, and the part of it that the width of the prior costs.
-    p_value : float or None
     amplitude : Amplitude or None
         None if it has no size.
     learnt_bits : dict of float
         How far the posterior of each of its sizes left the prior, by parameter.
-    look_alikes : tuple of str
     rejected_because : str or None
         None if it is part of the verdict.
     fate : str

@@ -48,7 +48,6 @@ class Condition:
         the effect, at least 0.05.
     value, limit : float or None
         None where too few readings leave nothing to judge by.
-    is_met : bool
     """
 
     name: ConditionName
@@ -80,15 +79,8 @@ def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Ne
 
     Parameters
     ----------
-    found : Found
-    verdict : Verdict
-    control : NullControl
     folded : Nested or None
         Of the board's own readings; it and the control without those whose modes alone carry something.
-
-    Returns
-    -------
-    Claim
     """
     if not verdict.index:
         return Claim()
@@ -117,8 +109,6 @@ def named_in_part(
 
     Parameters
     ----------
-    found : Found
-    verdict : Verdict
     folded : Nested or None
         Of the board's own readings.
     others : iterable of (str, Found), optional

@@ -29,9 +29,6 @@ def draw_constants(
 
     Parameters
     ----------
-    found : Found
-    rng : numpy.random.Generator
-    n_draws : int
     among : sequence of int, optional
         Hypotheses to average over, weighted by their probability; by default all, by that under the exact law.
     sampled : dict, optional

@@ -31,11 +31,8 @@ def effect_entry(
 
     Parameters
     ----------
-    found : Found
-    verdict : Verdict
     ranked : sequence of Answer
         Best first.
-    one : Candidate
     doubled : float
         Its inclusion probability with the width of every amplitude prior doubled.
     """
@@ -165,11 +162,8 @@ def fate_of(found: Found, verdict: Verdict, ranked: Sequence[Answer], name: str,
 
     Parameters
     ----------
-    found : Found
-    verdict : Verdict
     ranked : sequence of Answer
         Best first.
-    name : str
     index : int
         Of the hypothesis that it acts alone.
     """

@@ -63,23 +63,16 @@ class Case:
 
     Attributes
     ----------
-    found : Found
-    verdict : Verdict
-    control : NullControl
-    folded : Nested or None
     before, after : Side
         The same where nothing was added.
     claim : Claim
         Of the explanation that was fitted again.
-    recommendation : str
     known : sequence of KnownFit
         The board as it stands first.
-    stated_claims : sequence of StatedClaim
     finalists : sequence of (Answer, Side)
         Explanations that were fitted again, best first, or the one that comes nearest where none is enough.
     has_slip : bool
         Whether the fit without an effect names a reading or two that a slip explains.
-    notes : tuple of str
     in_part : tuple of str
         Effects that explain the readings in part.
     carrying : tuple of CarryingMode
@@ -109,16 +102,7 @@ class Case:
 
 
 def diagnosis_of(case: Case) -> Diagnosis:
-    """The result of a diagnosis.
-
-    Parameters
-    ----------
-    case : Case
-
-    Returns
-    -------
-    Diagnosis
-    """
+    """The result of a diagnosis."""
     found, verdict, control = case.found, case.verdict, case.control
     ranked = answers(found)
     halved, doubled = (varied(found, width=WIDTHS[word]) for word in ("halved", "doubled"))

@@ -76,7 +76,6 @@ def nested(ground: Ground, residuals: Floats, needed_from: float = CERTAINLY_NEE
 
     Parameters
     ----------
-    ground : Ground
     residuals : (n_sets, n_modes) array
     needed_from : float
         ln odds against no effect above which a fold adds the most probable one; `ALWAYS` makes every fold choose.
@@ -124,7 +123,6 @@ def log_score_gains(
 
     Parameters
     ----------
-    ground : Ground
     residual : (n_modes,) array
     chosen : (n_modes,) array of int
         Index of the hypothesis that the fold of each reading chose.
@@ -154,7 +152,6 @@ def carrying(found: Found, index: int) -> tuple[CarryingMode, ...]:
 
     Parameters
     ----------
-    found : Found
     index : int
         Of the hypothesis; 0: without any effect.
     """

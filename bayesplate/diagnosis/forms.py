@@ -17,7 +17,6 @@ class Form:
 
     Attributes
     ----------
-    effect : str
     detail : str
         What tells it from the effect's other forms; empty if there are none.
     board : Board
@@ -39,10 +38,6 @@ class Form:
 
 def forms(board: Board) -> dict[str, tuple[Form, ...]]:
     """Every form of every effect that is not declared and can act in a setup of the board.
-
-    Parameters
-    ----------
-    board : Board
 
     Returns
     -------
@@ -75,7 +70,6 @@ def with_labels_exchanged(board: Board, first: int, second: int) -> Board:
 
     Parameters
     ----------
-    board : Board
     first, second : int
         Indices among the readings of all setups.
     """

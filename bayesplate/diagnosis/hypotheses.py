@@ -57,10 +57,8 @@ class Hypothesis:
     ----------
     members : tuple of str
         Effects that are present; empty for none.
-    prior : float
     table : Table
         Of all modes that readings may be.
-    noise : NoiseGrid
     own : Baseline
         The baseline with the labels that readings have if it is the case.
     swap : Swap or None
@@ -106,7 +104,6 @@ def hypotheses(
 
     Parameters
     ----------
-    baseline : Baseline
     fine, coarse : dict of Table
         By effect; coarse ones are combined.
     paired : sequence of str

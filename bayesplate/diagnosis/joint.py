@@ -39,7 +39,6 @@ def full_search(
 
     Parameters
     ----------
-    baseline : Baseline
     tried : sequence of str, optional
         Effects to try; by default all that can act.
     tell : callable, optional
@@ -49,7 +48,6 @@ def full_search(
     -------
     ground : Ground
         With the labels of the board.
-    found : Found
     """
     ground = prepare_search(baseline, tried=tried, tell=tell)
     found = search(with_own_labels(ground))
@@ -64,7 +62,6 @@ def with_joint_pairs(found: Found, ground: Ground) -> Ground:
     ----------
     found : Found
         Of a search on it, with or without labels of its own under each hypothesis.
-    ground : Ground
 
     Returns
     -------

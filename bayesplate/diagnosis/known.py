@@ -79,7 +79,6 @@ def known_fits(problem: PosedProblem, tell: Callable[[float], None] | None = Non
 
     Parameters
     ----------
-    problem : PosedProblem
     tell : callable, optional
         Told which share of the fits is done.
 
@@ -109,10 +108,6 @@ def known_fit(problem: PosedProblem, combination: Sequence[str] | None = None) -
         The board as it stands.
     combination : sequence of str, optional
         By default the board as it stands, with sizes that it leaves open where its own fit has them.
-
-    Returns
-    -------
-    KnownFit
     """
     own = [name for name in known_effects(problem.board) if name in problem.board.effects]
     baseline = fit_with(problem, combination)

@@ -43,7 +43,6 @@ class Following:
 
     Attributes
     ----------
-    block : ReducedClass
     shapes : (n_modes, r) array
         Shape times mass of its lowest modes: their product with another shape is the share.
     wanted : (n_wanted,) array of int
@@ -104,7 +103,6 @@ class FormLaw:
 
     Attributes
     ----------
-    form : Form
     models : tuple of SetupModel
         With the exact law.
     """
@@ -208,15 +206,9 @@ def form_law(baseline: Baseline, form: Form, half_width: float | None = None) ->
 
     Parameters
     ----------
-    baseline : Baseline
-    form : Form
     half_width : float, optional
         Of the region in ln D_x / D_s and ln D_y / D_s, of which an isotropic board has none; by default three standard
         deviations of the fit.
-
-    Returns
-    -------
-    FormLaw
     """
     board = form.board
     parameters = Parameters(board)

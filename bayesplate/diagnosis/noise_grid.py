@@ -45,7 +45,6 @@ def noise_grid(board: Board, *, few: bool = False, reach: Sequence[float] = ()) 
 
     Parameters
     ----------
-    board : Board
     few : bool
         Fewer levels, for combinations of effects.
     reach : sequence of float, optional
@@ -70,7 +69,6 @@ def reach_of(board: Board, setup_index: NDArray[np.intp], residual: Floats) -> t
 
     Parameters
     ----------
-    board : Board
     setup_index : (n_modes,) array of int
     residual : (n_modes,) array
         ln f; not a number where a reading is no mode.

@@ -92,7 +92,6 @@ def null_control(
     ----------
     ground : Ground
         What the board at hand says does not matter, only its sizes, its modes and its priors do.
-    rng : numpy.random.Generator
     n_sets : int
         At most; fewer as soon as more than the false alarms certainly have larger odds than the board.
     against : float
@@ -122,7 +121,6 @@ def made_to_choose(
 
     Parameters
     ----------
-    ground : Ground
     control : NullControl
         With its sets.
     ratio : float

@@ -38,10 +38,6 @@ _MOST_WAYS, _WORTH = 6, 5.0
 def with_own_labels(ground: Ground) -> Ground:
     """The hypotheses about a board, each with the labels that its readings likely have if it holds.
 
-    Parameters
-    ----------
-    ground : Ground
-
     Returns
     -------
     Ground
@@ -65,7 +61,6 @@ def log_summed(baseline: Baseline, log_frequency: Floats, noise: Floats) -> Floa
 
     Parameters
     ----------
-    baseline : Baseline
     log_frequency : (n_draws, n_every) array
         ln f (Hz) of all modes that readings may be.
     noise : (n_draws, n_setups) array
@@ -87,10 +82,8 @@ def log_of_terms(own: Baseline, seen: Floats, drawn: TermDraws) -> Floats:
 
     Parameters
     ----------
-    own : Baseline
     seen : (n_modes,) array
         ln of the readings.
-    drawn : TermDraws
     """
     kept = own.is_mode
     variance = drawn.noise[:, own.setup_index[kept]] ** 2 + own.own_variance[kept]
@@ -128,7 +121,6 @@ def likely_labels(baseline: Baseline, log_frequency: Floats, noise: Floats, othe
 
     Parameters
     ----------
-    baseline : Baseline
     log_frequency : (n_draws, n_every) array
         ln f (Hz) of all modes that readings may be.
     noise : (n_draws, n_setups) array

@@ -70,7 +70,6 @@ class NullControlSummary:
 
     Attributes
     ----------
-    n_sets : int
     flagged_percent : float
         Share of the sets in which an effect would be called needed.
     log_odds : float or None
@@ -114,10 +113,6 @@ class Finalist:
 
     Attributes
     ----------
-    effects : tuple of str
-    probability : float
-    in_sample_rms_cents : float
-    leave_one_out_rms_cents : float or None
     elastic : dict of Spread
         By modulus.
     sizes : dict
@@ -138,8 +133,6 @@ class Explanation:
 
     Attributes
     ----------
-    effects : tuple of str
-    probability : float
     words : str
         The same as people read it; not written to JSON.
     is_stated : bool

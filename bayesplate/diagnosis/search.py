@@ -40,10 +40,8 @@ class Candidate:
 
     Attributes
     ----------
-    name : str
     laws : tuple of FormLaw
         Of its forms.
-    fine, coarse : Table
     signature : Signature
         Of the form that shows most.
     trace : float
@@ -61,14 +59,7 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """Everything about a board that a search needs, whatever the readings turn out to be.
-
-    Attributes
-    ----------
-    baseline : Baseline
-    candidates : dict of Candidate
-    hypotheses : tuple of Hypothesis
-    """
+    """Everything about a board that a search needs, whatever the readings turn out to be."""
 
     baseline: Baseline
     candidates: Mapping[str, Candidate]
@@ -95,7 +86,6 @@ class Found:
 
     Attributes
     ----------
-    ground : Ground
     residual : (n_modes,) array
         ln measured less ln f of the baseline.
     log_evidence, probability : (n_hypotheses,) array
@@ -155,7 +145,6 @@ def prepare_search(
 
     Parameters
     ----------
-    baseline : Baseline
     solve : callable, optional
         Makes the law of a form around the baseline; by default by full solves.
     tried : sequence of str, optional
@@ -217,8 +206,6 @@ def predictive_p_value(hypothesis: Hypothesis, baseline: Baseline, residuals: Fl
 
     Parameters
     ----------
-    hypothesis : Hypothesis
-    baseline : Baseline
     residuals : (n_sets, n_modes) array
         Of its labels.
 

@@ -59,16 +59,11 @@ def varied(found: Found, *, width: float = 1.0, noise: float = 1.0) -> Found:
 
     Parameters
     ----------
-    found : Found
     width : float
         Factor of the standard deviation of every size's prior. The cells reach three of the old standard deviations;
         what a wider prior puts beyond them counts as unable to explain the readings.
     noise : float
         Factor of every noise prior.
-
-    Returns
-    -------
-    Found
     """
     ground = found.ground
     changed = replace(ground, hypotheses=tuple(_changed(found, i, width, noise) for i in range(len(ground.hypotheses))))
@@ -107,10 +102,6 @@ def _inside(prior: Quantity, factor: float) -> float:
 @lru_cache(maxsize=2)  # the verdict and the averages ask for the same
 def under_exact_law(found: Found) -> Found | None:
     """The same search with every evidence corrected to the exact law.
-
-    Parameters
-    ----------
-    found : Found
 
     Returns
     -------

@@ -124,7 +124,6 @@ def tabulate(baseline: Baseline, laws: Sequence[FormLaw], cells: tuple[int, int,
 
     Parameters
     ----------
-    baseline : Baseline
     laws : sequence of FormLaw
         Of the effect's forms, equally probable.
     cells : tuple of int
@@ -178,10 +177,8 @@ def joint_table(baseline: Baseline, added: Table, laws: JointLaws) -> Table:
 
     Parameters
     ----------
-    baseline : Baseline
     added : Table
         Of both, their shifts added.
-    laws : JointLaws
 
     Returns
     -------
@@ -212,8 +209,6 @@ def refitted(baseline: Baseline, law: FormLaw, z: Floats) -> tuple[Floats, Float
 
     Parameters
     ----------
-    baseline : Baseline
-    law : FormLaw
     z : (n, n_parameters) array
         Standard coordinates.
 

@@ -48,7 +48,6 @@ class Signature:
 
     Attributes
     ----------
-    effect : str
     size : dict of float
         Value of each parameter, SI.
     raw : (n_modes,) array, cents
@@ -100,8 +99,6 @@ def signature(baseline: Baseline, effect: str, sizes: Sequence[Parameter], log_f
 
     Parameters
     ----------
-    baseline : Baseline
-    effect : str
     sizes : sequence of Parameter
         What has its nominal size there.
     log_frequency : (n_modes,) array
@@ -125,7 +122,6 @@ def signatures(problem: PosedProblem, names: Sequence[str] | None = None) -> tup
 
     Parameters
     ----------
-    problem : PosedProblem
     names : sequence of str, optional
         By default all that are not declared and can act in at least one setup of the board.
 

@@ -24,7 +24,6 @@ def size_posterior(found: Found, index: int, member: int, form: int, parameter: 
 
     Parameters
     ----------
-    found : Found
     index : int
         Of the hypothesis.
     member : int

@@ -72,8 +72,6 @@ def judge_stated(
 
     Parameters
     ----------
-    effects : sequence of str
-    predicts : str
     before, after : (n_readings,) arrays
         ln f, errors of prediction.
     gains : (n_modes,) array
@@ -106,7 +104,6 @@ def stated_claims(problem: PosedProblem, fits: Sequence[KnownFit]) -> tuple[Stat
 
     Parameters
     ----------
-    problem : PosedProblem
     fits : sequence of KnownFit
         Of its combinations.
 

@@ -157,7 +157,6 @@ def candidates_table(diagnosis: Diagnosis, *, narrow: bool = False) -> Table | N
 
     Parameters
     ----------
-    diagnosis : Diagnosis
     narrow : bool
         Fit for a terminal: without the bias and the look-alikes, the reason of a rejection in two words.
     """
@@ -253,13 +252,8 @@ def write_diagnosis_tables(folder: Path, diagnosis: Diagnosis, title: str) -> tu
     ----------
     folder : Path
         Must be there.
-    diagnosis : Diagnosis
     title : str
         Of the board; any text.
-
-    Returns
-    -------
-    tuple of Path
     """
     written: tuple[Path, ...] = ()
     for names, table in ((BEFORE_AFTER, before_after_table(diagnosis)), (KNOWN_EFFECTS, known_table(diagnosis.known))):

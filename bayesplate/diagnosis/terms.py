@@ -37,8 +37,6 @@ class Terms:
     ----------
     table : Table
         Of the modes that the readings are taken for.
-    baseline : Baseline
-    noise : NoiseGrid
     """
 
     table: Table

@@ -32,7 +32,6 @@ class Answer:
 
     Attributes
     ----------
-    members : tuple of str
     index : int
         Of its hypothesis.
     support : float
@@ -58,7 +57,6 @@ class Verdict:
         Hypothesis to refit; 0 if the model stays as it is.
     best : Answer or None
         The most probable answer, whatever the verdict.
-    reason : str
     is_needed : bool
         Whether the odds against no effect are larger than the null simulations leave to chance.
     stands_for : tuple of Answer
@@ -121,16 +119,11 @@ def decide(found: Found, control: NullControl, others: Iterable[tuple[str, Found
 
     Parameters
     ----------
-    found : Found
     control : NullControl
         What the search makes of boards without any effect.
     others : iterable of (str, Found), optional
         The searches that a name has to survive, each with what is assumed there; by default those of `variants`, made
         only if there is a name.
-
-    Returns
-    -------
-    Verdict
     """
     ranked = answers(found)
     best = ranked[0] if ranked else None

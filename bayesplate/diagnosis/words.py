@@ -62,7 +62,6 @@ class Merit:
 
     Attributes
     ----------
-    words : str
     of : callable
         Takes it from the errors of a model.
     shown : callable

@@ -51,10 +51,6 @@ class AttachedMass(Effect):
 
     A place that nobody knows is no continuous parameter: `forms` tries a few places instead. Places are fractions
     of the nominal sides. An exciter is no point mass: its magnet hangs on a spring.
-
-    Attributes
-    ----------
-    items : tuple of Item
     """
 
     items: tuple[Item, ...] = ()

@@ -45,7 +45,6 @@ class Contribution:
 
     Attributes
     ----------
-    terms : Terms
     weight : Weight
         s^-2 of a stiffness, of a mass a fraction of the vibrating mass.
     """
@@ -230,8 +229,6 @@ class Effect(ABC):
 
         Parameters
         ----------
-        key : str
-        prior : Quantity
         unit : str
             SI.
         null : float

@@ -25,12 +25,7 @@ def clamped_ends(setup: Setup) -> ClampedEnds:
 
 @dataclass(frozen=True)
 class CompliantClamp(Effect):
-    """Springs of one stiffness in place of what all clamped edges of a setup hold.
-
-    Attributes
-    ----------
-    clamped : ClampedEnds
-    """
+    """Springs of one stiffness in place of what all clamped edges of a setup hold."""
 
     clamped: ClampedEnds = ((False, False), (False, False))
 

@@ -75,7 +75,6 @@ class Drive:
         Of the whole, and of the coil with what is glued to the board.
     suspension : (Quantity, str)
         Stiffness in N/m, or the resonance of the magnet on its suspension in Hz.
-    is_resonance : bool
     is_held : bool
         Whether the magnet is held, so that the suspension is a spring to the ground.
     places : tuple of (float, float)

@@ -52,7 +52,6 @@ class Exciter(Effect):
 
     Attributes
     ----------
-    drives : tuple of Drive
     ends_x, ends_y : tuple of str
         How the edges are held.
     orders : (int, int)

@@ -41,7 +41,6 @@ class FieldProfile:
 
     Attributes
     ----------
-    expected : Surface
     with_mean : Surface or None
         What d gains where the board's mean is one of its standard deviations higher; None: nothing.
     components : tuple of Surface
@@ -91,7 +90,6 @@ def field_profile(found: ConditionedField, held: tuple[Held, ...], power: int, m
 
     Parameters
     ----------
-    found : ConditionedField
     held : tuple of Held
         One per setup.
     power : int

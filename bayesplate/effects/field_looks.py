@@ -29,10 +29,6 @@ def look(surface: Surface, mean: float, more: str) -> str:
         Of the field over the board, m.
     more : str
         "thicker" or "wider".
-
-    Returns
-    -------
-    str
     """
     terms = sorted(zip(surface.coefficients, surface.degrees, strict=True), key=lambda one: -abs(one[0]))
     told = [(value, degrees) for value, degrees in terms[:_MOST_TOLD] if value**2 >= _TOLD * surface.size**2]

@@ -93,10 +93,6 @@ def coefficient_rows(
         Whether to solve plates of both theories to say which a published table is of; half a second where it has many
         modes.
 
-    Returns
-    -------
-    CoefficientRows
-
     Raises
     ------
     InputError
@@ -214,10 +210,6 @@ def named_table(board_name: str, setup: Setup) -> CoefficientCard:
 
 def coefficient_faults(board: Board) -> list[Fault]:
     """Tables that are not of their setup's edges, aspect ratio and labels.
-
-    Parameters
-    ----------
-    board : Board
 
     Returns
     -------

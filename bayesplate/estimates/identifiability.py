@@ -197,8 +197,6 @@ def remarks(board: Board, found: Identifiability, carrying: str | None = None) -
 
     Parameters
     ----------
-    board : Board
-    found : Identifiability
     carrying : str, optional
         What a fit says of modes that alone carry something; before there is one, their leverages here say it.
     """

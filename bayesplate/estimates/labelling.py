@@ -34,10 +34,6 @@ def with_labels(setup: Setup, peaks: PeakLikelihood, probabilities: NDArray[np.f
         Of each peak to be each mode.
     least : float
         At least one half, so that no two peaks have the same label.
-
-    Returns
-    -------
-    Setup
     """
     likely = [_likely(peaks.labels, row, least) for row in probabilities]
     of_reading = {int(at): label for at, label in zip(peaks.readings, likely, strict=True) if at >= 0}

@@ -50,7 +50,6 @@ class Estimate:
         ln measured - ln predicted.
     scales : (n_modes,) array
         Relative uncertainty of each reading that weighs it, see `reading_scales`.
-    converged : bool
     """
 
     rigidities: NDArray[np.float64]

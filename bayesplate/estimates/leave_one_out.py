@@ -83,7 +83,6 @@ class CarryingMode:
 
     Attributes
     ----------
-    setup, label : str
     leverage : float
         Share of the mode in its own prediction, above 0.9.
     carries : str
@@ -144,8 +143,6 @@ def carrying_modes(board: Board, found: Leverages, names: Sequence[str]) -> tupl
 
     Parameters
     ----------
-    board : Board
-    found : Leverages
     names : sequence of str
         Of the parameters, the constants first.
     """
@@ -212,10 +209,6 @@ def prediction_errors(
         Readings of each mode; by default one each.
     scales : (n_modes,) array, optional
         Relative uncertainties by which the leverages weigh the readings; by default those of normal errors.
-
-    Returns
-    -------
-    Errors
     """
 
     n = n_constants(predict)

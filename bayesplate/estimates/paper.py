@@ -89,7 +89,6 @@ def paper_system(
 
     Parameters
     ----------
-    board : Board
     estimate : Estimate
         Where the modes' own coefficients are taken.
     source : "sensitivity", "training" or "published", optional

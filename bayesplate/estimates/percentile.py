@@ -50,10 +50,6 @@ class PercentileEstimate:
 def percentile_estimate(system: PaperSystem) -> PercentileEstimate | None:
     """The paper's estimate of E_x, E_y, G_xy from all subsets of the modes.
 
-    Parameters
-    ----------
-    system : PaperSystem
-
     Returns
     -------
     PercentileEstimate or None

@@ -35,7 +35,6 @@ class Suspect:
 
     Attributes
     ----------
-    question : str
     frequency : float
         What the frequencies on the card are, over what they would be in Hz.
     wrong : tuple of (str, float)
@@ -177,9 +176,6 @@ def prior_predictive(
 
     Parameters
     ----------
-    board : Board
-    prior : PriorCard
-    rng : numpy.random.Generator
     suspects : sequence of Suspect
         Mistakes to be mended first; by default none, which is the board as it is stated.
 
@@ -217,12 +213,6 @@ def require_plausible(board: Board, prior: PriorCard, rng: np.random.Generator) 
 
     Asked where the readings are out of the prior's reach, or would need a material that there is not, and mending one
     of `SUSPECTS` brings them within it. Refused in any case where no material carries sound so fast or so slowly.
-
-    Parameters
-    ----------
-    board : Board
-    prior : PriorCard
-    rng : numpy.random.Generator
 
     Raises
     ------

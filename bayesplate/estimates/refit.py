@@ -64,7 +64,6 @@ def refit(predict: Predict, target: Floats, scales: Floats, start: Floats, bound
         Relative uncertainties.
     start : (n_free,) array
         Within the bounds.
-    bounds : Bounds, optional
 
     Returns
     -------
@@ -109,7 +108,6 @@ def most_likely(
         See `Misfit`.
     start : (n_free,) array
         Within the bounds.
-    bounds : Bounds, optional
     left_out : sequence of int, optional
         Readings that are not used.
 

@@ -22,7 +22,6 @@ def labelled_shapes(models: Sequence[SetupModel], values: Values) -> dict[str, d
 
     Parameters
     ----------
-    models : sequence of SetupModel
     values : dict of float
         D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
 

@@ -38,8 +38,6 @@ class SheetMode:
     ----------
     name : str
         Its label, or "cannot tell".
-    hertz : float
-    measured_hz : float or None
     band_hz : tuple of float or None
         Where it is expected two times in three: by the prior alone, or by the modes measured so far.
     shares : (4,) array
@@ -80,14 +78,10 @@ class Sheet:
 
     Attributes
     ----------
-    title : str
-    setup : str
-    edges : dict of str
     first_label : str
         At which this laboratory's names begin.
     aspect_ratio : float
         L_x / L_y of the part that vibrates, L_y where it is widest.
-    theory : str
     basis : str
         At which constants the modes are computed.
     modes : tuple of SheetMode
@@ -147,7 +141,6 @@ class Precision:
         frequency : float, Hz
         shares : (3,) array
             Of D_x, D_y, D_s in the mode's energy: twice the sensitivities of ln f.
-        setup : str
         """
         variance = 0.25 * shares @ self.covariance @ shares + self.noise[setup] ** 2
         factor = float(np.exp(_TWO_THIRDS * np.sqrt(variance)))
@@ -164,7 +157,6 @@ def sampled(modes: Modes, limits: Limits | None, grid: NDArray[np.float64]) -> N
 
     Parameters
     ----------
-    modes : Modes
     limits : ((n,) array, (n,) array) or None
         Of the plate at the grid (`System.limits`).
     grid : (n,) array
@@ -199,8 +191,6 @@ def sheet(
 
     Parameters
     ----------
-    board : Board
-    system : System
     values : dict of float
         D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
     basis : str
@@ -211,10 +201,6 @@ def sheet(
         Of the estimate at which the modes are computed; it gives the bands of the modes that were not measured.
     numbers : sequence of int
         Of modes, rising: the first that holds every measured label is solved, or the last.
-
-    Returns
-    -------
-    Sheet
     """
     setup = system.setup
     measured = {str(reading.label): reading.frequency.mean for reading in setup.readings}

@@ -32,14 +32,8 @@ def unusual(board: Board, prior: PriorCard, rigidities: Floats) -> tuple[str, ..
 
     Parameters
     ----------
-    board : Board
-    prior : PriorCard
     rigidities : (3,) array, N m
         D_x, D_y, D_s, as by least squares.
-
-    Returns
-    -------
-    tuple of str
     """
     values = board.nominal() | dict(zip(RIGIDITIES, rigidities, strict=True))
     elastic = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])

@@ -94,8 +94,6 @@ def search_widely(board: Board, prior: PriorCard, rng: np.random.Generator) -> l
     ----------
     board : Board
         Labels tell the symmetry class of their peak here, and nothing else.
-    prior : PriorCard
-    rng : numpy.random.Generator
 
     Returns
     -------
@@ -186,8 +184,6 @@ class _Modes:
 
     Attributes
     ----------
-    system : System
-    nominal : dict of float
     reduced : ReducedOrderModel
         Of the modes at some members of a population.
     scale : float

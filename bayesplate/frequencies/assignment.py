@@ -52,7 +52,6 @@ class Near:
 
     Attributes
     ----------
-    n_peaks : int
     first, end : lists of n_modes int
         The first of these peaks, and the one after the last: none where the end is not beyond the first.
     low : list of n_modes int

@@ -38,15 +38,10 @@ def columns(system: System, values: Values, stiffness: NDArray[np.float64]) -> C
 
     Parameters
     ----------
-    system : System
     values : dict of float
         D_x, D_y, D_s (N m), the board's inputs and the effects' parameters, where the modes were computed.
     stiffness : (n_modes, n_terms) array
         phi' K_i phi of the mass-normalised modes.
-
-    Returns
-    -------
-    Columns
 
     References
     ----------

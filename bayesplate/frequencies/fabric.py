@@ -92,9 +92,7 @@ def over_fields(base: Weights, effects: Sequence[Effect], theory: Theory, values
         (n_draws, n_own) arrays, of the plate's own terms once each, without effects.
     effects : sequence of Effect
         As given to `fabric_of`.
-    theory : "thin" or "shear-flexible"
     values : dict of array
-    setup : Setup
 
     Returns
     -------

@@ -11,16 +11,7 @@ from bayesplate.plate.beams import is_rigid
 
 
 def label_faults(board: Board) -> list[Fault]:
-    """Every label of a board that is not in its model.
-
-    Parameters
-    ----------
-    board : Board
-
-    Returns
-    -------
-    list of Fault
-    """
+    """Every label of a board that is not in its model."""
     return [
         Fault(
             f'{board.name}.toml setup "{setup.name}" frequencies_hz "{reading.label}"',

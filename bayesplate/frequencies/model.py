@@ -33,7 +33,6 @@ class OtherMode:
 
     Attributes
     ----------
-    place : Place
     beams : (int, int) or None
         Orders of the beam functions that its shape resembles; None where it clearly resembles none.
     """
@@ -56,10 +55,8 @@ class SetupModel:
     ----------
     system : System
         The setup and its effects.
-    plate : Plate
     places : tuple of Place
         Where each labelled mode stands at the estimate; from there on a label means this rank of this class.
-    linear : LinearLaw
     exact : ExactLaw or None
         None until `with_exact` has built it.
     others : tuple of OtherMode
@@ -207,7 +204,6 @@ def setup_model(
 
     Parameters
     ----------
-    system : System
     values : dict of float
         D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
     plate : Plate, optional
@@ -269,7 +265,6 @@ def with_others(model: SetupModel, values: Values) -> SetupModel:
 
     Parameters
     ----------
-    model : SetupModel
     values : dict of float
         Where it was made.
 

@@ -97,7 +97,6 @@ class PeakLikelihood:
 
         Parameters
         ----------
-        model : SetupModel
         robust : bool
             Student's distribution for the noise.
         """
@@ -214,7 +213,6 @@ class PeakLikelihood:
             That order.
         log_missed : (n_modes, n_draws) array
             ln of the probability that each left no peak.
-        assignments : Assignments
         """
         log_missed = self._log_missed(there.T, noise)
         modes = np.argsort(there[0])[:, None]

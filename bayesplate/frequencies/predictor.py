@@ -23,8 +23,6 @@ class Predictor:
     ----------
     values : callable
         From (n, n_free) parameters to constants and sizes by name, SI.
-    models : sequence of SetupModel
-    law : "linear" or "exact"
     rows : (n_modes,) array of int, optional
         Which of all modes that the models have; by default all of them.
     n_constants : int

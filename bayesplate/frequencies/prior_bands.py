@@ -35,14 +35,6 @@ def prior_bands(
     From Rayleigh quotients of beam-function products, draw by draw: a few per cent off each frequency, which cancel in
     the factors.
 
-    Parameters
-    ----------
-    board : Board
-    prior : PriorCard
-    setup : Setup
-    labels : sequence of Label
-    rng : numpy.random.Generator
-
     Returns
     -------
     dict of (float, float)

@@ -156,7 +156,6 @@ class ReadingErrors:
         ----------
         lowest, highest : (n_modes,) array
             ln f (Hz).
-        least_noise, most_noise : float
 
         Returns
         -------
@@ -207,7 +206,6 @@ class ReadingErrors:
         predicted : (n_draws, n_modes) array
             ln f (Hz).
         noise : float or (n_draws,) array
-        rng : numpy.random.Generator
 
         Returns
         -------

@@ -31,8 +31,6 @@ def residues_of(setup: Setup, modes: Modes, values: Values, shaped: Effect | Non
 
     Parameters
     ----------
-    setup : Setup
-    modes : Modes
     values : dict of float
         The board's sizes.
     shaped : Effect, optional

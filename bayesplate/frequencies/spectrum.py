@@ -51,16 +51,13 @@ def spectrum(
 
     Parameters
     ----------
-    system : System
     values : dict of float
         D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
-    n_modes : int
     plate : Plate, optional
         Matrices to use again; by default those of the production mesh for these values.
 
     Returns
     -------
-    modes : Modes
     named : tuple of NamedMode
         In the order of frequency.
     """
@@ -79,7 +76,6 @@ def spectra(models: Sequence[SetupModel], values: Values) -> dict[str, tuple[Mod
 
     Parameters
     ----------
-    models : sequence of SetupModel
     values : dict of float
         D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
 

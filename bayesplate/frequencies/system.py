@@ -28,13 +28,7 @@ Limits = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class System:
-    """A setup and the effects that act in it.
-
-    Attributes
-    ----------
-    setup : Setup
-    effects : tuple of Effect
-    """
+    """A setup and the effects that act in it."""
 
     setup: Setup
     effects: tuple[Effect, ...] = ()

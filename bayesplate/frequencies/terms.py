@@ -19,7 +19,6 @@ def term_weights(values: Values, setup: Setup) -> Weights:
     ----------
     values : dict of array
         D_x, D_y, D_s (N m) and the board's inputs; numbers or (n_draws,) arrays.
-    setup : Setup
 
     Returns
     -------
@@ -60,7 +59,6 @@ def shear_term_weights(values: Values, setup: Setup) -> Weights:
     values : dict of array
         D_x, D_y, D_s (N m), G_xz and G_yz (Pa, positive) and the board's inputs; numbers or (n_draws,) arrays.
         G_xz and G_yz as of `shear_moduli`.
-    setup : Setup
 
     Returns
     -------
@@ -100,7 +98,6 @@ def along_grain(base: Weights, values: Values, setup: Setup) -> Weights:
         Of the plate's own terms, those of `term_weights` first.
     values : dict of array
         As given to `term_weights`.
-    setup : Setup
 
     Returns
     -------
@@ -138,7 +135,6 @@ def paper_coefficients(coefficients: NDArray[np.float64], aspect_ratio: float, n
     coefficients : (n_modes, 4) array
     aspect_ratio : float
         L_x / L_y.
-    nu_xy : float
 
     Returns
     -------

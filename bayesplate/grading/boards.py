@@ -54,7 +54,6 @@ class BoardRow:
         Why the constants of a fitted board are not to be trusted; empty where nothing speaks against them.
     card_sha256 : str
         Empty where no card could be read.
-    seed : int or None
     told : dict of str
         Theory, law, effects and prior of a fitted board.
     numbers : dict of float
@@ -151,7 +150,6 @@ def told_rows(rows: Sequence[BoardRow], place: Callable[[int], str]) -> Sequence
 
     Parameters
     ----------
-    rows : sequence of BoardRow
     place : callable
         Where the board of a row stands, "tops.csv row 3"; empty where its own file says so.
 
@@ -226,11 +224,8 @@ class BatchSummary:
 
     Attributes
     ----------
-    format : int
     seed : int
         From which each board's own follows.
-    versions : dict of str
-    n_boards, n_fitted, n_failed : int
     failed : tuple of Failure
         In the order of their names.
     doubts : tuple of Doubt

@@ -221,11 +221,6 @@ def grade(rows: Sequence[BoardRow], request: GradingRequest) -> Grading:
     ----------
     rows : sequence of BoardRow
         Fitted or not.
-    request : GradingRequest
-
-    Returns
-    -------
-    Grading
     """
     names: list[str] = []
     doubts: list[str] = []

@@ -157,12 +157,6 @@ def write_table(folder: Path, kind: TableKind, rows: Iterable[BoardRow]) -> Path
     ----------
     folder : Path
         Must be there.
-    kind : "csv" or "parquet"
-    rows : iterable of BoardRow
-
-    Returns
-    -------
-    Path
     """
     path = folder / table_name(kind)
     with writing(path), whole_file(path) as stream:

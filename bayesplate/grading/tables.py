@@ -36,7 +36,6 @@ def grading_tables(graded: Grading, most: int = MOST_LISTED) -> dict[str, Table]
 
     Parameters
     ----------
-    graded : Grading
     most : int
         Boards, or pairs, in each.
     """

@@ -82,7 +82,6 @@ class Explanation:
     ----------
     members : tuple of str
         Effects that are present; empty for none.
-    words : str
     probability : float
         Among the explanations that survive; they sum to one.
     mean : (n_terms, n_u) array
@@ -127,7 +126,6 @@ class KnownBoard:
 
     Attributes
     ----------
-    board : Board
     values : dict of float
         Rigidities and inputs about which its modes are computed, SI.
     laws : tuple of BareLaw
@@ -154,7 +152,6 @@ class Beliefs:
 
     Attributes
     ----------
-    boards : tuple of KnownBoard
     explanations : tuple of Explanation
         The most probable first.
     shared : tuple of str
@@ -226,7 +223,6 @@ def log_moduli(board: Board, log_rigidities: Floats) -> tuple[Floats, Floats]:
 
     Parameters
     ----------
-    board : Board
     log_rigidities : (n_constants,) array
     """
     parameters = Parameters(board)

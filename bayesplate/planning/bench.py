@@ -38,10 +38,8 @@ class Bench:
 
     Attributes
     ----------
-    entry : BenchEntry
     sheet : Sheet
         Of the modes to look for alone.
-    placing : Placing
     """
 
     entry: BenchEntry
@@ -64,8 +62,6 @@ def bands(beliefs: Beliefs, readings: Readings, within: Sequence[float] = BAND) 
 
     Parameters
     ----------
-    beliefs : Beliefs
-    readings : Readings
     within : sequence of float
         Probabilities.
     """
@@ -91,8 +87,6 @@ def bench_of(known: KnownBoard, law: BareLaw, rows: Sequence[int], ends: Floats,
 
     Parameters
     ----------
-    known : KnownBoard
-    law : BareLaw
     rows : sequence of int
         Which of its modes.
     ends : (n_rows, 3) array

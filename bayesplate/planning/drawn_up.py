@@ -26,7 +26,6 @@ def drawn_up(
 
     Parameters
     ----------
-    planner : Planner
     name, title, card_sha256 : str
         Of the card.
     priors, shared

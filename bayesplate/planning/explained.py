@@ -56,7 +56,6 @@ def believed(
 
     Parameters
     ----------
-    found : Found
     prior : PriorCard or None
         Of the noise where the board was never held.
     rng : numpy.random.Generator
@@ -188,7 +187,6 @@ def survivors(found: Found, rivals: Collection[tuple[str, ...]] = ()) -> tuple[A
 
     Parameters
     ----------
-    found : Found
     rivals : collection of tuple of str
         Answers that survive in any case: alternatives that a verdict lists because another assumption favours them.
     """

@@ -83,9 +83,6 @@ def expected_gain(
 
     Parameters
     ----------
-    beliefs : Beliefs
-    readings : Readings
-    rng : numpy.random.Generator
     goal : str, optional
         One of `GOALS`: what the score counts. By default the drop of the explanations' entropy and the mean shrinkage,
         both logarithms, of what the boards share, or of the constants where they share nothing.
@@ -93,10 +90,6 @@ def expected_gain(
         That the readings take.
     n_draws : int
         Of what may be read.
-
-    Returns
-    -------
-    Gain
     """
     updates = [_Update.of(one, readings, k, beliefs.free) for k, one in enumerate(beliefs.explanations)]
     weights = beliefs.probabilities

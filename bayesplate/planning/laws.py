@@ -36,7 +36,6 @@ class SolvedStation:
 
     Attributes
     ----------
-    station : Station
     values : dict of float
         With those that the station's effects take.
     modes : Modes
@@ -122,7 +121,6 @@ class BareLaw:
 
     Attributes
     ----------
-    station : Station
     solved : (1 + n_spots, n_modes) array
         Of `SolvedStation.bare_and_added`, at the estimate.
     middle : (n_modes,) array
@@ -146,8 +144,6 @@ def bare_law(board: Board, station: Station, values: Values, drawn: Sequence[Val
 
     Parameters
     ----------
-    board : Board
-    station : Station
     values : dict of float
         Rigidities and the board's inputs, SI.
     drawn : sequence of dict of float

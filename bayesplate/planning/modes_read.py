@@ -28,7 +28,6 @@ class StationReadings:
 
     Attributes
     ----------
-    law : BareLaw
     further : Readings
         Modes that were not read yet, in the session that goes on, or in a new one where the board is held anew.
     rows : tuple of int
@@ -60,7 +59,6 @@ def station_readings(
 
     Parameters
     ----------
-    beliefs : Beliefs
     known : KnownBoard
         The board.
     law : BareLaw
@@ -112,7 +110,6 @@ def given_first(
 
     Parameters
     ----------
-    station : Station
     old : sequence of int
         Which of its readings.
     readings : Readings

@@ -62,10 +62,6 @@ def placing(shapes: Floats, grid: Floats, sensor: Place | None = None) -> Placin
         Fractions of a side.
     sensor : (float, float), optional
         Where it stands already.
-
-    Returns
-    -------
-    Placing
     """
     from scipy.linalg import qr
 

@@ -17,7 +17,6 @@ class ExplanationEntry:
     ----------
     effects : tuple of str
         Empty for no effect.
-    words : str
     probability : float
         Among those that survive.
     """
@@ -51,7 +50,6 @@ class Gain:
         Of a campaign: the same as E_x for each parameter that its boards share.
     score : float
         What the plan is ordered by, nats.
-    score_per_minute : float
     """
 
     E_x: float
@@ -79,15 +77,12 @@ class ProposalEntry:
     ----------
     what : str
         "modes", "edges", "mass", "again", "size" or "board".
-    board : str
     setup : str
         Empty where no frequency is read.
     sentence : str
         What to do, as an order.
-    cost_minutes : float
     modes : tuple of str
         Labels of the modes to read.
-    gain : Gain
     """
 
     what: str
@@ -107,7 +102,6 @@ class SequenceEntry:
     ----------
     steps : tuple of str
         Their sentences, in the order in which they can be done.
-    cost_minutes : float
     gain : Gain
         Of all together.
     """
@@ -123,7 +117,6 @@ class ModeToFind:
 
     Attributes
     ----------
-    label : str
     hz : float
         Where it is expected: the median over all explanations.
     low_hz, high_hz : float
@@ -145,13 +138,10 @@ class BenchEntry:
 
     Attributes
     ----------
-    board, setup : str
-    edges : dict of str
     sensor_mm, hammer_mm : tuple of float
         Places on the whole board.
     taps_mm : tuple of tuple of float
         Where to tap to tell the figures apart.
-    modes : tuple of ModeToFind
     """
 
     board: str

@@ -62,7 +62,6 @@ class Proposal:
     ----------
     entry : ProposalEntry
         As it is written.
-    readings : Readings
     about : str
         The way to hold a board, the input, the effect or the board that it asks for.
     known : KnownBoard or None
@@ -95,12 +94,10 @@ class Planner:
 
     Attributes
     ----------
-    beliefs : Beliefs
     seed : int
         Everything random follows from it; all gains are compared on the same simulated readings.
     goal : str or None
         See `bayesplate.planning.gains.expected_gain`.
-    costs : Costs
     """
 
     beliefs: Beliefs

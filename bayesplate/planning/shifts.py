@@ -26,8 +26,6 @@ def add_effects(one: Explanation, known: KnownBoard, law: BareLaw, shift: Floats
 
     Parameters
     ----------
-    one : Explanation
-    known : KnownBoard
     law : BareLaw
         Of the station.
     shift : (n_terms, (1 + n_spots) n_modes) array

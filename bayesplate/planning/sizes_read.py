@@ -45,7 +45,6 @@ class Measured:
 
     Attributes
     ----------
-    parameter : Parameter
     sentence : str
         What to do.
     n : int
@@ -134,7 +133,6 @@ class Look:
 
     Attributes
     ----------
-    sentence : str
     n : int
         Readings that it takes.
     sd : callable

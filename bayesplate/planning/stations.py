@@ -117,7 +117,6 @@ def old_stations(board: Board, values: Values) -> Iterator[Station]:
 
     Parameters
     ----------
-    board : Board
     values : dict of float
         Where the modes are computed, SI.
     """
@@ -134,7 +133,6 @@ def new_stations(board: Board, values: Values, prior: PriorCard | None = None) -
 
     Parameters
     ----------
-    board : Board
     values : dict of float
         Where the modes are computed, SI.
     prior : PriorCard, optional

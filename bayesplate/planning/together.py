@@ -56,7 +56,6 @@ def beliefs_together(
         The shared effects declared.
     priors : sequence of PriorCard
         One per board.
-    shared : sequence of Shared
     tell : callable, optional
         Told after every board which share of them is done.
     """
@@ -193,8 +192,6 @@ class FurtherBoard:
 
     Attributes
     ----------
-    like : Board
-    sentence : str
     labels : tuple of str
         Of the modes to read.
     readings : Readings

@@ -36,8 +36,6 @@ def prior_beliefs(board: Board, prior: PriorCard, rng: np.random.Generator, note
 
     Parameters
     ----------
-    board : Board
-    prior : PriorCard
     rng : numpy.random.Generator
         Deals the levels of the noise, and draws plates.
     notes : tuple of str

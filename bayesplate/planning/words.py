@@ -25,7 +25,6 @@ def first_line(
     ----------
     proposals : sequence of ProposalEntry
         The best first.
-    explanations : sequence of ExplanationEntry
     entropy : float
         Of them, nats.
     goal : str or None

@@ -39,7 +39,6 @@ def air_mass(deflections: Deflections, aspect_ratio: float, is_baffled: bool, ou
 
     Parameters
     ----------
-    deflections : Deflections
     aspect_ratio : float
         L_x / L_y, of the mean width.
     is_baffled : bool

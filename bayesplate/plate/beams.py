@@ -25,7 +25,6 @@ class BeamFunctions:
 
     Attributes
     ----------
-    side : Line
     coefficients : (n_functions, n_beams) array
     """
 

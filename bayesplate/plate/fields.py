@@ -56,7 +56,6 @@ class Fabric:
     ----------
     fields : mapping
         Fields that the terms of each group take, each with a weight of its own (None: uniform); absent: uniform alone.
-    outline : Outline or None
     is_turned : bool
         Whether terms that couple bending and twist, and the two shear strains, join the plate's own.
     """

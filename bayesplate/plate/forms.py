@@ -58,8 +58,6 @@ class Forms:
 
     Attributes
     ----------
-    kinematics : Kinematics
-    x, y : Line
     stiffness, masses : tuple of (Term, (n_x, n_y) array or None)
         The plate's own terms first; the array weighs the Gauss points of a term over the plate.
     """

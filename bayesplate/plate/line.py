@@ -42,7 +42,6 @@ class Line:
         What the functions themselves hold there: the same, or less where an effect has put springs in place of a clamp.
     is_split : bool
         Whether this is the first half alone.
-    basis : skfem.Basis
     """
 
     ends: Ends
@@ -164,7 +163,6 @@ def graded_nodes(ends: Holds, n_elements: int) -> Floats:
 
     Parameters
     ----------
-    ends : tuple of str
     n_elements : int
         All elements, the split ones among them; too few to be split stay equal.
 
@@ -205,10 +203,6 @@ def line(
         What the ends hold where that is less than `ends` says.
     n_points : int
         Gauss points per element.
-
-    Returns
-    -------
-    Line
     """
     from skfem import Basis, ElementLineHermite, MeshLine
 

@@ -79,7 +79,6 @@ def membrane_terms(
 
     Parameters
     ----------
-    deflections : Deflections
     aspect_ratio : float
         L_x / L_y.
     moduli : tuple of 4 floats

@@ -25,10 +25,6 @@ def mesh(weights: Weights, elements_per_side: int = ELEMENTS_PER_SIDE) -> tuple[
         Of one draw.
     elements_per_side : int
         Of a plate that bends alike both ways.
-
-    Returns
-    -------
-    tuple of int
     """
     ratio = float(np.clip((weights.stiffness[1] / weights.stiffness[0]) ** 0.25, 1 / _MOST_ELONGATED, _MOST_ELONGATED))
     along_x = 2 * round(elements_per_side * np.sqrt(ratio) / 2)

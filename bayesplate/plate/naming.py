@@ -34,7 +34,6 @@ class Place:
 
     Attributes
     ----------
-    parity : Parity
     rank : int
         Position among the elastic modes of the class, from 0.
     correlation : float
@@ -66,7 +65,6 @@ def name_shapes(own: SymmetryClass, vectors: Floats, on_plate: Floats) -> list[t
 
     Parameters
     ----------
-    own : SymmetryClass
     vectors : (n_dof, n_modes) array
         The lowest modes of the class, of any size.
     on_plate : (n_modes,) array
@@ -87,7 +85,6 @@ def beam_parts(own: SymmetryClass, vectors: Floats) -> tuple[Floats, Floats]:
 
     Parameters
     ----------
-    own : SymmetryClass
     vectors : (n_dof, n_vectors) array
 
     Returns
@@ -155,7 +152,6 @@ def find(plate: Plate, weights: Weights, wanted: Iterable[Beams]) -> dict[Beams,
 
     Parameters
     ----------
-    plate : Plate
     weights : Weights
         Of one draw.
     wanted : iterable of (int, int)

@@ -43,15 +43,10 @@ def plate_of(kinematics: Kinematics, x: Line, y: Line, fabric: Fabric = UNIFORM)
 
     Parameters
     ----------
-    kinematics : Kinematics
     x, y : Line
         Whole along a side along which the halves differ.
     fabric : Fabric
         Varying properties repeat the plate's own terms in the order of `bayesplate.plate.fields.layout`.
-
-    Returns
-    -------
-    Plate
     """
     groups = kinematics.groups(fabric.is_turned)
     weights = fabric.weights({*groups[0], *groups[1]}, x, y)

@@ -33,7 +33,6 @@ class ReducedClass:
 
     Attributes
     ----------
-    parity : Parity
     stiffness : (n_terms, r, r) array
         Projected stiffness terms.
     masses : (n_masses, r, r) array
@@ -135,7 +134,6 @@ class ReducedOrderModel:
     ----------
     places : tuple of Place
         The wanted modes, in the caller's order.
-    classes : tuple of ReducedClass
     worst_cents : float
         Largest error against full solves that were held out when the basis was built.
     """
@@ -157,7 +155,6 @@ class ReducedOrderModel:
 
         Parameters
         ----------
-        weights : Weights
         least : float
             Correlation of its shape with the product from which on a mode has that name.
 

@@ -51,7 +51,6 @@ def reduced_order_model(
 
     Parameters
     ----------
-    plate : Plate
     places : sequence of Place
         The modes wanted.
     centre : Weights
@@ -59,10 +58,6 @@ def reduced_order_model(
     around, held_out : sequences of Weights
         At least one is held out. Points that are no plates are left out.
     tolerance : float, cents
-
-    Returns
-    -------
-    ReducedOrderModel
 
     Raises
     ------

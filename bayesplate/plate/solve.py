@@ -36,7 +36,6 @@ class ClassModes:
 
     Attributes
     ----------
-    own : SymmetryClass
     eigenvalues : (n_modes,) array
         omega^2, s^-2, increasing; rigid motions are left out.
     vectors : (n_dof, n_modes) array
@@ -73,15 +72,10 @@ def solve_classes(plate: Plate, weights: Weights, n_modes: Mapping[Parity, int])
 
     Parameters
     ----------
-    plate : Plate
     weights : Weights
         Of one draw.
     n_modes : dict of int
         How many of each class.
-
-    Returns
-    -------
-    dict of ClassModes
 
     Raises
     ------
@@ -160,7 +154,6 @@ class Modes:
 
     Attributes
     ----------
-    plate : Plate
     eigenvalues : (n_modes,) array
         omega^2, s^-2.
     parities : tuple of Parity
@@ -227,14 +220,8 @@ def solve(plate: Plate, weights: Weights, n_modes: int) -> Modes:
 
     Parameters
     ----------
-    plate : Plate
     weights : Weights
         Of one draw.
-    n_modes : int
-
-    Returns
-    -------
-    Modes
     """
     asked = dict.fromkeys(plate.parities, -(-n_modes // len(plate.parities)) + 2)
     solved = solve_classes(plate, weights, asked)

@@ -126,7 +126,6 @@ class OnDeflections:
     ----------
     project : callable
         From `Deflections` to the terms' (n_terms, n_vectors, n_vectors) matrices.
-    n_terms : int
     """
 
     project: Callable[[Deflections], Floats]
@@ -142,8 +141,6 @@ class Deflections:
 
     Attributes
     ----------
-    x, y : Line
-    parity : Parity
     coefficients : (n_vectors, n_functions_x, n_functions_y) array
     """
 

@@ -47,7 +47,6 @@ class TrainingConstants:
     Attributes
     ----------
     E_x, E_y, G_xy : float, Pa
-    nu_xy : float
     G_xz, G_yz : float or None, Pa
         Of the shear-flexible plate; the thin one does not read them.
     """
@@ -96,7 +95,6 @@ class TrainedMode:
         Not negative.
     r_squared : float
         Coefficient of determination.
-    n_plates : int
     """
 
     a: float
@@ -139,13 +137,8 @@ def train(
         h / L_x; without influence on the thin plate.
     constants : TrainingConstants
         Pa.
-    theory : "thin" or "shear-flexible"
     beams : sequence of (int, int)
         The modes wanted, as orders of the beam functions along x and y.
-
-    Returns
-    -------
-    Training
 
     Raises
     ------

@@ -69,14 +69,8 @@ def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = No
 
     Parameters
     ----------
-    inference : Inference
-    draws : Draws
     linear_errors : (n_some, n_every) array, cents, optional
         Those of `bayesplate.posterior.reweighting.linearisation`, where they are known already.
-
-    Returns
-    -------
-    Assessment
     """
     problem = inference.problem
     models = problem.posterior.models

@@ -38,7 +38,6 @@ class Snapshot:
         One for each ensemble; what they hold beyond `n_steps` is of a chunk that was not ended.
     random_states : sequence of tuple
         Of emcee's samplers, as numpy states them.
-    n_steps : int
     """
 
     backends: Sequence[Any]
@@ -116,7 +115,6 @@ class Session:
 
     Parameters
     ----------
-    checkpoint : Checkpoint
     identity : dict
         What must be the same in a run that is continued.
     """

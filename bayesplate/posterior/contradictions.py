@@ -27,7 +27,6 @@ def require_reachable(posterior: Posterior, centre: Floats, covariance: Floats) 
 
     Parameters
     ----------
-    posterior : Posterior
     centre, covariance : (n_dim,) and (n_dim, n_dim) arrays
         Normal approximation of what the readings tell.
 

@@ -156,10 +156,6 @@ def assess(draws: FloatArray, gate: Gate | None = None, *, names: Sequence[str] 
         The rules; the default ones if absent.
     names : sequence of str, optional
         Parameter names for the reasons.
-
-    Returns
-    -------
-    Convergence
     """
     gate = Gate() if gate is None else gate
     _, n_steps, _, n_dim = draws.shape

@@ -28,7 +28,6 @@ class Draws:
     rigidities, moduli, inputs : dict of (n_chains, n_draws) array, SI
     noise : (n_chains, n_draws, n_setups) array
         Relative.
-    derived : dict of Derived
     log_frequency : (n_chains, n_draws, n_modes) array
         ln f (Hz) under the law of the fit.
     every_log_frequency : tuple of (n_chains, n_draws, n_every) array
@@ -62,15 +61,10 @@ def named_draws(inference: Inference, seed: int, every_log_frequency: Sequence[F
 
     Parameters
     ----------
-    inference : Inference
     seed : int
         Of the predictive draws.
     every_log_frequency : sequence of (n_draws, n_every) array, optional
         ln f (Hz) of all modes at the thinned draws, where it is known already.
-
-    Returns
-    -------
-    Draws
     """
     problem = inference.problem
     shape = inference.theta.shape[:2]

@@ -34,7 +34,6 @@ class Ensembles:
     centre : (n_dim,) array
     factor : (n_dim, n_dim) array
         Lower Cholesky factor of the estimate's covariance.
-    seed : int
     shape : (int, int)
         Ensembles, and walkers of each.
     """
@@ -154,12 +153,6 @@ def pilot(
     centre : (n_dim,) array
     factor : (n_dim, n_dim) array
         Lower Cholesky factor of the estimate's covariance.
-    rng : numpy.random.Generator
-    n_walkers, fewest_rounds : int, optional
-
-    Returns
-    -------
-    Pilot
     """
     import emcee
 

@@ -109,7 +109,6 @@ def propose_labels(board: Board, prior: PriorCard) -> Proposed:
 
     Parameters
     ----------
-    board : Board
     prior : PriorCard
         For the first labels of a board that has too few.
 
@@ -146,11 +145,6 @@ def probable_ways(board: Board, prior: PriorCard) -> list[tuple[Way, float]]:
 
     A plate may be as unlike the board as `UNLIKE`, and is hardly stiffer along y than along x, which cards take along
     the grain.
-
-    Parameters
-    ----------
-    board : Board
-    prior : PriorCard
 
     Returns
     -------

@@ -30,10 +30,8 @@ class Inference:
 
     Attributes
     ----------
-    problem : PosedProblem
     chains : Chains
         All that was walked: under the law of the problem, or under a surrogate of it.
-    convergence : Convergence
     theta : (n_chains, n_draws, n_dim) array
         Draws of the posterior, thinned, chain = ensemble; those of a surrogate are drawn again by their weights.
     log_posterior : (n_chains, n_draws) array
@@ -69,8 +67,6 @@ def infer(
 
     Parameters
     ----------
-    problem : PosedProblem
-    settings : SamplerSettings
     checkpoint, progress
         See `bayesplate.posterior.sampling.sample`.
 

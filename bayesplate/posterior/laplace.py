@@ -70,17 +70,12 @@ def laplace_approximation(
 
     Parameters
     ----------
-    board : Board
     estimate : Estimate
         At the nominal inputs.
     robust : bool
         Student's distribution for the noise.
     spread : (n_constants, n_constants) array, optional
         Covariance of ln D beyond that: between several ways to take peaks for modes.
-
-    Returns
-    -------
-    LaplaceApproximation
     """
     parameters = Parameters(board)
     medians = np.array([setup.noise.median for setup in board.setups])
@@ -243,7 +238,6 @@ def exact_models(
 
     Parameters
     ----------
-    board : Board
     models : sequence of SetupModel
         At the centre.
     centre, covariance : (n_dim,) and (n_dim, n_dim) arrays

@@ -27,7 +27,6 @@ def with_likely_labels(inference: Inference, seed: int) -> tuple[Inference, Draw
 
     Parameters
     ----------
-    inference : Inference
     seed : int
         Of the predictive draws.
     """
@@ -49,7 +48,6 @@ def labelled_by(inference: Inference, every_log_frequency: Sequence[Floats], noi
 
     Parameters
     ----------
-    inference : Inference
     every_log_frequency : sequence of (n_draws, n_every) array
         ln f (Hz) of all modes, setup after setup, at draws of the posterior.
     noise : (n_draws, n_setups) array

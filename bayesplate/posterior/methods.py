@@ -27,7 +27,6 @@ class Method:
 
     Attributes
     ----------
-    name : str
     mean : dict of float, Pa
         E_x, E_y, G_xy; not a number where the method finds no plate.
     misses : (n_modes,) array
@@ -57,8 +56,6 @@ def point_methods(problem: PosedProblem, system: PaperSystem, expected_sd: Mappi
 
     Parameters
     ----------
-    problem : PosedProblem
-    system : PaperSystem
     expected_sd : dict of float
         Relative standard deviation of the weighted estimate of each modulus.
 
@@ -108,9 +105,6 @@ def posterior_method(name: str, problem: PosedProblem, draws: Draws, weights: Fl
 
     Parameters
     ----------
-    name : str
-    problem : PosedProblem
-    draws : Draws
     weights : (n_chains * n_draws,) array
         Sum to 1.
     """

@@ -30,12 +30,7 @@ _AHEAD = 16
 
 
 class IndependentMove:
-    """A Metropolis update of every walker by itself, with a proposal from a mixture of Student distributions.
-
-    Parameters
-    ----------
-    mixture : Mixture
-    """
+    """A Metropolis update of every walker by itself, with a proposal from a mixture of Student distributions."""
 
     def __init__(self, mixture: Mixture) -> None:
         self.mixture = mixture

@@ -19,10 +19,6 @@ class Parameters:
 
     Columns: ln D_x, ln D_y, ln D_s (N m), of an isotropic board ln D alone; ln of the relative noise, one per setup;
     the standard coordinate z of each uncertain parameter of the board (`bayesplate.board.quantity`).
-
-    Attributes
-    ----------
-    board : Board
     """
 
     board: Board

@@ -44,10 +44,6 @@ class PosedProblem:
 
     Attributes
     ----------
-    board : Board
-    prior : PriorCard
-    estimate : Estimate
-    identifiability : Identifiability
     posterior : Posterior
         Its models hold both laws.
     centre, covariance : (n_dim,) and (n_dim, n_dim) arrays
@@ -113,8 +109,6 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
 
     Parameters
     ----------
-    board : Board
-    prior : PriorCard
     law : "linear" or "exact", optional
         By default the linear law where its error over the normal approximation of the posterior, widened because the
         noise is not known, stays below a quarter of the expected noise for every mode.

@@ -29,9 +29,6 @@ def means_under(
 
     Parameters
     ----------
-    inference : Inference
-    draws : Draws
-    law : "linear" or "exact"
     errors : (n_some, n_every) array, cents, optional
         Those of `linearisation`, where they are known already.
 

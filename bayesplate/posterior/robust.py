@@ -26,7 +26,6 @@ def highest_student(board: Board, estimate: Estimate) -> tuple[Floats, Floats]:
 
     Parameters
     ----------
-    board : Board
     estimate : Estimate
         By weighted least squares of all readings.
 

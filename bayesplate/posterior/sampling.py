@@ -164,7 +164,6 @@ def sample(
         The estimate.
     covariance : (n_dim, n_dim) array
         Its covariance; the walkers start three times as wide.
-    settings : SamplerSettings
     names : sequence of str, optional
         Parameter names for messages.
     checkpoint : Checkpoint, optional
@@ -174,7 +173,6 @@ def sample(
 
     Returns
     -------
-    chains : Chains
     convergence : Convergence
         `passed` is False if the steps did not suffice, or never would: then nothing may be printed from the chains.
 
@@ -230,7 +228,6 @@ def is_hopeless(n_taus: float, n_kept: int, settings: SamplerSettings) -> bool:
         Length of the draws that are kept, in autocorrelation times of the slowest parameter.
     n_kept : int
         The same in steps.
-    settings : SamplerSettings
     """
     return 0.0 < n_taus * 2 * settings.max_steps < settings.gate.tau_count_min * n_kept
 

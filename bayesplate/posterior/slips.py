@@ -105,10 +105,6 @@ def reading_remarks(posterior: Posterior, centre: Floats) -> Remarks:
         Its models hold the exact law.
     centre : (n_dim,) array
         Where the readings are most likely.
-
-    Returns
-    -------
-    Remarks
     """
     readings = Readings(posterior, centre)
     is_lost = is_too_wide(posterior.board, readings.log_widening)
@@ -160,10 +156,6 @@ class Readings:
         anywhere : bool
             Whether the plate may be quite another one than the readings as they are lead to: then fits begin as well
             where least squares without each reading lead.
-
-        Returns
-        -------
-        Slip or None
         """
         n = self.target.size
         if n < self._parameters.n_constants + FEWEST_TO_SPARE:
@@ -298,7 +290,6 @@ def noise_remarks(board: Board, log_widening: float) -> tuple[str, ...]:
 
     Parameters
     ----------
-    board : Board
     log_widening : float
         ln of the noise that the residuals want, over the median of its prior.
     """

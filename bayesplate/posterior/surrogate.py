@@ -97,7 +97,6 @@ class Surrogate:
 
         Parameters
         ----------
-        points : Solved
         columns : (n_fitted,) array of int
         along_bent : dict of int
             Orders above the second, and along how many of the directions in which ln f is bent most.
@@ -198,7 +197,6 @@ def find_surrogate(
 
     Parameters
     ----------
-    posterior : Posterior
     centre, covariance : (n_dim,) and (n_dim, n_dim) arrays
         Normal approximation.
     coordinates : TailCoordinates

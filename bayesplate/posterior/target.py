@@ -28,13 +28,10 @@ class Posterior:
 
     Attributes
     ----------
-    board : Board
     prior : PriorCard
         Densities of E_x, E_y, G_xy or of D_x, D_y, D_s; of an isotropic board that of E_x, which is its E.
     models : sequence of SetupModel
         One per setup.
-    law : "linear" or "exact"
-    robust : bool
     """
 
     board: Board

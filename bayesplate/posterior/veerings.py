@@ -35,7 +35,6 @@ def with_doubts(board: Board, models: Sequence[SetupModel], values: Values) -> t
 
     Parameters
     ----------
-    board : Board
     models : sequence of SetupModel
         Of its setups, with the exact law.
     values : dict of (n_draws,) array

@@ -71,7 +71,6 @@ class Across:
         Probability that it is no mode in the set that shows it best.
     spectra : Spectra
         Without recordings that have other modes than all others.
-    remarks : tuple of str
     """
 
     modes: list[Mode]
@@ -85,13 +84,8 @@ def modes_across(spectra: Spectra, shown: Sequence[Shown]) -> Across:
 
     Parameters
     ----------
-    spectra : Spectra
     shown : sequence of Shown
         Sets that do not show quite the same modes.
-
-    Returns
-    -------
-    Across
 
     Raises
     ------

@@ -33,7 +33,6 @@ def agreeing(spectra: Spectra, lowest: float, highest: float) -> list[Rows]:
 
     Parameters
     ----------
-    spectra : Spectra
     lowest, highest : float, Hz
         Between which peaks are compared.
 

@@ -34,7 +34,6 @@ class PickedRow:
         Frequency and its standard error.
     noise_hz, scatter_hz, window_hz : float
         Its parts: noise, scatter between hits and places beyond it, choice of lines.
-    damping_percent, damping_sd_percent : float
     sign : str
         "+" or "-" between hammer and sensor, where their polarity is known or was found; otherwise empty.
     amplitude : float
@@ -138,15 +137,10 @@ def rows(
 
     Parameters
     ----------
-    picked : Picked
     flips : bool or None
         Whether force and response have opposite polarity; None if that is not known.
     labels : mapping
         Number of a mode to its labels and their probabilities.
-
-    Returns
-    -------
-    tuple of PickedRow
     """
     return tuple(
         PickedRow(

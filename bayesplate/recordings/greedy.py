@@ -31,7 +31,6 @@ class Found:
 
     Attributes
     ----------
-    fit : Fitted
     path : tuple of (n_modes, 2) array, Hz
         Modes with one mode, with two, and so on: what a diagram of stability shows.
     """
@@ -45,13 +44,8 @@ def search(window: Window, least_gain: float) -> Found:
 
     Parameters
     ----------
-    window : Window
     least_gain : float
         Twice the ln of the likelihood that a mode must gain.
-
-    Returns
-    -------
-    Found
     """
     fit = refined(window, np.zeros((0, 2)))
     candidates = _candidates(window)

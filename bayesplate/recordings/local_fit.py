@@ -86,7 +86,6 @@ class Fitted:
 
     Attributes
     ----------
-    window : Window
     poles : (n_modes, 2) array, Hz
         Frequency and decay rate, which is half the width of the peak at half its power.
     residues : (n_modes, n_records) complex array
@@ -161,10 +160,8 @@ def refined(window: Window, poles: Floats, most_steps: int = _MOST_STEPS) -> Fit
 
     Parameters
     ----------
-    window : Window
     poles : (n_modes, 2) array, Hz
         Where to begin.
-    most_steps : int
 
     Returns
     -------

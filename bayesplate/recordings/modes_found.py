@@ -108,14 +108,12 @@ def find_modes(spectra: Spectra, lowest: float, highest: float) -> tuple[list[Fl
 
     Parameters
     ----------
-    spectra : Spectra
     lowest, highest : float, Hz
 
     Returns
     -------
     by_width : list of (n_modes, 2) array, Hz
         Frequency and decay rate of the modes that windows of each width show.
-    paths : list of Path
     """
     values = spectra.values / spectra.noise
     by_width: list[Floats] = []
@@ -147,7 +145,6 @@ def fit_modes(spectra: Spectra, start: Floats, by_width: list[Floats], lowest: f
 
     Parameters
     ----------
-    spectra : Spectra
     start : (n_modes, 2) array, Hz
         Frequencies and decay rates to begin with.
     by_width : list of (n_modes, 2) array, Hz

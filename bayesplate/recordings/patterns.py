@@ -69,10 +69,6 @@ def sign_odds(signs: Floats, predicted: Floats, largest: Floats, likely: Floats)
         +1 or -1, 0 if not known.
     predicted, largest : (n_modes,) array
     likely : (n_peaks, n_modes) array
-
-    Returns
-    -------
-    float
     """
     from scipy.special import ndtr
 

@@ -43,7 +43,6 @@ class PickedMode:
         Ratio to the critical one.
     mobility : tuple of float
         Residue of the mobility between each pair of places, its real part, in the units of the recordings.
-    mobility_sd : tuple of float
     complexity : float
         Degrees by which the residues are not real.
     alike : float
@@ -88,7 +87,6 @@ class Picked:
     ----------
     modes : tuple of PickedMode
         In the order of frequency, those that are likely none included.
-    spectra : Spectra
     paths : tuple of Path
         Of the search, for the diagram of stability.
     lowest, highest : float, Hz
@@ -114,12 +112,7 @@ def pick_modes(spectra: Spectra, lowest: float = LOWEST, highest: float = HIGHES
 
     Parameters
     ----------
-    spectra : Spectra
     lowest, highest : float, Hz
-
-    Returns
-    -------
-    Picked
 
     Raises
     ------

@@ -69,18 +69,7 @@ class Verdict:
 
 
 def verdicts(spectra: Spectra, modes: Sequence[Mode], answered: Sequence[Answer]) -> list[Verdict]:
-    """A verdict for each mode; the probabilities of different reasons are taken as independent.
-
-    Parameters
-    ----------
-    spectra : Spectra
-    modes : sequence of Mode
-    answered : sequence of Answer
-
-    Returns
-    -------
-    list of Verdict
-    """
+    """A verdict for each mode; the probabilities of different reasons are taken as independent."""
     if not modes:
         return []
     strengths = np.array([one.strength for one in answered])

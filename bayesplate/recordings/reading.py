@@ -50,7 +50,6 @@ def read_recordings(
 
     Parameters
     ----------
-    paths : sequence of path
     rate : float, optional, Hz
         For files that do not say it.
     channels : str

@@ -25,7 +25,6 @@ class Averaged:
         Magnitude: of H1 with a force, else root mean square of the hits' spectra, each over its own strength.
     coherence : (n_lines,) array or None
         Of force and response over the hits, 0 to 1; None for one hit or without a force.
-    n_hits : int
     """
 
     name: str

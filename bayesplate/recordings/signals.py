@@ -60,14 +60,11 @@ class FrequencyResponse:
 
     Attributes
     ----------
-    name : str
     frequency : (n_lines,) array, Hz
         Evenly spaced.
     values : (n_lines,) complex array
     coherence : (n_lines,) array or None
-    motion : str
     hammer, sensor : tuple of float or None, m
-    remarks : tuple of str
     """
 
     name: str

@@ -41,7 +41,6 @@ class Spectra:
         Which records were taken between the same two places.
     between : tuple of (Place or None, Place or None)
         The places of hammer and sensor, m.
-    motion : str
     duration : float, s
         Of each decay.
     """
@@ -87,10 +86,6 @@ def decay_spectra(heard: Sequence[tuple[Recording, Sequence[Hit]]], highest: flo
         All of one rate, with the hits that can be used.
     highest : float, Hz
         Up to which modes are looked for.
-
-    Returns
-    -------
-    Spectra
     """
     from scipy.fft import prev_fast_len, rfft
 

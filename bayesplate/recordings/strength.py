@@ -55,17 +55,7 @@ class Answer:
 
 
 def answers(spectra: Spectra, modes: Sequence[Mode]) -> list[Answer]:
-    """How each mode answers; hits without a force are first set to one time.
-
-    Parameters
-    ----------
-    spectra : Spectra
-    modes : sequence of Mode
-
-    Returns
-    -------
-    list of Answer
-    """
+    """How each mode answers; hits without a force are first set to one time."""
     forces = _forces(spectra, modes)
     return [_answer(spectra, mode, force) for mode, force in zip(modes, forces, strict=True)]
 

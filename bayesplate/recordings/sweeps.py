@@ -88,7 +88,6 @@ def impulse_response(recording: Recording, sweep: Sweep | Floats) -> tuple[Recor
     -------
     recording : Recording
         With the impulse response in place of the response.
-    hit : Hit
 
     Raises
     ------

@@ -30,7 +30,6 @@ class Heard:
 
     Attributes
     ----------
-    spectra : Spectra
     remarks : tuple of str
         What was left out, and why.
     """
@@ -44,13 +43,8 @@ def take(files: Sequence[Sequence[Read]], highest: float) -> Heard:
 
     Parameters
     ----------
-    files : sequence of sequence of Recording or FrequencyResponse
     highest : float, Hz
         Up to which modes are looked for.
-
-    Returns
-    -------
-    Heard
 
     Raises
     ------

@@ -97,7 +97,6 @@ class _Outline:
     Attributes
     ----------
     x, low, high : (n,) array, m
-    is_rectangle : bool
     """
 
     x: Floats

@@ -183,8 +183,6 @@ def write_campaign_report(
         Made if it is not there.
     title : str
         Of the campaign; any text.
-    summary : CampaignSummary
-    diagnosis : CampaignDiagnosis, optional
 
     Returns
     -------

@@ -49,15 +49,10 @@ def layout(n_modes: int, aspect_ratio: float, *, has_combined: bool) -> Layout:
 
     Parameters
     ----------
-    n_modes : int
     aspect_ratio : float
         Length of a board over its width.
     has_combined : bool
         Whether a row of combined modes comes last.
-
-    Returns
-    -------
-    Layout
     """
     width = A4[0] - 2 * _MARGIN
     height = A4[1] - _HEAD - _FOOT - (_BETWEEN if has_combined else 0.0)
@@ -93,7 +88,6 @@ def chladni_sheet(sheet: Sheet, marks: Marks | None = None) -> Figure:
 
     Parameters
     ----------
-    sheet : Sheet
     marks : Marks, optional
         Where sensor and hammer go.
 

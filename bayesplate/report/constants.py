@@ -41,7 +41,6 @@ def constants_figure(summary: Summary, moduli: Mapping[str, NDArray[np.float64]]
 
     Parameters
     ----------
-    summary : Summary
     moduli : dict of array, Pa
         Draws of each modulus.
 

@@ -256,15 +256,10 @@ def write_grading_page(folder: Path, graded: Grading, summary: BatchSummary, *, 
     ----------
     folder : Path
         Must be there.
-    graded : Grading
     summary : BatchSummary
         Of the same boards.
     has_pages : bool
         Whether each board has a page of its own in boards/NAME.
-
-    Returns
-    -------
-    Path
     """
     tables: dict[str, Table | None] = {**dict.fromkeys(_TABLES), **grading_tables(graded)}
     pages = [(marked(graded, i), f"boards/{graded.names[i]}/{PAGE}") for i in best_first(graded)[:MOST_LISTED]]

@@ -141,13 +141,8 @@ def predictive_picture(summary: Summary, predictive: NDArray[np.float64]) -> Pic
 
     Parameters
     ----------
-    summary : Summary
     predictive : (..., n_modes) array, Hz
         Draws of the next reading.
-
-    Returns
-    -------
-    Picture
     """
     modes = summary.modes
     measured = np.array([mode.measured_hz for mode in modes])

@@ -69,11 +69,8 @@ def write_report(
     ----------
     folder : Path
         Made if it is not there; what it holds of an earlier report is replaced.
-    card : Board
     inference : Inference
         Of a run that has converged.
-    draws : Draws
-    summary : Summary
     diagnosis : Diagnosis, optional
         Then `inference`, `draws` and `summary` are those of the refitted model.
 
@@ -98,7 +95,6 @@ def save_page(
 
     Parameters
     ----------
-    path : Path
     groups : dict of sequence of Picture
         By the place where they stand.
     text : callable

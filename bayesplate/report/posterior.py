@@ -55,9 +55,7 @@ class Compared:
 
     Attributes
     ----------
-    name, unit : str
     draws : (n_draws,) array
-    prior : Quantity
     """
 
     name: str

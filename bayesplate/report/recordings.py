@@ -173,8 +173,6 @@ def write_recordings_page(folder: Path, report: PickReport, picked: Picked) -> P
     ----------
     folder : Path
         Made if it is not there.
-    report : PickReport
-    picked : Picked
 
     Returns
     -------

@@ -41,13 +41,7 @@ def drawing() -> Iterator[None]:
 
 @drawing()
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure by the ending of its path, PNG or SVG, without a time stamp.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-    path : Path
-    """
+    """Write a figure by the ending of its path, PNG or SVG, without a time stamp."""
     write_bytes(path, _bytes_of(figure, path.suffix.removeprefix("."), {}))
 
 
@@ -56,10 +50,8 @@ def save_pictures(pictures: Iterable[Picture], folder: Path, ending: Ending) -> 
 
     Parameters
     ----------
-    pictures : iterable of Picture
     folder : Path
         Must be there.
-    ending : "png" or "svg"
 
     Returns
     -------

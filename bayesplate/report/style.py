@@ -49,12 +49,10 @@ class Picture:
     ----------
     name : str
         Stem of its files.
-    title : str
     alt : str
         What a person who cannot see it should know.
     caption : str
         How to read it.
-    figure : matplotlib.figure.Figure
     """
 
     name: str
@@ -93,7 +91,6 @@ def stacked(
 
     Parameters
     ----------
-    heights : sequence of float
     left, right, top, bottom, gap : float
         Margins of the page, and the space between two panels.
 
@@ -101,7 +98,6 @@ def stacked(
     -------
     figure : matplotlib.figure.Figure
         No state of pyplot is touched.
-    panels : list of matplotlib.axes.Axes
     """
     from matplotlib.figure import Figure
 
@@ -149,10 +145,6 @@ def limits(draws: Floats, others: Iterable[float] = (), *, reach: float = 1.5, m
         How far from the draws they may be, in widths of theirs.
     margin : float
         At either side, as a share of what is shown.
-
-    Returns
-    -------
-    low, high : float
     """
     low, high = np.quantile(draws, _SHOWN)
     far = reach * (high - low)

@@ -37,10 +37,8 @@ class DiagnosisSection:
 
     Attributes
     ----------
-    heading : str
     verdicts : tuple of (str, str, bool)
         Each word that a verdict may be, what it means, and whether it is the one given.
-    sentences : tuple of str
     known : str
         What known effects do to the error, and what is claimed of those that the card states; empty if there are none.
     tables : tuple of Table
@@ -49,9 +47,6 @@ class DiagnosisSection:
         What two words of these tables mean.
     model : str
         Which model the rest of the page is of.
-    notes : tuple of str
-    known_effects, candidates : Table or None
-    recommendation : str
     """
 
     heading: str

@@ -35,7 +35,6 @@ def tree_of(groups: Mapping[str, Variables], labels: Mapping[str, Sequence[str]]
         Variables by group (`GROUPS`) and name.
     labels : dict of sequence of str
         Of each dimension besides chain and draw.
-    attributes : dict of str
 
     Returns
     -------
@@ -91,8 +90,6 @@ def posterior_tree(inference: Inference, draws: Draws, attributes: Mapping[str, 
 
     Parameters
     ----------
-    inference : Inference
-    draws : Draws
     attributes : dict of str
         What is said of their origin.
 

@@ -25,13 +25,10 @@ class CheckedMode:
 
     Attributes
     ----------
-    setup, label : str
-    measured_hz, residual_cents : float
     leverage : float
         Share of the reading in its own prediction.
     share_percent : tuple of float
         Share of D_x, D_y, D_s in the mode's energy.
-    label_correlation : float
     """
 
     setup: str
@@ -49,7 +46,6 @@ class CheckedEffect:
 
     Attributes
     ----------
-    effect : str
     size : dict of float
         Value of each parameter.
     raw_rms_cents, visible_rms_cents : float

@@ -144,15 +144,8 @@ def theory_row(problem: PosedProblem, system: PaperSystem, methods: Sequence[Met
 
     Parameters
     ----------
-    problem : PosedProblem
-    system : PaperSystem
-    methods : sequence of Method
     errors : Errors
         Of the most likely constants under the exact law, in sample and refitted with each mode left out.
-
-    Returns
-    -------
-    TheoryRow
     """
     board = problem.board
     rows = [(setup.name, str(r.label), r.frequency.mean) for setup in board.setups for r in setup.readings]

@@ -21,15 +21,8 @@ def laid_out(title: str, columns: Texts, rows: Sequence[Texts], width: int) -> A
 
     Parameters
     ----------
-    title : str
-    columns : sequence of str
-    rows : sequence of sequence of str
     width : int
         Of the terminal, characters.
-
-    Returns
-    -------
-    rich.console.RenderableType
     """
     widths = column_widths(columns, rows, width)
     return _stacked(title, columns, rows) if widths is None else _grid(title, columns, rows, widths)

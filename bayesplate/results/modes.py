@@ -44,9 +44,6 @@ class ModeRow:
 
     Attributes
     ----------
-    setup, label : str
-    measured_hz : float
-    predicted_hz : Prediction
     residual_cents : float
         Measured over the posterior mean of the prediction.
     residual_interval_cents : tuple of float
@@ -84,18 +81,7 @@ def over(measured: float, predicted: float) -> float:
 
 
 def mode_rows(problem: PosedProblem, draws: Draws, assessment: Assessment) -> tuple[ModeRow, ...]:
-    """One row per labelled mode, setup after setup.
-
-    Parameters
-    ----------
-    problem : PosedProblem
-    draws : Draws
-    assessment : Assessment
-
-    Returns
-    -------
-    tuple of ModeRow
-    """
+    """One row per labelled mode, setup after setup."""
     predicted = np.exp(draws.log_frequency).reshape(-1, draws.log_frequency.shape[-1])
     rounding = rounding_intervals(problem)
     rows = [
@@ -174,7 +160,6 @@ class AssignedPeak:
 
     Attributes
     ----------
-    setup : str
     hz : float
         As read.
     stated : str or None
@@ -204,8 +189,6 @@ class PredictedMode:
 
     Attributes
     ----------
-    setup, label : str
-    predicted_hz : Prediction
     seen_probability : float
         That one of the peaks is this mode.
     """
@@ -222,7 +205,6 @@ class Spectrum:
 
     Attributes
     ----------
-    setup : str
     missed_probability, spurious_probability : float
         Beforehand: that a mode left no peak, and that a peak is no mode.
     modes : tuple of PredictedMode
@@ -237,11 +219,6 @@ class Spectrum:
 
 def assigned_peaks(problem: PosedProblem, draws: Draws) -> tuple[tuple[AssignedPeak, ...], tuple[Spectrum, ...]]:
     """Every peak whose label is not sure, and the modes of its setup, averaged over the posterior.
-
-    Parameters
-    ----------
-    problem : PosedProblem
-    draws : Draws
 
     Returns
     -------

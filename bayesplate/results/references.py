@@ -54,8 +54,6 @@ def references(card: Board, prior: PriorCard, board: Board) -> tuple[Section, ..
 
     Parameters
     ----------
-    card : Board
-    prior : PriorCard
     board : Board
         With the effects that the fit declares.
 

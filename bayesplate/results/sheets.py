@@ -28,13 +28,10 @@ class SheetRow:
     ----------
     label : str
         Or "cannot tell".
-    hz : float
-    measured_hz : float or None
     miss_cents : float or None
         Computed over measured.
     likely_hz : tuple of float or None
         Where it is expected two times in three, if it was not measured.
-    share_percent : EnergyShares
     a, b, c : float
         The paper's coefficients.
     """
@@ -76,8 +73,6 @@ class ProposedLabel:
 
     Attributes
     ----------
-    setup : str
-    measured_hz : float
     label : str or None
         In the most probable way to label all peaks; None where it is no mode of the plate.
     probability : dict of float

@@ -77,17 +77,8 @@ def summarise(
 
     Parameters
     ----------
-    inference : Inference
-    draws : Draws
     assessment : Assessment
         Of these draws.
-    seed : int
-    versions : dict of str
-    card_sha256 : str
-
-    Returns
-    -------
-    Summary
     """
     problem = inference.problem
     board = problem.board

@@ -119,13 +119,8 @@ class Run:
 
     Attributes
     ----------
-    format : int
     name : str
         Of the board.
-    seed : int
-    versions : dict of str
-    card_sha256 : str
-    model : ModelHeader
     """
 
     format: int

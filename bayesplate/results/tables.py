@@ -25,9 +25,6 @@ class Table:
 
     Attributes
     ----------
-    title : str
-    columns : tuple of str
-    rows : tuple of tuple of Cell
     keys : tuple of str
         What programs call the columns, where that differs.
     """
@@ -54,15 +51,8 @@ def by_constant(
 
     Parameters
     ----------
-    title : str
-    columns : dict of callable
-    isotropic : bool
     names : iterable of str
         The moduli.
-
-    Returns
-    -------
-    Table
     """
     rows = ((narrow_name(name, isotropic=isotropic), *(held(name) for held in columns.values())) for name in names)
     return Table(title, ("constant", *columns), tuple(rows))
@@ -88,7 +78,6 @@ def render(shown: Table | str, medium: Medium, *, width: int = 80, styled: bool 
 
     Parameters
     ----------
-    shown : Table or str
     medium : "terminal", "html", "csv" or "latex"
         Programs read CSV at full precision: a number with its uncertainty has two columns, and so has an interval.
     width : int
@@ -97,10 +86,6 @@ def render(shown: Table | str, medium: Medium, *, width: int = 80, styled: bool 
         Whether the terminal knows bold letters.
     kind : str
         Classes of a table of HTML.
-
-    Returns
-    -------
-    str
     """
     if medium == "terminal":
         return _printed(shown, width, styled=styled)
