@@ -31,7 +31,7 @@ extensions = [
     "mathml",
     "commands",
     "computed",
-    "rooms",
+    "public_names",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 _tables = [path for path in (HERE / "validation").glob("*.md") if not path.read_text("utf-8").startswith("# ")]
