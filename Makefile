@@ -23,7 +23,7 @@ test slow: export PYTHONDONTWRITEBYTECODE :=
 test: $(VENV)/tested-with
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
+	$(BIN)/python -m pytest -n 2 --dist loadfile --durations=30 -m "not slow"
 
 slow: $(VENV)/tested-with
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m slow

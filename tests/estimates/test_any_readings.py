@@ -61,6 +61,7 @@ def is_told(errors, n_modes):
     return both.size == 2 * n_modes and not np.isinf(both).any()
 
 
+@pytest.mark.slow
 @given(hertz=st.lists(POSITIVE, min_size=12, max_size=12), kind=st.sampled_from(["normal", "rounded", "student"]))
 @settings(max_examples=4, deadline=None, derandomize=True, phases=[Phase.generate])
 def test_leaving_a_mode_of_a_free_board_out_never_raises(hertz, kind):

@@ -146,6 +146,7 @@ def test_bare_peaks_of_which_one_is_missing_are_labelled_with_probabilities():
     assert [one for _, one in ways] == sorted((one for _, one in ways), reverse=True)
 
 
+@pytest.mark.slow
 def test_a_plate_stiffer_across_its_grain_is_an_unlikely_way(monkeypatch):
     """Peaks that fit a plate either way round, under a prior of any solid: all probable unless cards mean the grain."""
     board = board_with((), ALL[:7])

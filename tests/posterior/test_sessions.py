@@ -205,6 +205,7 @@ def test_sessions_that_are_one_plate_have_one_law_and_others_each(effects):
         assert np.abs(first - other).max() > 1e-4 if effects else np.abs(first - other).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_what_an_effect_shifts_is_told_beside_the_discrepancies():
     """`check` and `diagnose` tell the same; the air makes every mode lower, whatever the board does otherwise."""
     problem = pose(board(is_rough=True), load_prior("weakly-informative"), law="linear")

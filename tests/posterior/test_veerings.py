@@ -88,6 +88,7 @@ def test_a_misread_frequency_puts_no_label_in_doubt(label, factor, left_out):
     assert any("the readings scatter about the fitted plate" in sentence for sentence in problem.doubts)
 
 
+@pytest.mark.slow
 def test_a_truth_on_the_other_side_of_the_veering_is_as_likely_as_it_should_be(monkeypatch):
     """Twice the log of the greatest density over that of the truth is a chi-square.
 

@@ -98,6 +98,7 @@ def test_the_shared_law_is_that_of_the_board():
     assert larger - predicted == pytest.approx(np.full(6, 0.5 * math.log(1.1)))  # f goes with the root of D
 
 
+@pytest.mark.slow
 def test_null_simulations_are_shared_by_boards_of_a_setting():
     """Kinds of boards and of effects do not matter, what the card says of the noise does."""
     cell = Cell("null", "cantilever-6", 1)
@@ -162,6 +163,7 @@ def _in_a_group(out):
     run(FEW, out, workers=1, quiet=True)
 
 
+@pytest.mark.slow
 def test_records_of_other_code_are_gone_on_with_only_if_they_come_out_the_same(few, tmp_path):
     out = tmp_path / "trial.jsonl"
     head = json.dumps(identity(FEW, BASE_SEED) | {"code": "another"})
