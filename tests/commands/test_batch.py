@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import errno
 import io
+import multiprocessing
 import os
 import pickle
 import re
@@ -30,9 +31,9 @@ from bayesplate.board.board import Board
 from bayesplate.board.named import load_named
 from bayesplate.board.prior import load_prior
 from bayesplate.cli import main
+from bayesplate.commands.batch import default_batch_folder
 from bayesplate.commands.batch_boards import boards_of
-from bayesplate.commands.batch_options import default_batch_folder
-from bayesplate.commands.batch_pool import Call, WorkerDied, Workers, computed, processes
+from bayesplate.commands.workers import WorkerDied, computed, processes
 from bayesplate.errors import BatchError, CheckpointError, InputError
 from bayesplate.results.contract import json_text
 
@@ -72,10 +73,10 @@ def test_what_is_no_board_card_is_left_aside(cards, tmp_path):
     folder = shutil.copytree(cards, tmp_path / "tops")
     (folder / "setup.toml").write_text('[setup.frequencies_hz]\n"(1,1)" = 50.0\n')
     (folder / "unfinished.toml").write_text('format = 1\nname = "unfinished"\n[setup]\n')
-    found = boards_of(folder, None)
+    boards, aside = boards_of(folder, None)
 
-    assert set(found.aside) == {"own-prior.toml", "setup.toml"}
-    assert "unfinished" in found.names
+    assert set(aside) == {"own-prior.toml", "setup.toml"}
+    assert "unfinished" in [board.name for board in boards]
 
 
 def test_a_folder_that_cannot_be_read_is_refused(cards, monkeypatch):
@@ -97,14 +98,12 @@ def test_a_link_out_of_the_folder_is_no_card_of_it(tmp_path):
     (folder / "b.toml").symlink_to(tmp_path / "b.toml")
     (folder / "c.toml").symlink_to(folder / "inner" / "c.toml")
     (folder / "d.toml").symlink_to(folder / "d.toml")  # to itself
-    found = boards_of(folder, None)
-
     read = {}
-    for at, name in enumerate(found.names):
+    for board in boards_of(folder, None)[0]:
         try:
-            read[name] = found.card(at).name
+            read[board.name] = board.card().name
         except InputError as error:
-            read[name] = str(error)
+            read[board.name] = str(error)
 
     assert (read["a"], read["c"]) == ("a", "c")
     assert read["b"] == (
@@ -159,12 +158,12 @@ def test_a_board_has_its_seed_from_its_card_and_only_changed_cards_are_fitted_ag
     (again / "a.toml").unlink()
     (again / "m.toml").write_text(card_text("m", 1.02), encoding="utf-8")
     submitted = []
-    monkeypatch.setattr("bayesplate.commands.batch_run.computed", counted(submitted))
+    monkeypatch.setattr("bayesplate.commands.batch.computed", counted(submitted))
 
     result = bayesplate.batch(again, out, workers=1, resume=True, report=False)
 
     before, after = rows_of(two.table.read_bytes()), rows_of(result.table.read_bytes())
-    assert [call.arguments[0].name for call in submitted] == ["m"]
+    assert [call[1][0].name for call in submitted] == ["m"]
     assert set(after) == {"b", "m", "n"}
     assert {name: after[name] for name in "bn"} == {name: before[name] for name in "bn"}
     assert after["m"]["outcome"] == "fitted"
@@ -172,13 +171,13 @@ def test_a_board_has_its_seed_from_its_card_and_only_changed_cards_are_fitted_ag
     assert (out / "boards.jsonl").read_bytes().count(b"\n") == 3
 
 
-def counted(submitted: list[Call]):
+def counted(submitted: list[Any]):
     """`computed` that notes what it is given."""
 
-    def compute(workers, calls):
+    def compute(free, calls):
         noted = list(calls)
         submitted.extend(call for _, call in noted)
-        return computed(workers, iter(noted))
+        return computed(free, iter(noted))
 
     return compute
 
@@ -242,9 +241,9 @@ def test_a_cluster_of_two_processes_gives_the_same_bytes(cards, two, tmp_path):
 
 
 def test_a_worker_that_dies_takes_no_other_board_with_it():
-    """Whose call it was is found by computing those under way again, one at a time."""
-    calls = [(0, Call(abs, (-1,))), (1, Call(os._exit, (1,))), (2, Call(abs, (-3,))), (3, Call(int, ("x",)))]
-    found = dict(computed(processes(2), iter(calls)))
+    calls = [(0, (abs, (-1,))), (1, (os._exit, (1,))), (2, (abs, (-3,))), (3, (int, ("x",)))]
+    with processes(2) as free:
+        found = dict(computed(free, iter(calls)))
 
     assert found[0].result() == 1
     assert isinstance(found[1].exception(), WorkerDied)
@@ -253,8 +252,9 @@ def test_a_worker_that_dies_takes_no_other_board_with_it():
 
 
 SCRIPT = """
-from bayesplate.commands.batch_pool import Call, computed, processes
-print([future.result() for _, future in computed(processes(2), [(0, Call(abs, (-1,)))])])
+from bayesplate.commands.workers import computed, processes
+with processes(2) as free:
+    print([future.result() for _, future in computed(free, [(0, (abs, (-1,)))])])
 """
 
 
@@ -270,10 +270,9 @@ def test_workers_do_not_run_the_script_that_started_them(is_file, tmp_path):
 
 
 def test_no_worker_starts_for_nothing():
-    def opened():
-        raise AssertionError("workers were started")
-
-    assert list(computed(Workers(opened, 2), [])) == []
+    with processes(2) as free:
+        assert list(computed(free, [])) == []
+        assert multiprocessing.active_children() == []
 
 
 def test_few_calls_wait_at_a_time():
@@ -283,10 +282,11 @@ def test_few_calls_wait_at_a_time():
     def source():
         for i in range(40):
             taken.append(i)
-            yield i, Call(abs, (i,))
+            yield i, (abs, (i,))
 
-    for n_done, _ in enumerate(computed(processes(2), source()), start=1):
-        ahead.append(len(taken) - n_done)
+    with processes(2) as free:
+        for n_done, _ in enumerate(computed(free, source()), start=1):
+            ahead.append(len(taken) - n_done)
 
     assert len(ahead) == 40
     assert max(ahead) <= 4
@@ -312,8 +312,8 @@ def table(tmp_path) -> Path:
 
 
 def test_a_row_is_the_card_that_the_template_and_its_cells_make(table):
-    boards = boards_of(table, table.parent / "template.toml")
-    one, two = (boards.card(at) for at, name in enumerate(boards.names) if name in ("top-1", "top-2"))
+    boards, _ = boards_of(table, table.parent / "template.toml")
+    one, two = (board.card() for board in boards if board.name in ("top-1", "top-2"))
 
     assert (one.inputs["mass"].mean, one.inputs["mass"].sd) == (0.3, 0.002)
     assert "density" not in one.inputs
@@ -339,9 +339,7 @@ def test_two_boards_of_one_name_have_two_rows_and_one_line_whether_begun_or_gone
 
 def test_bad_rows_are_rows_of_the_table_and_no_name_leaves_the_folder(table, tmp_path, monkeypatch):
     """Nothing is computed here: what the good rows give is another test's. Names are cells that no sheet executes."""
-    monkeypatch.setattr(
-        "bayesplate.commands.batch_run.computed", lambda workers, calls: (one for one in list(calls)[:0])
-    )
+    monkeypatch.setattr("bayesplate.commands.batch.computed", lambda workers, calls: (one for one in list(calls)[:0]))
     (tmp_path / "tops.csv").write_text("\n".join(TABLE.splitlines()[:1] + TABLE.splitlines()[3:]))
     result = bayesplate.batch(table, tmp_path / "deep" / "out", template=tmp_path / "template.toml", folders=True)
 
@@ -371,8 +369,8 @@ def test_a_table_in_parquet_says_the_same(table, tmp_path):
     parquet.write_table(pyarrow.table(columns | hertz), tmp_path / "tops.parquet")
     texts = []
     for file in ("tops.csv", "tops.parquet"):
-        boards = boards_of(tmp_path / file, tmp_path / "template.toml")
-        texts.append([boards.card(at).text for at, name in enumerate(boards.names) if name in ("1", "007")])
+        boards, _ = boards_of(tmp_path / file, tmp_path / "template.toml")
+        texts.append([board.card().text for board in boards if board.name in ("1", "007")])
 
     assert texts[0] == texts[1]
     assert len(texts[0]) == 2
@@ -383,7 +381,7 @@ def computed_here(workers, calls):
     for key, call in calls:
         future: Future[Any] = Future()
         try:
-            future.set_result(call.function(*call.arguments))
+            future.set_result(call[0](*call[1]))
         except InputError as error:
             future.set_exception(error)
         yield key, future
@@ -391,7 +389,7 @@ def computed_here(workers, calls):
 
 def test_faults_of_rows_name_the_table_and_the_row_as_it_is_counted_there(table, tmp_path, monkeypatch):
     """Lines without a word count but are no boards; so a fault of sizes, of a card that a row names, and of a name."""
-    monkeypatch.setattr("bayesplate.commands.batch_run.computed", computed_here)
+    monkeypatch.setattr("bayesplate.commands.batch.computed", computed_here)
     header = 'name,thickness_mm,density_kg_m3,prior,"(0,0)","(0,1)","(1,0)",,'
     rows = [",,,,", header, "", "thick,3 mm,400,,57,100,130,,", ",,,,,,,,", "light,3,2,,57,100,130,,"]
     rows += ["prior,3,400,x.toml,57,100,130", "twice,3,400,,57,100,130", "", "Twice,3,400,,58,100,131"]
@@ -413,12 +411,10 @@ def test_doubts_of_a_fit_and_of_copied_rows_reach_the_table_and_the_summary_and_
     def made(workers, calls):
         for key, call in calls:
             future: Future[Any] = Future()
-            future.set_result(
-                replace(SUMMARY, name=(name := call.arguments[0].name), doubts=("misread?",) * (name == "c"))
-            )
+            future.set_result(replace(SUMMARY, name=(name := call[1][0].name), doubts=("misread?",) * (name == "c")))
             yield key, future
 
-    monkeypatch.setattr("bayesplate.commands.batch_run.computed", made)
+    monkeypatch.setattr("bayesplate.commands.batch.computed", made)
     header, *rows = 'name,"(0,0)","(0,1)","(1,0)"', "a,57,100,130", "b,57,100,130", "c,58,100,130"
     found = []
     for some, resume in ((rows, False), (rows[1:], True)):
