@@ -31,7 +31,9 @@ Rule = Callable[[Mapping[str, Any]], Iterable[Fault]]
 
 
 def checked(*rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """A function whose arguments are read by the `Key` of their annotations.
+    """A function whose arguments are read by the `Key` of their annotations, and which runs in one thread.
+
+    Thousands of small matrices in several threads of linear algebra would only wait for one another.
 
     Parameters
     ----------
@@ -49,9 +51,13 @@ def checked(*rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
         @wraps(function)
         def call(*args: P.args, **kwargs: P.kwargs) -> R:
+            import scipy.linalg  # noqa: F401  (what is not loaded is not limited)
+            from threadpoolctl import threadpool_limits
+
             bound = signature.bind(*args, **kwargs)
-            bound.arguments |= read_arguments(function, bound.arguments, (contradictions, *rules))
-            return function(*bound.args, **bound.kwargs)
+            with threadpool_limits(1, user_api="blas"):
+                bound.arguments |= read_arguments(function, bound.arguments, (contradictions, *rules))
+                return function(*bound.args, **bound.kwargs)
 
         return call
 

@@ -16,8 +16,8 @@ from bayesplate.campaign.shared import Shared, shared_by
 from bayesplate.commands.arguments import checked
 from bayesplate.commands.options import CARD, Effects, Law, Robust
 from bayesplate.commands.prepare import Card, Prepared, prepare
-from bayesplate.commands.problem import Problem, as_problem
-from bayesplate.errors import Fault, InputError, NotIdentifiableError
+from bayesplate.commands.problem import Problem, as_problem, pose_all
+from bayesplate.errors import Fault, InputError
 from bayesplate.frequencies.laws import LawName
 
 CampaignPath = str | os.PathLike[str]
@@ -94,14 +94,7 @@ class Campaign:
         NotIdentifiableError
             With every board that leaves a constant open.
         """
-        told = []
-        for problem in self.problems:
-            try:
-                _ = problem.posed
-            except NotIdentifiableError as error:
-                told.append(f"{problem.board.name}: {error}")
-        if told:
-            raise NotIdentifiableError("\n".join(told))
+        pose_all(self.problems)
 
     def __repr__(self) -> str:
         shared = ", ".join(one.name for one in self.shared) or "nothing shared"

@@ -12,7 +12,6 @@ import numpy as np
 
 from bayesplate.board.board import Board, Values
 from bayesplate.commands.arguments import checked
-from bayesplate.commands.one_thread import one_thread_each
 from bayesplate.commands.options import CARD, Effects, Force, Out, Seed, SetupFile
 from bayesplate.commands.prepare import Card, Prepared, prepare
 from bayesplate.commands.problem import Problem, as_problem
@@ -66,7 +65,6 @@ class ModesResult:
         return show_modes(self.summary).html(self.summary.title or self.summary.name)
 
 
-@one_thread_each()
 @checked()
 def modes(
     card: Annotated[Problem | Card, CARD],

@@ -15,12 +15,11 @@ from bayesplate.board.words import EFFECT_NAMES
 from bayesplate.campaign.shared import Shared
 from bayesplate.commands.arguments import checked
 from bayesplate.commands.campaign import Campaign, problem_or_campaign
-from bayesplate.commands.one_thread import one_thread_each
+from bayesplate.commands.fitting import Stages
 from bayesplate.commands.options import CARD, Between, Effects, Force, Goal, Minutes, OnProgress, Out, Seed
 from bayesplate.commands.prepare import Card, Prepared, prepare
 from bayesplate.commands.problem import Problem, as_problem
 from bayesplate.commands.shown import show_plan
-from bayesplate.commands.stages import Stages
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.hypotheses import RELABELLING
 from bayesplate.diagnosis.joint import full_search
@@ -81,7 +80,6 @@ class PlanResult:
         return show_plan(self.summary).html(self.summary.title or self.summary.name)
 
 
-@one_thread_each()
 @checked()
 def plan(
     card: Annotated[Problem | Card | Campaign, CARD],

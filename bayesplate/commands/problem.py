@@ -18,7 +18,7 @@ from bayesplate.board.values import Key
 from bayesplate.commands.arguments import checked, or_none, read_prior
 from bayesplate.commands.options import CARD, Effects, Law, Robust, SetupFile
 from bayesplate.commands.prepare import Card, Prepared, prepare
-from bayesplate.errors import Fault, InputError
+from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.posing import PosedProblem, pose
@@ -268,6 +268,26 @@ class Problem:
                 found[inside] = of(rows[inside])
         found[np.isnan(found)] = outside
         return found if np.ndim(theta) == 2 else found[0][()]
+
+
+def pose_all(problems: Sequence[Problem]) -> None:
+    """Solve boards around their estimates, so that what cannot be fitted is known before anything is sampled.
+
+    Raises
+    ------
+    NotIdentifiableError
+        With every board that leaves a constant open.
+    """
+    told = []
+    for problem in problems:
+        try:
+            _ = problem.posed
+        except NotIdentifiableError as error:
+            if len(problems) == 1:
+                raise
+            told.append(f"{problem.board.name}: {error}")
+    if told:
+        raise NotIdentifiableError("\n".join(told))
 
 
 def as_problem(

@@ -56,7 +56,7 @@ def quickly(patch: pytest.MonkeyPatch, *, page: bool = False) -> None:
     patch.setattr("bayesplate.commands.fitting.SamplerSettings", partial(SamplerSettings, gate=LOOSE_GATE))
     patch.setattr("bayesplate.commands.diagnose.full_search", partial(full_search, tried=TRIED))
     if not page:
-        patch.setattr("bayesplate.commands.diagnose.write_page", lambda *_: None)
+        patch.setattr("bayesplate.commands.fitting.FitResult.write_page", lambda *_: None)
 
 
 @pytest.fixture

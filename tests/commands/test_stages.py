@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from bayesplate.commands.fitting import Stages
 from bayesplate.commands.shown import progress_text
-from bayesplate.commands.stages import Stages
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import Progress
 from bayesplate.terminal import progress_line
