@@ -225,6 +225,7 @@ def test_killed_at_a_random_moment_and_resumed_the_table_is_the_same(cards, two,
     assert (out / "boards.jsonl").read_bytes() == (two.folder / "boards.jsonl").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_cluster_of_two_processes_gives_the_same_bytes(cards, two, tmp_path):
     import warnings
 
@@ -258,13 +259,12 @@ with processes(2) as free:
 """
 
 
-@pytest.mark.parametrize("is_file", [True, False])
-def test_workers_do_not_run_the_script_that_started_them(is_file, tmp_path):
-    """Without a guard it would begin the batch again in each; that of the standard input is no file at all."""
+def test_workers_do_not_run_the_script_that_started_them(tmp_path):
+    """Without a guard it would begin the batch again in each."""
     (tmp_path / "script.py").write_text(SCRIPT, encoding="utf-8")
-    program = [sys.executable, "script.py" if is_file else "-"]
+    program = [sys.executable, "script.py"]
     source = {"cwd": tmp_path, "env": {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}}
-    done = subprocess.run(program, input=SCRIPT, capture_output=True, text=True, check=False, **source)
+    done = subprocess.run(program, capture_output=True, text=True, check=False, **source)
 
     assert (done.stdout, done.stderr) == ("[1]\n", "")
 
@@ -337,26 +337,6 @@ def test_two_boards_of_one_name_have_two_rows_and_one_line_whether_begun_or_gone
     assert (found[0][0].count(b"more than once"), found[0][1].count(b"\n")) == (2, 1)
 
 
-def test_bad_rows_are_rows_of_the_table_and_no_name_leaves_the_folder(table, tmp_path, monkeypatch):
-    """Nothing is computed here: what the good rows give is another test's. Names are cells that no sheet executes."""
-    monkeypatch.setattr("bayesplate.commands.batch.computed", lambda workers, calls: (one for one in list(calls)[:0]))
-    (tmp_path / "tops.csv").write_text("\n".join(TABLE.splitlines()[:1] + TABLE.splitlines()[3:]))
-    result = bayesplate.batch(table, tmp_path / "deep" / "out", template=tmp_path / "template.toml", folders=True)
-
-    text = result.table.read_text(encoding="utf-8")
-    rows = rows_of(result.table.read_bytes())
-    assert {row["outcome"] for row in rows.values()} == {"refused"}
-    assert set(rows) == {"'=cmd()", "../../evil", "twice", "Twice", "top-3"}
-    assert "tops.csv row 4 -> Twice.toml" not in text
-    assert "more than once" in rows["twice"]["message"] == rows["twice"]["message"]
-    assert "tops.csv row 5 -> top-3.toml [plate] thickness_mm: wanted a number" in rows["top-3"]["message"]
-    assert {path.name for path in tmp_path.iterdir()} == {"template.toml", "tops.csv", "deep"}
-    assert {path.name for path in (tmp_path / "deep").iterdir()} == {"out"}
-    assert not (result.folder / "boards").exists()
-    page = (result.folder / "grading.html").read_text(encoding="utf-8")
-    assert "Boards that were not fitted" in page
-
-
 def test_a_table_in_parquet_says_the_same(table, tmp_path):
     """Numbers as numbers, nothing where there is nothing."""
     import pyarrow
@@ -385,6 +365,19 @@ def computed_here(workers, calls):
         except InputError as error:
             future.set_exception(error)
         yield key, future
+
+
+def test_names_of_boards_leave_no_folder_and_are_cells_that_no_sheet_executes(table, tmp_path, monkeypatch):
+    """Nothing is computed here: what the good rows give is another test's."""
+    monkeypatch.setattr("bayesplate.commands.batch.computed", lambda free, calls: (one for one in list(calls)[:0]))
+    (tmp_path / "tops.csv").write_text("\n".join(TABLE.splitlines()[:1] + TABLE.splitlines()[3:]))
+    result = bayesplate.batch(table, tmp_path / "deep" / "out", template=tmp_path / "template.toml", folders=True)
+
+    rows = rows_of(result.table.read_bytes())
+    assert {row["outcome"] for row in rows.values()} == {"refused"}
+    assert set(rows) == {"'=cmd()", "../../evil", "twice", "Twice", "top-3"}
+    assert {path.name for path in (tmp_path / "deep").iterdir()} == {"out"}
+    assert not (result.folder / "boards").exists()
 
 
 def test_faults_of_rows_name_the_table_and_the_row_as_it_is_counted_there(table, tmp_path, monkeypatch):

@@ -83,14 +83,14 @@ def moments(n: int, n_of: int, seed: int) -> list[int]:
     return [int(rng.integers(first, last)) + 1 for first, last in pairwise(ends)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "n"),
     [
-        ("fit", 2),
-        pytest.param("fit and report", 20, marks=pytest.mark.slow),
-        pytest.param("diagnose", 20, marks=pytest.mark.slow),
-        pytest.param("batch", 20, marks=pytest.mark.slow),
-        pytest.param("campaign", 20, marks=pytest.mark.slow),
+        ("fit and report", 20),
+        ("diagnose", 20),
+        ("batch", 20),
+        ("campaign", 20),
     ],
     indirect=["arguments"],
 )

@@ -55,6 +55,7 @@ def test_a_warped_board(warped, tmp_path):
     assert_covers(warped, on_card(warped, tmp_path, effects='["warp"]'), {"warp.cup": CUP["cup"]})
 
 
+@pytest.mark.slow
 def test_an_exciter_at_a_known_place(tmp_path):
     board = planted("clamped-9", "exciter", DRIVE)
     assert board.shifts()["clamped"][0, 0] > 5.0 * NOISE_CENTS
