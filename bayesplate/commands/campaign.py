@@ -108,15 +108,9 @@ def problem_or_campaign(
     law: LawName | None = None,
     robust: bool = False,
     setup: str | os.PathLike[str] | None = None,
+    may_lack_frequencies: bool = False,
 ) -> Problem | Campaign:
-    """What a command was given, as a problem or as a campaign.
-
-    Parameters
-    ----------
-    given : Problem, str, path, Board or Campaign
-    effects, law, robust, setup
-        As of `Problem.from_card`, setup for a board only; of a problem or a campaign that is there already they may
-        not be given.
+    """What a command was given, as a problem or as a campaign; the options are those of `as_problem`.
 
     Raises
     ------
@@ -133,7 +127,9 @@ def problem_or_campaign(
         return given
     if is_card and isinstance(given, str | os.PathLike):
         return Campaign.from_card(given, effects, law, robust)
-    return as_problem(given, effects=effects, law=law, robust=robust, setup=setup)
+    return as_problem(
+        given, effects=effects, law=law, robust=robust, setup=setup, may_lack_frequencies=may_lack_frequencies
+    )
 
 
 def _prepared(card: CampaignCard, effects: Sequence[str] | None) -> tuple[list[Prepared], PriorCard | None]:

@@ -297,8 +297,9 @@ def as_problem(
     law: LawName | None = None,
     robust: bool = False,
     setup: str | os.PathLike[str] | None = None,
+    may_lack_frequencies: bool = False,
 ) -> Problem:
-    """What a command was given, as a problem; the options are those of `Problem.from_card`.
+    """What a command was given, as a problem; the options are those of `Problem.from_card` and of `prepare`.
 
     Raises
     ------
@@ -306,7 +307,8 @@ def as_problem(
         If the card cannot be used, or a problem is given together with what it states itself.
     """
     if not isinstance(given, Problem):
-        return Problem(prepare(given, effects, setup=setup), law, robust)
+        prepared = prepare(given, effects, setup=setup, may_lack_frequencies=may_lack_frequencies)
+        return Problem(prepared, law, robust)
     told = {"effects": effects is not None, "law": law is not None, "robust": robust, "setup": setup is not None}
     if any(told.values()):
         stated = ", ".join(name for name, is_told in told.items() if is_told)
