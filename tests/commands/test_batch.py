@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import errno
 import io
-import multiprocessing
 import os
 import pickle
 import re
@@ -269,29 +268,6 @@ def test_workers_do_not_run_the_script_that_started_them(tmp_path):
     assert (done.stdout, done.stderr) == ("[1]\n", "")
 
 
-def test_no_worker_starts_for_nothing():
-    with processes(2) as free:
-        assert list(computed(free, [])) == []
-        assert multiprocessing.active_children() == []
-
-
-def test_few_calls_wait_at_a_time():
-    """The queue is bounded: what is taken from the source is never far ahead of what is done."""
-    taken, ahead = [], []
-
-    def source():
-        for i in range(40):
-            taken.append(i)
-            yield i, (abs, (i,))
-
-    with processes(2) as free:
-        for n_done, _ in enumerate(computed(free, source()), start=1):
-            ahead.append(len(taken) - n_done)
-
-    assert len(ahead) == 40
-    assert max(ahead) <= 4
-
-
 TABLE = """name,thickness_mm,mass_g,mass_g sd,"(0,0)","(0,1)","(1,0)","(1,1)","clamped (0,2)"
 top-1,3.1,300,2,57,100,130,162,170
 top-2,2.9;3.0;3.1,,,57,100,130,162,
@@ -430,19 +406,13 @@ def test_a_folder_keeps_what_stands_behind_a_point_in_its_name(table):
     assert default_batch_folder(table) == Path("results/tops")
 
 
-HEADERS = [
-    ("name,thicknes_mm", 'column 2: wanted a key of a board card, or the label of a mode, got "thicknes_mm" (did you'),
-    ('name,"side (1,1)"', 'got "side (1,1)" (the setups of the template are "clamped": write the name of one)'),
-    ("thickness_mm", 'wanted a column with the names of the boards, got none (call it "name")'),
-    ("name,name", 'column 2: wanted each column once, got "name" again'),
-]
-
-
-@pytest.mark.parametrize(("header", "said"), HEADERS)
-def test_a_table_whose_columns_are_no_keys_is_refused(table, tmp_path, header, said):
-    table.write_text(f"{header}\nx,3\n", encoding="utf-8")
-    with pytest.raises(InputError, match=re.escape(said)):
+def test_a_table_whose_columns_are_no_keys_is_refused(table, tmp_path):
+    table.write_text("thicknes_mm\n3\n", encoding="utf-8")
+    with pytest.raises(InputError) as refused:
         bayesplate.batch(table, tmp_path / "out", template=tmp_path / "template.toml")
+
+    assert "column 1: wanted a key of a board card, or the label of a mode" in str(refused.value)
+    assert 'wanted a column with the names of the boards, got none (call it "name")' in str(refused.value)
     assert not (tmp_path / "out").exists()
 
 
@@ -467,18 +437,3 @@ def test_what_cannot_be_a_batch_is_refused_and_nothing_is_written(cards, tmp_pat
     with pytest.raises(CheckpointError, match=re.escape("wanted the boards.jsonl of an earlier run, got none")):
         bayesplate.batch(cards, out, resume=True)
     assert not out.exists()
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
-def test_memory_does_not_grow_with_the_number_of_boards(tmp_path):
-    """Peaks over 10 and over 40 boards, of the command and of its worker: within 5 % and 5 MB of each other."""
-    from validation.benchmarks.batch import measured, write_cards
-
-    few, many = (
-        measured(write_cards(tmp_path / f"cards-{n}", n), tmp_path / f"out-{n}", ["--workers", "1"], "1")
-        for n in (10, 40)
-    )
-
-    assert many.peak_parent < 1.05 * few.peak_parent + 5.0
-    assert many.peak_worker < 1.05 * few.peak_worker + 5.0

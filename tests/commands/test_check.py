@@ -204,11 +204,3 @@ def test_the_missing_direction_and_the_mode_that_would_help_are_named(with_label
     assert "D_x (so E_x)" not in message
     assert "D_s (so G_xy)" not in message
     assert invoke("check", str(with_labels("(1,0)", "(1,1)", "(2,1)", "(1,2)"))).exit_code == 0
-
-
-@pytest.mark.usefixtures("without_effects")
-def test_three_modes_that_fix_three_constants_leave_no_check(with_labels):
-    report = bayesplate.check(with_labels("(1,0)", "(1,1)", "(1,2)"))
-
-    assert any("nothing is left to check the model with" in sentence for sentence in report.identifiability)
-    assert report.in_sample_rms_cents < 0.1

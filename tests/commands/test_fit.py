@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -167,18 +166,6 @@ def test_the_archive_of_a_board_with_peaks_holds_what_each_factor_says(free):
 
     assert group["readings_and_peaks"].dims == ("chain", "draw", "factor")
     assert group["factor"].values.tolist() == ["free peaks"]
-
-
-def test_peaks_narrow_the_constants(tmp_path):
-    """Sixteen peaks in place of nine labels: at the expected noise the constants are known better."""
-    shipped = shelf_folder("boards") / "spruce-free-2R.toml"
-    text = shipped.read_text(encoding="utf-8")
-    without = tmp_path / "spruce-free-2R.toml"
-    without.write_text(re.sub(r"\[\[setup\.peaks\]\]\n(.+\n)+", "", text), encoding="utf-8")
-    noise_alone = [bayesplate.Problem.from_card(card, effects=[]).posed.identifiability for card in (shipped, without)]
-    shrunk = noise_alone[0].standard_errors / noise_alone[1].standard_errors
-    assert (shrunk < 0.95).all()
-    assert shrunk[0] < 0.7  # bending along the grain, which the bare peaks are mostly
 
 
 @pytest.fixture(scope="module")

@@ -30,12 +30,6 @@ def test_the_share_is_that_of_the_whole_and_never_falls():
     assert told[1].n_steps == 100
 
 
-def test_nobody_needs_to_be_told():
-    stages = Stages(None, 1.0)
-    stages.begin("one", 1.0)
-    stages.reached(1.0)
-
-
 @pytest.mark.parametrize(
     ("done", "seconds", "words"),
     [
