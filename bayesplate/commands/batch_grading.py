@@ -23,22 +23,7 @@ _PERCENTS = f"positive per cents up to {_MOST_PERCENT:g}, as 10 or E_x=10,E_y=15
 
 
 def grading_request(match: str | None, limit: Sequence[str], rigidity: float | None) -> GradingRequest:
-    """Read what boards are graded by.
-
-    Parameters
-    ----------
-    match : str or None
-        Tolerances in per cent: "10", or "E_x=10,E_y=15,G_xy=15".
-    limit : sequence of str
-        "E_x=10:14", either end may be left away; in the unit that the tables show.
-    rigidity : float or None
-        D_x, N m.
-
-    Raises
-    ------
-    InputError
-        With everything that cannot be read.
-    """
+    """A request from "10" or "E_x=10,E_y=15" (per cent), "E_x=10:14" (units of the tables) and D_x (N m)."""
     faults: list[Fault] = []
     percents = {} if match is None else _percents(match, faults)
     limits: dict[str, Limit] = {}

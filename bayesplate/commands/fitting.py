@@ -113,8 +113,6 @@ class Stages:
 
     Attributes
     ----------
-    tell : callable or None
-        Told; None tells nobody.
     left : float
         How long the parts that are still to come take, begun ones not counted, in any unit of time.
     """
@@ -197,10 +195,6 @@ def opened(
     ----------
     first : dict of Problem
         What is fitted first, by the subfolders of the checkpoint.
-    out : path or None
-        Output folder; None writes nothing.
-    force, resume : bool
-        Replace the results in the folder, or continue an interrupted run.
 
     Raises
     ------
