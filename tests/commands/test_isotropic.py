@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -202,16 +201,6 @@ def test_the_unit_cube_becomes_the_prior_of_one_modulus():
     np.testing.assert_allclose(E, density.quantile(u[:, 0]), rtol=1e-9)
     factors = problem.posed.posterior.log_prior_factors(theta)
     np.testing.assert_allclose(factors["constants"], density.log_density_of_log(np.log(E)), rtol=1e-9)
-
-
-def test_a_board_comes_back_from_its_card():
-    board = sheet(sheet_hz(70e9, 0.3), effects=("transverse_shear",))
-    problem = bayesplate.Problem.from_card(board)
-
-    assert "isotropic = true" in board.to_toml()
-    assert problem.board.isotropic
-    assert problem.board.to_toml() == board.to_toml()
-    assert "isotropic" not in replace(board, isotropic=False).to_toml()
 
 
 def test_the_poisson_ratio_of_nobody_is_that_of_its_kind():

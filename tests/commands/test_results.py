@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from read_pages import ALLOWED, Read
 
 import bayesplate
-from bayesplate.results.archive import GROUPS
 from bayesplate.results.contract import as_json
 
 
@@ -75,18 +74,6 @@ def test_a_figure_of_what_is_not_there_is_refused(results):
         with pytest.raises(bayesplate.InputError, match=r"names: wanted a list of one or more of E_x.* each once, got"):
             results["fit"].plot.corner(names)
     assert len(results["fit"].plot.corner(["E_x"]).axes) == 1
-
-
-def test_arviz_gets_what_posterior_nc_holds(fiemme):
-    import arviz
-
-    written, made = arviz.from_netcdf(str(fiemme.folder / "posterior.nc"), engine="h5netcdf"), fiemme.to_arviz()
-    for group in GROUPS:
-        assert set(made[group].data_vars) == set(written[group].data_vars)
-        for name, values in written[group].data_vars.items():
-            assert made[group][name].dims == values.dims
-            np.testing.assert_array_equal(made[group][name].values, values.values)
-    assert {key: value for key, value in written.attrs.items() if key in made.attrs} == dict(made.attrs)
 
 
 def test_the_factors_of_the_prior_multiply_to_it(fiemme):
