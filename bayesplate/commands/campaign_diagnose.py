@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -43,7 +42,6 @@ from bayesplate.diagnosis.forms import forms
 from bayesplate.effects import EFFECTS
 from bayesplate.errors import InputError
 from bayesplate.files import write_text
-from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import CampaignPlots
 from bayesplate.results.contract import as_json, json_text
 from bayesplate.results.folder import BEFORE, DIAGNOSIS
@@ -102,26 +100,16 @@ class CampaignDiagnoseResult:
         return f"<CampaignDiagnoseResult of {one.name}: {one.verdict}, {told} shared, {claim}>"
 
 
-def diagnose_campaign(
-    campaign: Campaign,
-    *,
-    out: str | os.PathLike[str] | None = None,
-    report: bool = True,
-    seed: int = 1,
-    force: bool = False,
-    resume: bool = False,
-    progress: Callable[[Progress], None] | None = None,
-) -> CampaignDiagnoseResult:
-    """Diagnose a campaign; `bayesplate.diagnose` says what the arguments mean and what is raised.
+def diagnose_campaign(campaign: Campaign, run: Run, *, report: bool) -> CampaignDiagnoseResult:
+    """Diagnose a campaign; `bayesplate.diagnose` says what is raised.
 
     Where the card names what is shared, that is judged: each board by what the others teach it, against the same boards
     without it. Otherwise every effect that boards may have alike is tried, and the one that stands out is judged so.
     """
     alone = _without_shared(campaign)
-    n = len(campaign.problems)
-    stages = Stages(progress, n * (2.0 * FIT + (0.0 if campaign.shared else _SEARCH)) + SHARED)
     campaign.pose()
-    with campaign_run(alone, f"{BEFORE}/", stages, seed, out, force=force, resume=resume) as run:
+    of_a_board = 2.0 * FIT + (0.0 if campaign.shared else _SEARCH)
+    with campaign_run(alone, run, len(campaign.problems) * of_a_board + SHARED, f"{BEFORE}/"):
         found = replace(_diagnosed(campaign, alone, run), folder=run.path)
     if run.folder is not None:
         path = run.folder.path

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -31,12 +30,12 @@ from bayesplate.campaign.summary import (
     shared_numbers,
 )
 from bayesplate.commands.campaign import Campaign
-from bayesplate.commands.fitting import FIT, FitResult, Run, Stages, not_converged, opened
+from bayesplate.commands.fitting import FIT, FitResult, Run, Stages, not_converged
 from bayesplate.commands.shown import show_fit
 from bayesplate.errors import Fault, InputError, NotConvergedError
 from bayesplate.files import write_text, writing
 from bayesplate.posterior.assessment import assess
-from bayesplate.posterior.sampling import Progress, SamplerSettings
+from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.report.plots import CampaignPlots
 from bayesplate.results.archive import to_arviz, write_tree
 from bayesplate.results.contract import as_json, json_text
@@ -144,19 +143,9 @@ class CampaignFitResult:
         return repr(self.summary).replace("<CampaignSummary", "<CampaignFitResult", 1)
 
 
-def fit_campaign(
-    campaign: Campaign,
-    *,
-    out: str | os.PathLike[str] | None = None,
-    report: bool = True,
-    seed: int = 1,
-    force: bool = False,
-    resume: bool = False,
-    progress: Callable[[Progress], None] | None = None,
-) -> CampaignFitResult:
-    """Fit a campaign; `bayesplate.fit` says what the arguments mean and what is raised."""
-    stages = Stages(progress, len(campaign.problems) * FIT + SHARED)
-    with campaign_run(campaign, "", stages, seed, out, force=force, resume=resume) as run:
+def fit_campaign(campaign: Campaign, run: Run, *, report: bool) -> CampaignFitResult:
+    """Fit a campaign; `bayesplate.fit` says what is raised."""
+    with campaign_run(campaign, run, len(campaign.problems) * FIT + SHARED):
         result = replace(fitted_together(campaign, run), folder=run.path)
     if run.folder is not None:
         result.write(run.folder.path, report=report)
@@ -165,25 +154,21 @@ def fit_campaign(
 
 
 @contextmanager
-def campaign_run(
-    campaign: Campaign,
-    place: str,
-    stages: Stages,
-    seed: int,
-    out: str | os.PathLike[str] | None,
-    *,
-    force: bool,
-    resume: bool,
-) -> Iterator[Run]:
+def campaign_run(campaign: Campaign, run: Run, left: float, place: str = "") -> Iterator[None]:
     """A run that begins with each board alone, at a place of the checkpoint; where one fails, summary.json says so."""
-    first = {f"{place}{BOARDS}/{one.board.name}": one for one in campaign.problems}
-    run = opened(first, stages, seed, out, force=force, resume=resume)
+    run.open({f"{place}{BOARDS}/{one.board.name}": one for one in campaign.problems}, left)
     try:
-        yield run
+        yield
     except NotConvergedError as error:
         if run.path is not None:
             summary = UnconvergedCampaign(
-                FORMAT, campaign.name, seed, versions(), campaign.card.sha256, converged=False, warnings=(str(error),)
+                FORMAT,
+                campaign.name,
+                run.seed,
+                versions(),
+                campaign.card.sha256,
+                converged=False,
+                warnings=(str(error),),
             )
             write_text(run.path / SUMMARY, json_text(summary))
         raise

@@ -17,7 +17,7 @@ from bayesplate.board.values import Key
 from bayesplate.commands.arguments import checked, whole
 from bayesplate.commands.campaign import Campaign, problem_or_campaign
 from bayesplate.commands.campaign_diagnose import CampaignDiagnoseResult, diagnose_campaign
-from bayesplate.commands.fitting import FIT, FitResult, Stages, opened, with_board
+from bayesplate.commands.fitting import FIT, FitResult, Run, with_board
 from bayesplate.commands.options import CARD, Effects, Force, OnProgress, Out, Report, Resume, Seed, SetupFile
 from bayesplate.commands.prepare import Card
 from bayesplate.commands.problem import Problem
@@ -152,16 +152,14 @@ def diagnose(
         As `bayesplate.fit`, of the fit without further effects; also if a problem asks for robust noise.
     """
     problem = problem_or_campaign(card, effects=effects, setup=setup)
+    run = Run(seed, out, force=force, resume=resume, progress=progress)
     if isinstance(problem, Campaign):
-        return diagnose_campaign(
-            problem, out=out, report=report, seed=seed, force=force, resume=resume, progress=progress
-        )
+        return diagnose_campaign(problem, run, report=report)
     if problem.robust:
         wanted = "a problem with normal noise, which the search for an effect assumes"
         raise InputError(Fault("robust", wanted, "Student's distribution"))
-    stages = Stages(progress, FIT + _SEARCH + _KNOWN + _CONTROL + FIT + _CHOICE)
-    run = opened({BEFORE: problem}, stages, seed, out, force=force, resume=resume)
-
+    run.open({BEFORE: problem}, 2.0 * FIT + _SEARCH + _KNOWN + _CONTROL + _CHOICE)
+    stages = run.stages
     before = run.fit(problem, BEFORE, "fit without further effects", tells_failure=True)
     posed = before.inference.problem
     stages.begin("search for effects", _SEARCH)

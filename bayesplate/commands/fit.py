@@ -8,7 +8,7 @@ from typing import Annotated
 from bayesplate.commands.arguments import checked
 from bayesplate.commands.campaign import Campaign, problem_or_campaign
 from bayesplate.commands.campaign_fit import CampaignFitResult, fit_campaign
-from bayesplate.commands.fitting import FIT, FitResult, Stages, opened
+from bayesplate.commands.fitting import FitResult, Run
 from bayesplate.commands.options import (
     CARD,
     Effects,
@@ -87,9 +87,10 @@ def fit(
         If a run cannot be resumed.
     """
     given = problem_or_campaign(card, effects=effects, law=law, robust=robust, setup=setup)
+    run = Run(seed, out, force=force, resume=resume, progress=progress)
     if isinstance(given, Campaign):
-        return fit_campaign(given, out=out, report=report, seed=seed, force=force, resume=resume, progress=progress)
-    run = opened({"": given}, Stages(progress, FIT), seed, out, force=force, resume=resume)
+        return fit_campaign(given, run, report=report)
+    run.open({"": given})
     result = replace(run.fit(given, tells_failure=True), folder=run.path)
     if run.folder is not None:
         result.write(run.folder.path)

@@ -143,18 +143,69 @@ class Stages:
             self.tell(replace(progress or Progress(0, 0), stage=self._stage, done=self._done))
 
 
-@dataclass(frozen=True, eq=False)
 class Run:
-    """A run that may begin: its folder is open, if anything is to be written."""
+    """A run of one fit or several: its seed, its progress, and its output folder.
 
-    seed: int
-    stages: Stages
-    folder: OutputFolder | None = None
+    Parameters
+    ----------
+    out : path or None
+        Output folder; None writes nothing.
+    force, resume : bool
+        Replace the results in the folder, or continue an interrupted run.
+    progress : callable, optional
+        Told of the parts of the run and of its sampling.
+    """
+
+    def __init__(
+        self,
+        seed: int = 1,
+        out: str | os.PathLike[str] | None = None,
+        *,
+        force: bool = False,
+        resume: bool = False,
+        progress: Callable[[Progress], None] | None = None,
+    ) -> None:
+        self.seed, self.stages = seed, Stages(progress, 0.0)
+        self.folder = None if out is None else OutputFolder(Path(out))
+        self._force, self._resume = force, resume
 
     @property
     def path(self) -> Path | None:
         """Where the files go; None if nothing is to be written."""
         return None if self.folder is None else self.folder.path
+
+    def open(self, first: Mapping[str, Problem], left: float = 0.0) -> None:
+        """Pose problems and open the folder; whatever is refused is refused before that, and nothing is written.
+
+        Parameters
+        ----------
+        first : dict of Problem
+            What is fitted first, by the subfolders of the checkpoint.
+        left : float
+            How long the parts of the run take.
+
+        Raises
+        ------
+        InputError
+            If the folder may not be used.
+        NotIdentifiableError
+            If the data leave a constant open.
+        CheckpointError
+            If there is nothing to resume.
+        """
+        self.stages.left = left
+        if self.folder is not None:
+            self.folder.require_usable(force=self._force, resume=self._resume)
+        pose_all(list(first.values()))
+        for problem in first.values():
+            SamplerSettings(seed=self.seed).walkers(problem.posed.parameters.n_dim)
+        if self.folder is not None:
+            saved = [checkpoint_in(self.folder.checkpoint / at, one, one.posed) for at, one in first.items()]
+            if self._resume and not any(one.exists() for one in saved):
+                law = next(iter(first.values())).posed.posterior.law
+                wanted = f"a saved run under the {law} law"
+                raise CheckpointError(f"{self.path}: wanted {wanted}, got none to resume (--force runs it anew)")
+            self.folder.open(resume=self._resume)
 
     def fit(
         self, problem: Problem, place: str = "", stage: str = "", *, of: str = "", tells_failure: bool = False
@@ -178,47 +229,6 @@ class Run:
         progress = self.stages.sampled if stage else self.stages.tell
         failure = self.path if tells_failure else None
         return fitted(problem, self.seed, checkpoints, progress, of=of, failure=failure)
-
-
-def opened(
-    first: Mapping[str, Problem],
-    stages: Stages,
-    seed: int,
-    out: str | os.PathLike[str] | None,
-    *,
-    force: bool = False,
-    resume: bool = False,
-) -> Run:
-    """Pose problems and open the folder of their run; whatever is refused is refused before that.
-
-    Parameters
-    ----------
-    first : dict of Problem
-        What is fitted first, by the subfolders of the checkpoint.
-
-    Raises
-    ------
-    InputError
-        If the folder may not be used; then nothing is written, nor with the following.
-    NotIdentifiableError
-        If the data leave a constant open.
-    CheckpointError
-        If there is nothing to resume.
-    """
-    folder = None if out is None else OutputFolder(Path(out))
-    if folder is not None:
-        folder.require_usable(force=force, resume=resume)
-    pose_all(list(first.values()))
-    for problem in first.values():
-        SamplerSettings(seed=seed).walkers(problem.posed.parameters.n_dim)
-    if folder is not None:
-        places = [checkpoint_in(folder.checkpoint / at, one, one.posed) for at, one in first.items()]
-        if resume and not any(one.exists() for one in places):
-            law = next(iter(first.values())).posed.posterior.law
-            wanted = f"a saved run under the {law} law"
-            raise CheckpointError(f"{folder.path}: wanted {wanted}, got none to resume (--force runs it anew)")
-        folder.open(resume=resume)
-    return Run(seed, stages, folder)
 
 
 def with_board(problem: Problem, board: Board) -> Problem:

@@ -19,7 +19,7 @@ from runs import files_in
 
 from bayesplate.cli import main
 from bayesplate.commands.campaign_fit import fit_boards
-from bayesplate.commands.fitting import Run, Stages
+from bayesplate.commands.fitting import Run
 from bayesplate.errors import InputError
 from bayesplate.locks import take
 from bayesplate.posterior import checkpoint
@@ -194,6 +194,6 @@ def test_a_board_of_a_campaign_may_have_the_name_of_a_file_of_the_checkpoint(mon
     kept = []
     monkeypatch.setattr(Run, "fit", lambda run, problem, place, *others, **told: kept.append(place))
     problems = [SimpleNamespace(board=SimpleNamespace(name=name)) for name in ("lock", "earlier", "before")]
-    fit_boards(SimpleNamespace(problems=problems), Run(1, Stages(None, 1.0)))
+    fit_boards(SimpleNamespace(problems=problems), Run())
 
     assert kept == ["boards/lock", "boards/earlier", "boards/before"]
