@@ -200,10 +200,10 @@ class Run:
         for problem in first.values():
             SamplerSettings(seed=self.seed).walkers(problem.posed.parameters.n_dim)
         if self.folder is not None:
-            saved = [checkpoint_in(self.folder.checkpoint / at, one, one.posed) for at, one in first.items()]
-            if self._resume and not any(one.exists() for one in saved):
-                law = next(iter(first.values())).posed.posterior.law
-                wanted = f"a saved run under the {law} law"
+            (place, problem), *others = first.items()
+            saved = checkpoint_in(self.folder.checkpoint / place, problem, problem.posed)
+            if self._resume and not (self.folder.has_checkpoint if others else saved.exists()):
+                wanted = "a saved run" if others else f"a saved run under the {problem.posed.posterior.law} law"
                 raise CheckpointError(f"{self.path}: wanted {wanted}, got none to resume (--force runs it anew)")
             self.folder.open(resume=self._resume)
 
