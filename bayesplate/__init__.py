@@ -50,13 +50,14 @@ if TYPE_CHECKING:
     from bayesplate.commands.batch import BatchResult, batch
     from bayesplate.commands.campaign import Campaign
     from bayesplate.commands.campaign_diagnose import CampaignDiagnoseResult
-    from bayesplate.commands.campaign_result import CampaignFitResult
+    from bayesplate.commands.campaign_fit import CampaignFitResult
     from bayesplate.commands.check import CheckResult, check
     from bayesplate.commands.cite import cite
     from bayesplate.commands.compare import CompareResult, compare
     from bayesplate.commands.diagnose import DiagnoseResult, diagnose
-    from bayesplate.commands.fit import FitResult, fit
+    from bayesplate.commands.fit import fit
     from bayesplate.commands.fit_board import FitRequest, fit_board
+    from bayesplate.commands.fitting import FitResult
     from bayesplate.commands.modes import ModesResult, modes
     from bayesplate.commands.new import new
     from bayesplate.commands.pick import PickResult, pick
@@ -146,7 +147,7 @@ _HOMES = {
     "CampaignCheck": "bayesplate.campaign.checking",
     "CampaignDiagnoseResult": "bayesplate.commands.campaign_diagnose",
     "CampaignDiagnosis": "bayesplate.campaign.diagnosis",
-    "CampaignFitResult": "bayesplate.commands.campaign_result",
+    "CampaignFitResult": "bayesplate.commands.campaign_fit",
     "CampaignSummary": "bayesplate.campaign.summary",
     "CheckReport": "bayesplate.results.checking",
     "CheckResult": "bayesplate.commands.check",
@@ -158,7 +159,7 @@ _HOMES = {
     "Diagnosis": "bayesplate.diagnosis.result",
     "Fault": "bayesplate.errors",
     "FitRequest": "bayesplate.commands.fit_board",
-    "FitResult": "bayesplate.commands.fit",
+    "FitResult": "bayesplate.commands.fitting",
     "Grading": "bayesplate.grading.matching",
     "GradingRequest": "bayesplate.grading.matching",
     "InputError": "bayesplate.errors",

@@ -134,11 +134,14 @@ class Command(click.Command):
         return super().parse_args(ctx, args)
 
     def _run(self, as_json: bool, quiet: bool, debug: bool, **told: Any) -> None:
+        from bayesplate.commands.arguments import contradictions
+
         has_progress = "progress" in self._arguments
         with reporting(as_json=as_json, debug=debug):
             about = told[next(iter(self._options))]
             given = {name: part.value(name, told, about) for name, part in self._options.items()}
-            refuse_contradictions(given)
+            for fault in contradictions(given):
+                raise click.UsageError(str(fault))
             with progress_line(shown=has_progress and not quiet and not as_json) as tell:
                 given |= {"progress": tell}
                 answer = self._answer(
@@ -156,14 +159,6 @@ def _printing() -> list[click.Parameter]:
         click.Option(["--quiet"], is_flag=True, help="Print nothing but errors."),
         click.Option(["--debug"], is_flag=True, help="Show the traceback of an error."),
     ]
-
-
-def refuse_contradictions(given: Mapping[str, Any]) -> None:
-    """Refuse options that exclude each other; raises click.UsageError."""
-    if given.get("force") and given.get("resume"):
-        raise click.UsageError("--force starts anew and --resume continues: give one of them.")
-    if given.get("workers") and given.get("dask"):
-        raise click.UsageError("--workers are processes here, --dask others: give one of them.")
 
 
 def command(answer: Callable[..., Answer]) -> Command:

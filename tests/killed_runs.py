@@ -77,12 +77,12 @@ class Moments:
 
         whole = storage.Journal.append
 
-        def append(journal: Any, key: str, row: Any) -> int:
+        def append(journal: Any, key: str, row: Any) -> None:
             if self.reached():
                 line = storage._line(key, row)
                 journal._stream.write(line[: len(line) * self.last // 7 % len(line)])
                 end()
-            return whole(journal, key, row)
+            whole(journal, key, row)
 
         storage.Journal.append = append  # type: ignore[method-assign]
 

@@ -215,7 +215,7 @@ def test_an_output_folder_that_cannot_be_one():
         (["fit", "fiemme-spruce-clamped", "--linar"], "No such option '--linar'. Did you mean '--linear'?"),
         (["fit", "fiemme-spruce-clamped", "--seed", "-1"], "-1 is not in the range x>=0"),
         (["fit", "fiemme-spruce-clamped", "--seed", "one"], "'one' is not a valid integer"),
-        (["fit", "fiemme-spruce-clamped", "--force", "--resume"], "--force starts anew and --resume continues"),
+        (["fit", "fiemme-spruce-clamped", "--force", "--resume"], "force starts anew and resume continues"),
         (["fit", "fiemme-spruce-clamped", "--linear", "--exact"], "--linear and --exact force different laws"),
         (["check", "fiemme-spruce-clamped", "--effects", "none,fluid_loading"], "--effects none declares nothing"),
         (["fit"], "Missing argument 'CARD'"),

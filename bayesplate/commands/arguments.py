@@ -8,7 +8,6 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache, wraps
 from numbers import Integral, Real
-from types import SimpleNamespace
 from typing import Any, ParamSpec, TypeGuard, TypeVar, get_type_hints
 
 import numpy as np
@@ -31,7 +30,9 @@ Rule = Callable[[Mapping[str, Any]], Iterable[Fault]]
 
 
 def checked(*rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """A function whose arguments are read by the `Key` of their annotations.
+    """A function whose arguments are read by the `Key` of their annotations, and which runs in one thread.
+
+    Thousands of small matrices in several threads of linear algebra would only wait for one another.
 
     Parameters
     ----------
@@ -49,9 +50,13 @@ def checked(*rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
         @wraps(function)
         def call(*args: P.args, **kwargs: P.kwargs) -> R:
+            import scipy.linalg  # noqa: F401  (what is not loaded is not limited)
+            from threadpoolctl import threadpool_limits
+
             bound = signature.bind(*args, **kwargs)
-            bound.arguments |= read_arguments(function, bound.arguments, (contradictions, *rules))
-            return function(*bound.args, **bound.kwargs)
+            with threadpool_limits(1, user_api="blas"):
+                bound.arguments |= read_arguments(function, bound.arguments, (contradictions, *rules))
+                return function(*bound.args, **bound.kwargs)
 
         return call
 
@@ -79,10 +84,8 @@ def read_arguments(
 
 
 def annotations_of(function: Callable[..., Any]) -> dict[str, Any]:
-    """Of the parameters alone: that of the answer may name what only a type checker imports."""
-    own = inspect.unwrap(function)
-    stated = {name: one for name, one in own.__annotations__.items() if name != "return"}
-    return get_type_hints(SimpleNamespace(__annotations__=stated), own.__globals__, include_extras=True)
+    """Annotations of the parameters, with what they hold besides types."""
+    return get_type_hints(inspect.unwrap(function), include_extras=True)
 
 
 @cache
@@ -100,11 +103,13 @@ def _place(*inside: object) -> str:
 
 
 def contradictions(given: Mapping[str, Any]) -> Iterator[Fault]:
-    """What is wrong with beginning anew and going on."""
+    """Arguments that exclude each other, or lack one another."""
     if given.get("force") is True and given.get("resume") is True:
         yield Fault("force and resume", "one of them", "both", "force starts anew and resume continues")
     if given.get("resume") is True and given.get("out") is None:
         yield Fault("resume", "the folder of the run that is continued, as out", "no out")
+    if given.get("workers") and given.get("dask"):
+        yield Fault("workers and dask", "one of them", "both", "workers are processes here, dask others")
 
 
 def refused(wanted: str, value: object, remedy: str = "") -> Refusal:

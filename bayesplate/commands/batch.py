@@ -2,53 +2,145 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, get_args
 
-from bayesplate.commands.arguments import checked
-from bayesplate.commands.batch_boards import boards_of
-from bayesplate.commands.batch_options import (
-    Dask,
-    Folders,
-    GradingOptions,
-    NumberOfWorkers,
-    OutOfBatch,
-    Table,
-    Template,
-)
-from bayesplate.commands.batch_pool import dask_cluster, processes
-from bayesplate.commands.batch_run import Run
-from bayesplate.commands.fit_board import FitRequest
+import click
+
+from bayesplate.board.checks import readings_sha256
+from bayesplate.board.named import load_named
+from bayesplate.board.values import Key
+from bayesplate.board.words import quoted
+from bayesplate.commands.arguments import checked, or_none, read_path, read_switch, refused, whole
+from bayesplate.commands.batch_boards import Entry, boards_of
+from bayesplate.commands.batch_grading import grading_request, read_grading
+from bayesplate.commands.fit_board import FitRequest, fit_board, fit_board_into
 from bayesplate.commands.options import (
     ANY_PATH,
     Effects,
     FilePath,
     Force,
+    Joined,
     Law,
     OnProgress,
+    Option,
     Report,
     Resume,
     Robust,
     Seed,
+    path_option,
 )
+from bayesplate.commands.prepare import prepared_card
+from bayesplate.commands.workers import Call, WorkerDied, computed, dask_cluster, processes
 from bayesplate.errors import (
     BatchError,
+    BayesplateError,
     CheckpointError,
+    InputError,
+    NotConvergedError,
+    NotIdentifiableError,
     RunInterrupted,
+    UnwritableError,
 )
 from bayesplate.files import write_text
-from bayesplate.grading.boards import FORMAT, BatchSummary, BoardRow, Doubt, Failure, told_rows
+from bayesplate.grading.boards import (
+    FORMAT,
+    WORDS,
+    BatchSummary,
+    BoardRow,
+    Doubt,
+    Failure,
+    row_of,
+    with_copies_in_doubt,
+)
 from bayesplate.grading.matching import Grading, GradingRequest, grade
-from bayesplate.grading.storage import Journal, require_table_kind, write_table
+from bayesplate.grading.storage import Journal, TableKind, parquet_library, write_table
+from bayesplate.posterior.sampling import Progress
 from bayesplate.results.contract import json_text
-from bayesplate.results.folder import OutputFolder, run_of_its_own
+from bayesplate.results.folder import BOARDS, SUMMARY, OutputFolder, run_of_its_own
+from bayesplate.results.summary import versions
 
 JOURNAL = "boards.jsonl"
 BATCH = "batch.json"
+_REFUSED, _INTERNAL, _DIED = "refused", "internal error", "worker died"
+_OUTCOMES: dict[type[BaseException], str] = {
+    InputError: _REFUSED,
+    NotIdentifiableError: "not identifiable",
+    NotConvergedError: "not converged",
+    WorkerDied: _DIED,
+}
+_AGAIN = (_INTERNAL, _DIED)
+"""What may end otherwise the next time: these boards are tried again when a run is continued."""
+_TOLD_EVERY = 100
+"""Times that progress is told, at most."""
+
+
+def default_batch_folder(source: str | os.PathLike[str]) -> Path:
+    """Where the command line writes a batch unless it is told: results/NAME, of the folder or the table."""
+    path = Path(source).resolve()
+    return Path("results") / ((path.name if os.path.isdir(path) else path.stem) or "batch")
+
+
+def _read_kind(value: object) -> object:
+    if value not in get_args(TableKind):
+        raise refused(" or ".join(map(quoted, get_args(TableKind))), value)
+    return value
+
+
+OutOfBatch = Annotated[
+    FilePath,
+    ANY_PATH,
+    path_option("--out", otherwise=default_batch_folder, help="Output folder (default results/NAME)."),
+]
+Template = Annotated[
+    FilePath | None,
+    Key(or_none(read_path)),
+    Option("--template", metavar="CARD", help="With a table: the card of what is common to its boards."),
+]
+NumberOfWorkers = Annotated[
+    int | None,
+    Key(or_none(whole(1))),
+    Option("--workers", type=click.IntRange(1), help="Processes (default: one for each core)."),
+]
+Dask = Annotated[
+    str | None,
+    Key(or_none(read_path)),
+    Option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster that computes in their place."),
+]
+Folders = Annotated[
+    bool,
+    Key(read_switch),
+    Option("--folders", is_flag=True, help="Write the files of fit for each board too, into boards/NAME."),
+]
+Table = Annotated[
+    TableKind,
+    Key(_read_kind),
+    Option("--table", type=click.Choice(get_args(TableKind)), show_default=True),
+]
+GradingOptions = Annotated[
+    GradingRequest | None,
+    Key(read_grading),
+    Joined(
+        grading_request,
+        match=Option("--match", metavar="PERCENT", help="Boards match within this: 10 (default), or E_x=10,E_y=15."),
+        limit=Option(
+            "--limit",
+            multiple=True,
+            metavar="NAME=LEAST:GREATEST",
+            help="A specification, moduli in GPa, density in kg/m3: E_x=10:14, density=:420.",
+        ),
+        rigidity=Option(
+            "--rigidity", type=float, metavar="N_M", help="D_x in N m for which each board's thickness is wanted."
+        ),
+    ),
+]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -143,31 +235,46 @@ def batch(
     CheckpointError
         If there is nothing to resume, or another run is at work in the folder.
     """
-    require_table_kind(table)
-    boards = boards_of(source, template)
+    if table == "parquet":
+        parquet_library("--table parquet")
+    boards, aside = boards_of(source, template)
     folder = OutputFolder(Path(out))
-    _require_usable(folder, force=force, resume=resume)
-    by = processes(workers or os.cpu_count() or 1) if dask is None else dask_cluster(dask)
-    folder.open(resume=resume)
+    if not resume:
+        folder.require_usable(force=force, resume=False)
+    elif not os.path.isfile(folder.path / JOURNAL):
+        raise CheckpointError(f"{folder.path}: wanted the {JOURNAL} of an earlier run, got none (--force runs it anew)")
     request = FitRequest(seed, None if effects is None else tuple(effects), law, robust)
-    run = Run(boards, request, folder.path, folders, report)
-    journal = Journal(folder.path / JOURNAL)
-    try:
-        with _interruptions_told():
-            places = run.fitted(by, journal, progress)
-        aside, versions = tuple(boards.aside), run.versions
-        rows = told_rows(journal.rows(places), boards.place)
-        del boards, run  # where the cards of very many boards stand is not needed any more
-        written = write_table(folder.path, table, rows)
-        graded = grade(rows, grading or GradingRequest())
-        summary = _summary(rows, seed, versions, aside)
-        journal.keep(dict.fromkeys(places))
-    finally:
-        journal.close()
+    with processes(workers or os.cpu_count() or 1) if dask is None else dask_cluster(dask) as free:
+        folder.open(resume=resume)
+        journal = Journal(folder.path / JOURNAL)
+        try:
+            keys = _Run(boards, request, folder.path, folders, report, journal).fitted(free, progress)
+        except KeyboardInterrupt:
+            raise RunInterrupted("interrupted; --resume goes on with the boards that are left") from None
+        finally:
+            journal.close()
+    placed = [_at_its_place(journal.rows[key], board.place) for key, board in zip(keys, boards, strict=True)]
+    rows = with_copies_in_doubt(placed)
+    written = write_table(folder.path, table, rows)
+    graded = grade(rows, grading or GradingRequest())
+    summary = _summary(rows, seed, aside)
+    journal.keep(dict.fromkeys(keys))
     write_text(folder.path / BATCH, json_text(summary))
     _write_grading(folder.path, graded, summary, folders=folders and report, report=report)
     folder.close()
     return BatchResult(folder.path, written, summary, graded)
+
+
+def _at_its_place(row: BoardRow, place: str) -> BoardRow:
+    """The row of a board; its message says where the board stands, if its own file does not."""
+    return row if row.is_fitted or not place else replace(row, message=f"{place} -> {row.message}")
+
+
+def _summary(rows: Sequence[BoardRow], seed: int, aside: tuple[str, ...]) -> BatchSummary:
+    failed = tuple(Failure(row.name, row.outcome, row.message) for row in rows if not row.is_fitted)
+    doubts = tuple(Doubt(row.name, row.doubt) for row in rows if row.doubt)
+    n_fitted = len(rows) - len(failed)
+    return BatchSummary(FORMAT, seed, versions(), len(rows), n_fitted, len(failed), failed, doubts, aside)
 
 
 def _write_grading(folder: Path, graded: Grading, summary: BatchSummary, *, folders: bool, report: bool) -> None:
@@ -180,28 +287,98 @@ def _write_grading(folder: Path, graded: Grading, summary: BatchSummary, *, fold
         write_grading_page(folder, graded, summary, has_pages=folders)
 
 
-def _require_usable(folder: OutputFolder, *, force: bool, resume: bool) -> None:
-    if not resume:
-        folder.require_usable(force=force, resume=False)
-    elif not os.path.isfile(folder.path / JOURNAL):
-        raise CheckpointError(f"{folder.path}: wanted the {JOURNAL} of an earlier run, got none (--force runs it anew)")
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """The boards of a batch, and what is asked of each."""
+
+    boards: Sequence[Entry]
+    request: FitRequest
+    folder: Path
+    folders: bool
+    report: bool
+    journal: Journal
+    versions: Mapping[str, str] = field(default_factory=versions)
+
+    def fitted(self, free: list[Executor], progress: Callable[[Progress], None] | None) -> list[str]:
+        """Fit the boards that the journal does not hold; the keys of the rows of all, in the order of their names."""
+        n = len(self.boards)
+        keys = [""] * n
+        told = Counter[bool]()
+
+        def done(at: int, key: str, row: BoardRow) -> None:
+            if self.journal.rows.get(key) != row:
+                self.journal.append(key, row)
+            keys[at] = key
+            told[row.is_fitted] += 1
+            if progress is not None and (told.total() % max(1, n // _TOLD_EVERY) == 0 or told.total() == n):
+                failed = f", {told[False]} not fitted" if told[False] else ""
+                stage = f"{told.total()} of {n} boards{failed}"
+                progress(Progress(0, 0, stage=stage, done=told.total() / n))
+
+        def calls() -> Iterator[tuple[tuple[int, str, BoardRow], Call]]:
+            names = Counter(board.name.casefold() for board in self.boards)
+            for at, board in sorted(enumerate(self.boards), key=lambda each: each[1].alike):
+                name = board.name
+                if names[name.casefold()] > 1:  # nobody could tell whose row or folder it is
+                    refusal = BoardRow(name, _REFUSED, f"wanted a name of its own, got {name} more than once")
+                    done(at, _hash(_REFUSED, refusal.message), refusal)
+                    continue
+                try:
+                    key, row, call = self._posed(board)
+                except InputError as error:
+                    refusal = BoardRow(name, _REFUSED, _one_line(error))
+                    done(at, _hash(_REFUSED, name, refusal.message), refusal)
+                    continue
+                known = self.journal.rows.get(key)
+                if known is not None and self._is_whole(known):
+                    done(at, key, known)
+                else:
+                    yield (at, key, row), call
+
+        for (at, key, row), future in computed(free, calls()):
+            done(at, key, _answered(row, future))
+        return keys
+
+    def _is_whole(self, row: BoardRow) -> bool:
+        """Whether a board that an earlier run left need not be computed again."""
+        own = self.folder / BOARDS / row.name / SUMMARY
+        return row.outcome not in _AGAIN and (not self.folders or not row.is_fitted or own.is_file())
+
+    def _posed(self, board: Entry) -> tuple[str, BoardRow, Call]:
+        """The key of a board's row, what the row says even if the fit fails, and the fit; raises InputError."""
+        card = board.card()
+        named = load_named(card)
+        if named.faults or named.prior is None:
+            prepared_card(card, named, self.request.effects)  # which raises with all other faults as well
+        assert named.prior is not None
+        seed = int(_hash(self.request.seed, card.sha256)[:8], 16)
+        request = replace(self.request, seed=seed, tables=dict(sorted(named.tables.items())))
+        key = _hash(FORMAT, WORDS, self.versions, card.name, card.sha256, named.prior.to_toml(), repr(request))
+        row = BoardRow(board.name, "", card_sha256=card.sha256, seed=seed, readings_sha256=readings_sha256(card))
+        arguments = (card, named.prior, request)
+        if self.folders:
+            folder = self.folder.resolve() / BOARDS / card.name
+            return key, row, (fit_board_into, (folder, self.report, *arguments))
+        return key, row, (fit_board, arguments)
 
 
-@contextmanager
-def _interruptions_told() -> Iterator[None]:
-    try:
-        yield
-    except KeyboardInterrupt:
-        raise RunInterrupted("interrupted; --resume goes on with the boards that are left") from None
+def _answered(row: BoardRow, future: Future[Any]) -> BoardRow:
+    """The row of a board that was computed, from what was known of it before."""
+    error = future.exception()
+    if error is None:
+        return replace(row_of(future.result()), seed=row.seed, readings_sha256=row.readings_sha256)
+    if isinstance(error, UnwritableError) or not isinstance(error, Exception):
+        raise error  # a full disk is no board's fault
+    outcome = next((word for kind, word in _OUTCOMES.items() if isinstance(error, kind)), _INTERNAL)
+    if type(error).__name__ == "KilledWorker":  # Dask's word for it
+        outcome = _DIED
+    kind = "" if isinstance(error, BayesplateError | WorkerDied) else f"{type(error).__name__}: "
+    return replace(row, outcome=outcome, message=kind + _one_line(error), readings_sha256="")
 
 
-def _summary(rows: Iterable[BoardRow], seed: int, versions: Mapping[str, str], aside: tuple[str, ...]) -> BatchSummary:
-    failures, doubts, n, n_fitted = [], [], 0, 0
-    for row in rows:
-        n += 1
-        n_fitted += row.is_fitted
-        if not row.is_fitted:
-            failures.append(Failure(row.name, row.outcome, row.message))
-        if row.doubt:
-            doubts.append(Doubt(row.name, row.doubt))
-    return BatchSummary(FORMAT, seed, versions, n, n_fitted, n - n_fitted, tuple(failures), tuple(doubts), aside)
+def _one_line(error: BaseException) -> str:
+    return "; ".join(str(error).splitlines())
+
+
+def _hash(*parts: object) -> str:
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from bayesplate.board.board import Board
 from bayesplate.board.card_file import CardFile
@@ -24,152 +26,93 @@ _OF_OTHER_CARDS = {"boards", "coefficients", "E_x", "D_x", "noise_percent"}
 """Keys that a campaign, a coefficient table and a prior card have and a board card has not."""
 
 
-class Source(Protocol):
-    """Where boards come from; little is kept of each, for there may be very many."""
+@dataclass(frozen=True)
+class Entry:
+    """A board of a batch that is read when its turn comes, for there may be very many.
 
-    names: Sequence[str]
-    """Of the boards, in their order, before it is known whether each may be one."""
-    alike: Sequence[tuple[str, ...]]
-    """What boards have in common that share their matrices: they are fitted one after another."""
-    aside: Sequence[str]
-    """Files that were left aside, because they are cards of another kind."""
-
-    def card(self, at: int) -> Board:
-        """The card of the board at a place among the names; raises InputError with all its faults."""
-
-    def place(self, at: int) -> str:
-        """Where that board stands, as messages show it; empty where its own file says so."""
-
-
-class Folder:
-    """The board cards of a folder; priors, campaigns, coefficient tables and what `pick` writes are left aside.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or there is no board card in it.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._path, self._inside = path, os.path.join(os.path.realpath(path), "")
-        self._strange: dict[int, str] = {}  # files whose name is not the board's
-        names: list[str] = []
-        alike: list[tuple[str, ...]] = []
-        aside: list[str] = []
-        kept: dict[tuple[str, ...], tuple[str, ...]] = {}
-        for name in _cards_in(path):
-            content = self._content_of(name) if self._is_inside(name) else {}
-            is_other = not {"plate", "setup"} & content.keys() and _OF_OTHER_CARDS & content.keys()
-            if is_other or content.keys() == {"setup"}:
-                aside.append(plain(name))
-                continue
-            own = plain(name.removesuffix(".toml"))
-            if f"{own}.toml" != name:
-                self._strange[len(names)] = name
-            names.append(own)
-            shared = _alike(content)
-            alike.append(kept.setdefault(shared, shared))
-        if not names:
-            raise InputError(Fault(plain(str(path)), "a folder with board cards (NAME.toml)", "none in it"))
-        self.names: Sequence[str] = names
-        self.alike: Sequence[tuple[str, ...]] = alike
-        self.aside: Sequence[str] = aside
-
-    def card(self, at: int) -> Board:
-        """The card of a board; raises InputError with all its faults, or if it is a link that leads elsewhere."""
-        file = self._strange.get(at, f"{self.names[at]}.toml")
-        if not self._is_inside(file):
-            wanted, remedy = "a card in the folder of the batch", "copy the card"
-            raise InputError(Fault(plain(file), wanted, "a link that leads out of it", remedy))
-        data = read_file(os.path.join(self._path, file))  # no Path: Python keeps every name that stood in one
-        return Board.from_card(CardFile.of(data, file, self._path))
-
-    def place(self, at: int) -> str:
-        """Nothing: the faults of a card name its file."""
-        return ""
-
-    def _is_inside(self, file: str) -> bool:
-        return os.path.realpath(os.path.join(self._path, file)).startswith(self._inside)
-
-    def _content_of(self, file: str) -> Mapping[str, Any]:
-        """What a card's file holds; nothing where it cannot be read, which is told when the board's turn comes."""
-        try:
-            return read_table(read_file(os.path.join(self._path, file)), plain(file))
-        except InputError:
-            return {}
-
-
-class Table:
-    """The rows of a table, in CSV or Parquet, with a card as the template of what is common.
-
-    Parameters
+    Attributes
     ----------
-    template : str or path
-        A board card.
-
-    Raises
-    ------
-    InputError
-        If the table or the template cannot be read, a column is no key of a card, or there is no row.
+    card : callable
+        Reads it; raises InputError with all its faults.
+    place : str
+        Where it stands, as messages show it; empty where its own file says so.
+    alike : tuple of str
+        What it has in common with boards that share its matrices: they are fitted one after another.
     """
 
-    def __init__(self, path: Path, template: str | Path) -> None:
-        self._file = plain(path.name)
-        header, self._rows = _read_parquet(path) if _ending(path) == ".parquet" else _read_csv(path)
-        self._columns = Columns(template, header, self._file)
-        filled = [i for i, row in enumerate(self._rows, start=1) if not all(map(is_empty, row))]
-        if not filled:
-            raise InputError(Fault(self._file, "a row for each board", "no row"))
-        named = sorted((plain(self._columns.name_of(self._rows[i - 1])) or f"row-{i}", i) for i in filled)
-        self.names: Sequence[str] = [name for name, _ in named]
-        self.alike: Sequence[tuple[str, ...]] = [()] * len(named)
-        self.aside: Sequence[str] = ()
-        self._numbers = [number for _, number in named]
-
-    def card(self, at: int) -> Board:
-        """The card of a row; raises InputError with all its faults."""
-        return self._columns.board(self._rows[self._numbers[at] - 1])
-
-    def place(self, at: int) -> str:
-        """The table and the number of the row, the first below the header being 1."""
-        return f"{self._file} row {self._numbers[at]}"
+    name: str
+    card: Callable[[], Board]
+    place: str = ""
+    alike: tuple[str, ...] = ()
 
 
-def boards_of(source: str | os.PathLike[str], template: str | os.PathLike[str] | None) -> Source:
-    """The boards of a folder or of a table.
+def boards_of(
+    source: str | os.PathLike[str], template: str | os.PathLike[str] | None
+) -> tuple[list[Entry], tuple[str, ...]]:
+    """The boards of a folder or of a table by name, and the files of the folder that are cards of another kind.
 
     Raises
     ------
     InputError
-        If there are none, or a template is given with a folder or lacks with a table.
+        If there are none, the table cannot be read, or a template is given with a folder or lacks with a table.
     """
     path = Path(source)
     if os.path.isdir(path):
         if template is not None:
             raise InputError(Fault("--template", "a table of boards beside it", "a folder of cards"))
-        return Folder(path)
+        return _in_folder(path)
     if not os.path.exists(path):
         got, looked = "nothing there", f"looked in {plain(str(path.absolute().parent))}"
         raise InputError(Fault(plain(str(path)), _WANTED, got, looked))
-    if _ending(path) not in (".csv", ".parquet"):
-        remedy = "save the table as CSV" if _ending(path) in _OF_SHEETS else ""
+    ending = path.suffix.lower()
+    if ending not in (".csv", ".parquet"):
+        remedy = "save the table as CSV" if ending in _OF_SHEETS else ""
         raise InputError(Fault(plain(str(path)), _WANTED, "another file", remedy))
     if template is None:
         remedy = "a board card with what all boards have in common"
         raise InputError(Fault("--template", "a card for the table", "none", remedy))
-    return Table(path, os.fspath(template))
+    header, rows = (_read_csv if ending == ".csv" else _read_parquet)(path)
+    return _of_rows(plain(path.name), Columns(os.fspath(template), header, plain(path.name)), rows), ()
 
 
-def _ending(path: Path) -> str:
-    return path.suffix.lower()
-
-
-def _cards_in(folder: Path) -> list[str]:
-    """Names of the files that may be cards, in their order."""
+def _in_folder(folder: Path) -> tuple[list[Entry], tuple[str, ...]]:
+    """The board cards of a folder; priors, campaigns, coefficient tables and what `pick` writes are left aside."""
     try:
-        return sorted(name for name in os.listdir(folder) if name.endswith(".toml"))
+        files = sorted(name for name in os.listdir(folder) if name.endswith(".toml"))
     except OSError as error:
         raise InputError(Fault(plain(str(folder)), "a readable folder", error.strerror or str(error))) from None
+    entries, aside = [], []
+    for file in files:
+        content = _content_of(folder, file)
+        is_other = not {"plate", "setup"} & content.keys() and _OF_OTHER_CARDS & content.keys()
+        if is_other or content.keys() == {"setup"}:
+            aside.append(plain(file))
+        else:
+            name = plain(file.removesuffix(".toml"))
+            entries.append(Entry(name, partial(_card_in, folder, file), alike=_alike(content)))
+    if not entries:
+        raise InputError(Fault(plain(str(folder)), "a folder with board cards (NAME.toml)", "none in it"))
+    return entries, tuple(aside)
+
+
+def _card_in(folder: Path, file: str) -> Board:
+    """A card of the folder; raises InputError with all its faults, or if it is a link that leads elsewhere."""
+    if not _is_inside(folder, file):
+        wanted, remedy = "a card in the folder of the batch", "copy the card"
+        raise InputError(Fault(plain(file), wanted, "a link that leads out of it", remedy))
+    return Board.from_card(CardFile.of(read_file(os.path.join(folder, file)), file, folder))
+
+
+def _content_of(folder: Path, file: str) -> Mapping[str, Any]:
+    """What a card holds; nothing where it cannot be read, which is told when the board's turn comes."""
+    try:
+        return read_table(read_file(os.path.join(folder, file)), plain(file)) if _is_inside(folder, file) else {}
+    except InputError:
+        return {}
+
+
+def _is_inside(folder: Path, file: str) -> bool:
+    return os.path.realpath(os.path.join(folder, file)).startswith(os.path.join(os.path.realpath(folder), ""))
 
 
 def _alike(content: Mapping[str, Any]) -> tuple[str, ...]:
@@ -180,9 +123,22 @@ def _alike(content: Mapping[str, Any]) -> tuple[str, ...]:
     means = [float(side) for side in told if isinstance(side, int | float) and 0 < side <= _LONGEST]
     listed = setups if isinstance(setups, list) else [setups]
     edges = [repr(one.get("edges")) for one in listed if isinstance(one, dict)]
-    if len(means) == 2:
-        edges.append(f"{means[0] / means[1]:.3f}")
-    return tuple(edges)
+    return (*edges, f"{means[0] / means[1]:.3f}") if len(means) == 2 else tuple(edges)
+
+
+def _of_rows(file: str, columns: Columns, rows: Sequence[Sequence[Cell]]) -> list[Entry]:
+    """The boards of a table; its rows are counted from the first below the header, lines without a word too."""
+
+    def entries() -> Iterator[Entry]:
+        for i, row in enumerate(rows, start=1):
+            if not all(map(is_empty, row)):
+                name = plain(columns.name_of(row)) or f"row-{i}"
+                yield Entry(name, partial(columns.board, row), f"{file} row {i}")
+
+    found = sorted(entries(), key=lambda entry: entry.name)
+    if not found:
+        raise InputError(Fault(file, "a row for each board", "no row"))
+    return found
 
 
 def _read_csv(path: Path) -> tuple[Sequence[str], Sequence[Sequence[Cell]]]:
@@ -204,10 +160,6 @@ def _read_parquet(path: Path) -> tuple[Sequence[str], Sequence[Sequence[Cell]]]:
         found = arrow.parquet.read_table(path)
     except (OSError, arrow.ArrowException) as error:
         raise InputError(Fault(file, "a Parquet table", plain(str(error)))) from None
-    columns = [_cells(column.to_pylist()) for column in found.columns]
-    return list(found.column_names), [list(row) for row in zip(*columns, strict=True)]
-
-
-def _cells(values: Sequence[Any]) -> list[Cell]:
-    """A column of Parquet: numbers and texts as they are, nothing where there is nothing or not-a-number."""
-    return [None if value is None or value != value else value for value in values]
+    rows = zip(*(column.to_pylist() for column in found.columns), strict=True)
+    # a number that is not one, which some programs write for an empty cell, is none
+    return list(found.column_names), [[None if cell != cell else cell for cell in row] for row in rows]

@@ -1,4 +1,4 @@
-"""What boards are graded by, from the words of the command line, in the units of people."""
+"""What boards are graded by, from the words of the command line, in the units of people, or from Python."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from bayesplate.board.values import Complaint, Refusal
 from bayesplate.board.words import did_you_mean, quoted
 from bayesplate.commands.arguments import is_positive
 from bayesplate.errors import Fault, InputError, plain
-from bayesplate.grading.figures import FIGURES, MOST
+from bayesplate.grading.figures import FIGURES
 from bayesplate.grading.matching import GradingRequest
+
+Limit = tuple[float | None, float | None]
 
 _RANGE = "positive numbers, the least before the greatest, at least one of them"
 _MATCHED = tuple(name for name in FIGURES if name[0] in "EG" or name == "density")
@@ -21,91 +23,58 @@ _PERCENTS = f"positive per cents up to {_MOST_PERCENT:g}, as 10 or E_x=10,E_y=15
 
 
 def grading_request(match: str | None, limit: Sequence[str], rigidity: float | None) -> GradingRequest:
-    """Read what boards are graded by.
-
-    Parameters
-    ----------
-    match : str or None
-        Tolerances in per cent: "10", or "E_x=10,E_y=15,G_xy=15".
-    limit : sequence of str
-        "E_x=10:14", either end may be left away; in the unit that the tables show.
-    rigidity : float or None
-        D_x, N m.
-
-    Raises
-    ------
-    InputError
-        With everything that cannot be read.
-    """
+    """A request from "10" or "E_x=10,E_y=15" (per cent), "E_x=10:14" (units of the tables) and D_x (N m)."""
     faults: list[Fault] = []
-    percent = _matched(match, faults)
-    found: dict[str, tuple[float | None, float | None]] = {}
-    for one in limit:
-        name, _, ends = one.partition("=")
-        key = name.strip()
-        if key in found:
-            faults.append(
-                Fault(f"--limit {plain(one)}", "each quantity once", f"{key} again", "both ends: LEAST:GREATEST")
-            )
-            continue
-        read = _limit(key, ends, one, faults)
-        if read is not None:
-            found[key] = read
-    if rigidity is not None and not (math.isfinite(rigidity) and rigidity > 0.0):
+    percents = {} if match is None else _percents(match, faults)
+    limits: dict[str, Limit] = {}
+    for text in limit:
+        name, _, ends = text.partition("=")
+        fault = _limit_fault(name.strip(), ends, limits)
+        if fault:
+            faults.append(Fault(f"--limit {plain(text)}", *fault))
+        else:
+            factor = FIGURES[name.strip()].per_unit
+            low, high = (_number(end) for end in ends.split(":", 1))
+            limits[name.strip()] = (low and low * factor, high and high * factor)
+    if rigidity is not None and not is_positive(rigidity):
         faults.append(Fault("--rigidity", "a positive number of N m", f"{rigidity:g}"))
     if faults:
         raise InputError(faults)
-    request = GradingRequest(limits=found, rigidity=rigidity)
-    return request if percent is None else GradingRequest(percent, found, rigidity)
+    asked = GradingRequest(limits=limits, rigidity=rigidity)
+    return asked if match is None else GradingRequest(percents, limits, rigidity)
 
 
-def _matched(match: str | None, faults: list[Fault]) -> dict[str, float] | None:
-    if match is None:
-        return None
+def _percents(match: str, faults: list[Fault]) -> dict[str, float]:
+    """Tolerances by name; one number alone is that of each modulus."""
     parts = [part.strip() for part in match.split(",") if part.strip()]
     if len(parts) == 1 and "=" not in parts[0]:
-        percent = _percent(parts[0])
-        if percent is None:
+        if not _is_percent(_number(parts[0])):
             faults.append(Fault("--match", _PERCENTS, quoted(parts[0])))
-        return None if percent is None else dict.fromkeys(MODULI, percent)
+        return dict.fromkeys(MODULI, _number(parts[0]) or 0.0)
     found: dict[str, float] = {}
     for part in parts:
         name, _, value = (one.strip() for one in part.partition("="))
-        percent = _percent(value)
-        if name not in _MATCHED or percent is None:
+        if name not in _MATCHED or not _is_percent(_number(value)):
             remedy = did_you_mean(name, _MATCHED) if name not in _MATCHED else ""
             faults.append(Fault("--match", _PERCENTS, quoted(part), remedy))
         elif name in found:
             faults.append(Fault("--match", "each quantity once", f"{name} again"))
-        else:
-            found[name] = percent
+        found[name] = _number(value) or 0.0
     return found
 
 
-def _percent(text: str) -> float | None:
-    percent = _number(text)
-    return percent if percent is not None and 0.0 < percent <= _MOST_PERCENT else None
-
-
-def _limit(name: str, ends: str, told: str, faults: list[Fault]) -> tuple[float | None, float | None] | None:
-    """The ends of one limit, SI."""
-    place = f"--limit {plain(told)}"
+def _limit_fault(name: str, ends: str, earlier: Mapping[str, Limit]) -> tuple[str, ...]:
+    """What is wrong with a limit: what was wanted, what was got, and what to do."""
     if name not in FIGURES:
-        faults.append(Fault(place, f"one of {', '.join(FIGURES)}", quoted(name), did_you_mean(name, FIGURES)))
-        return None
-    low_text, colon, high_text = ends.partition(":")
-    low, high = _number(low_text), _number(high_text)
-    is_read = all(one is not None or not text.strip() for one, text in ((low, low_text), (high, high_text)))
-    if not colon or not is_read or (low is None and high is None):
-        faults.append(
-            Fault(place, f"LEAST:GREATEST in {FIGURES[name].unit}, one of them may be left away", quoted(ends))
-        )
-        return None
-    if not _is_range((low, high)):
-        faults.append(Fault(place, _RANGE, quoted(ends)))
-        return None
-    factor = FIGURES[name].per_unit
-    return (None if low is None else low * factor, None if high is None else high * factor)
+        return f"one of {', '.join(FIGURES)}", quoted(name), did_you_mean(name, FIGURES)
+    if name in earlier:
+        return "each quantity once", f"{name} again", "both ends: LEAST:GREATEST"
+    texts = ends.split(":", 1)
+    numbers = [_number(text) for text in texts]
+    unread = any(text.strip() and number is None for text, number in zip(texts, numbers, strict=True))
+    if len(texts) < 2 or unread or not any(text.strip() for text in texts):
+        return f"LEAST:GREATEST in {FIGURES[name].unit}, one of them may be left away", quoted(ends)
+    return () if _is_range((numbers[0], numbers[1])) else (_RANGE, quoted(ends))
 
 
 def _number(text: str) -> float | None:
@@ -122,8 +91,7 @@ def read_grading(value: object) -> object:
         return None
     if not isinstance(value, GradingRequest):
         raise Refusal(Complaint("a GradingRequest or None", type(value).__name__))
-    wrong = [*_complaints(value)]
-    if wrong:
+    if wrong := [*_complaints(value)]:
         raise Refusal(*wrong)
     return value
 
@@ -137,8 +105,9 @@ def _complaints(value: GradingRequest) -> Iterator[Complaint]:
     for key, percent in value.match_percent.items():
         if key not in _MATCHED:
             yield Complaint(f"names of {', '.join(_MATCHED)}", quoted(str(key)), inside=("match_percent",))
-        elif not is_positive(percent):
-            yield Complaint("a positive number of per cent", repr(percent), inside=("match_percent", key))
+        elif not _is_percent(percent):
+            wanted = f"a positive number of per cent up to {_MOST_PERCENT:g}"
+            yield Complaint(wanted, repr(percent), inside=("match_percent", key))
     limits: Mapping[str, Any] = value.limits
     for key, limit in limits.items():
         if key not in FIGURES:
@@ -148,10 +117,12 @@ def _complaints(value: GradingRequest) -> Iterator[Complaint]:
             yield Complaint(wanted, repr(limit), inside=("limits", key))
         elif not _is_range(limit):
             yield Complaint(_RANGE, repr(limit), inside=("limits", key))
-    if len(value.limits) > MOST:
-        yield Complaint(f"at most {MOST}", str(len(value.limits)), inside=("limits",))
     if value.rigidity is not None and not is_positive(value.rigidity):
         yield Complaint("a positive number of N m, or None", repr(value.rigidity), inside=("rigidity",))
+
+
+def _is_percent(value: object) -> bool:
+    return is_positive(value) and value <= _MOST_PERCENT
 
 
 def _is_range(limit: tuple[Any, Any]) -> bool:

@@ -16,8 +16,8 @@ from bayesplate.campaign.shared import Shared, shared_by
 from bayesplate.commands.arguments import checked
 from bayesplate.commands.options import CARD, Effects, Law, Robust
 from bayesplate.commands.prepare import Card, Prepared, prepare
-from bayesplate.commands.problem import Problem, as_problem
-from bayesplate.errors import Fault, InputError, NotIdentifiableError
+from bayesplate.commands.problem import Problem, as_problem, pose_all
+from bayesplate.errors import Fault, InputError
 from bayesplate.frequencies.laws import LawName
 
 CampaignPath = str | os.PathLike[str]
@@ -94,14 +94,7 @@ class Campaign:
         NotIdentifiableError
             With every board that leaves a constant open.
         """
-        told = []
-        for problem in self.problems:
-            try:
-                _ = problem.posed
-            except NotIdentifiableError as error:
-                told.append(f"{problem.board.name}: {error}")
-        if told:
-            raise NotIdentifiableError("\n".join(told))
+        pose_all(self.problems)
 
     def __repr__(self) -> str:
         shared = ", ".join(one.name for one in self.shared) or "nothing shared"
@@ -115,15 +108,9 @@ def problem_or_campaign(
     law: LawName | None = None,
     robust: bool = False,
     setup: str | os.PathLike[str] | None = None,
+    may_lack_frequencies: bool = False,
 ) -> Problem | Campaign:
-    """What a command was given, as a problem or as a campaign.
-
-    Parameters
-    ----------
-    given : Problem, str, path, Board or Campaign
-    effects, law, robust, setup
-        As of `Problem.from_card`, setup for a board only; of a problem or a campaign that is there already they may
-        not be given.
+    """What a command was given, as a problem or as a campaign; the options are those of `as_problem`.
 
     Raises
     ------
@@ -140,7 +127,9 @@ def problem_or_campaign(
         return given
     if is_card and isinstance(given, str | os.PathLike):
         return Campaign.from_card(given, effects, law, robust)
-    return as_problem(given, effects=effects, law=law, robust=robust, setup=setup)
+    return as_problem(
+        given, effects=effects, law=law, robust=robust, setup=setup, may_lack_frequencies=may_lack_frequencies
+    )
 
 
 def _prepared(card: CampaignCard, effects: Sequence[str] | None) -> tuple[list[Prepared], PriorCard | None]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -28,30 +27,27 @@ from bayesplate.campaign.shared import shared_by
 from bayesplate.campaign.summary import CampaignSummary
 from bayesplate.commands.campaign import Campaign
 from bayesplate.commands.campaign_fit import (
+    SHARED,
+    CampaignFitResult,
     boards_of,
+    campaign_run,
     fit_boards,
     fitted_together,
-    open_folder,
     summed_up,
-    telling_failure,
 )
-from bayesplate.commands.campaign_result import CampaignFitResult, write_campaign_pages
-from bayesplate.commands.fit import write_fit
-from bayesplate.commands.fitting import Fitted
+from bayesplate.commands.fitting import FIT, FitResult, Run, Stages
 from bayesplate.commands.shown import show_diagnosis
-from bayesplate.commands.stages import Stages
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.forms import forms
 from bayesplate.effects import EFFECTS
 from bayesplate.errors import InputError
-from bayesplate.files import make_folder, write_text
-from bayesplate.posterior.sampling import Progress
+from bayesplate.files import write_text
 from bayesplate.report.plots import CampaignPlots
 from bayesplate.results.contract import as_json, json_text
-from bayesplate.results.folder import BEFORE, DIAGNOSIS, OutputFolder
+from bayesplate.results.folder import BEFORE, DIAGNOSIS
 
-_FIT, _SEARCH, _SHARED = 3.0, 2.0, 1.0
-"""How long the parts take beside each other."""
+_SEARCH = 2.0
+"""How long the search takes beside a fit."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,7 +59,7 @@ class CampaignDiagnoseResult:
     folder : Path or None
         Where its files are; None if none were asked for.
     diagnosis : CampaignDiagnosis
-    before : dict of Fitted
+    before : dict of FitResult
         By board: without what is shared.
     after : CampaignFitResult
         With it; boards side by side where nothing is shared.
@@ -71,7 +67,7 @@ class CampaignDiagnoseResult:
 
     folder: Path | None
     diagnosis: CampaignDiagnosis
-    before: Mapping[str, Fitted]
+    before: Mapping[str, FitResult]
     after: CampaignFitResult
 
     @property
@@ -104,72 +100,51 @@ class CampaignDiagnoseResult:
         return f"<CampaignDiagnoseResult of {one.name}: {one.verdict}, {told} shared, {claim}>"
 
 
-def diagnose_campaign(
-    campaign: Campaign,
-    *,
-    out: str | os.PathLike[str] | None = None,
-    report: bool = True,
-    seed: int = 1,
-    force: bool = False,
-    resume: bool = False,
-    progress: Callable[[Progress], None] | None = None,
-) -> CampaignDiagnoseResult:
-    """Diagnose a campaign; `bayesplate.diagnose` says what the arguments mean and what is raised.
+def diagnose_campaign(campaign: Campaign, run: Run, *, report: bool) -> CampaignDiagnoseResult:
+    """Diagnose a campaign; `bayesplate.diagnose` says what is raised.
 
     Where the card names what is shared, that is judged: each board by what the others teach it, against the same boards
     without it. Otherwise every effect that boards may have alike is tried, and the one that stands out is judged so.
     """
-    folder = None if out is None else OutputFolder(Path(out))
-    if folder is not None:
-        folder.require_usable(force=force, resume=resume)
     alone = _without_shared(campaign)
-    n = len(campaign.problems)
-    stages = Stages(progress, n * (2.0 * _FIT + (0.0 if campaign.shared else _SEARCH)) + _SHARED)
-    alone.pose()
     campaign.pose()
-    if folder is not None:
-        open_folder(folder, resume=resume)
-    with telling_failure(folder, campaign, seed):
-        found = _diagnosed(campaign, alone, None if folder is None else folder.checkpoint, seed, stages)
-    if folder is not None:
-        found = replace(found, folder=folder.path)
+    of_a_board = 2.0 * FIT + (0.0 if campaign.shared else _SEARCH)
+    with campaign_run(alone, run, len(campaign.problems) * of_a_board + SHARED, f"{BEFORE}/"):
+        found = replace(_diagnosed(campaign, alone, run), folder=run.path)
+    if run.folder is not None:
+        path = run.folder.path
         for name, one in found.before.items():
-            make_folder(folder.path / BEFORE / name)
-            write_fit(folder.path / BEFORE / name, one)
-        found.after.write(folder.path)
-        write_text(folder.path / DIAGNOSIS, json_text(found.diagnosis))
-        if report:
-            write_campaign_pages(folder.path, found.after, found.diagnosis)
-        folder.close()
+            one.write(path / BEFORE / name)
+        write_text(path / DIAGNOSIS, json_text(found.diagnosis))
+        found.after.write(path, report=report, diagnosis=found.diagnosis)
+        run.folder.close()
     return found
 
 
-def _diagnosed(
-    campaign: Campaign, alone: Campaign, checkpoints: Path | None, seed: int, stages: Stages
-) -> CampaignDiagnoseResult:
+def _diagnosed(campaign: Campaign, alone: Campaign, run: Run) -> CampaignDiagnoseResult:
     """The diagnosis of a campaign whose boards can be fitted, nothing written but checkpoints."""
     could_share = () if campaign.shared else shareable(campaign)
-    before = fit_boards(alone, seed, None if checkpoints is None else checkpoints / BEFORE, stages)
+    before = fit_boards(alone, run, f"{BEFORE}/")
     if campaign.shared:
         verdict, reason = "named", "the card names what the boards share"
         effects = tuple(dict.fromkeys(one.effect for one in campaign.shared))
         searched: tuple[Explanation, ...] = ()
         with_shared = campaign
     else:
-        searched = _searched(before, could_share, stages)
+        searched = _searched(before, could_share, run.stages)
         verdict, effects, reason = named(searched) if searched else ("none needed", (), "no effect could be shared")
         with_shared = _sharing(campaign, searched[0].effects if effects else ())
     if with_shared.shared:
-        after = fitted_together(with_shared, seed, checkpoints, stages)
+        after = fitted_together(with_shared, run)
     else:
-        after = summed_up(with_shared, before, before, None, (), seed)
+        after = summed_up(with_shared, before, before, None, (), run.seed)
     taught: Mapping[str, TaughtBoard] = {}
     claim: SharedClaim | None = None
     if after.learnt is not None:
         members = {name: Member(one.inference, one.draws, ()) for name, one in before.items()}
-        taught = taught_boards(after.learnt, members, seed)
+        taught = taught_boards(after.learnt, members, run.seed)
         claim = judge(taught)
-    diagnosis = _diagnosis(campaign, verdict, effects, reason, searched, taught, claim, before, after, seed)
+    diagnosis = _diagnosis(campaign, verdict, effects, reason, searched, taught, claim, before, after, run.seed)
     return CampaignDiagnoseResult(None, diagnosis, before, after)
 
 
@@ -222,7 +197,7 @@ def _has_one_size(campaign: Campaign, effects: Sequence[str]) -> bool:
 
 
 def _searched(
-    before: Mapping[str, Fitted], effects: Sequence[tuple[str, ...]], stages: Stages
+    before: Mapping[str, FitResult], effects: Sequence[tuple[str, ...]], stages: Stages
 ) -> tuple[Explanation, ...]:
     """What every board's tables say together."""
     if not effects:
@@ -243,7 +218,7 @@ def _diagnosis(
     searched: tuple[Explanation, ...],
     taught: Mapping[str, TaughtBoard],
     claim: SharedClaim | None,
-    before: Mapping[str, Fitted],
+    before: Mapping[str, FitResult],
     after: CampaignFitResult,
     seed: int,
 ) -> CampaignDiagnosis:

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator, Mapping
+import json
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from bayesplate.board.board import Board
+from bayesplate.board.prior import PriorCard
+from bayesplate.campaign.archive import shared_tree
 from bayesplate.campaign.boards import Member
 from bayesplate.campaign.common import common_residuals
+from bayesplate.campaign.diagnosis import CampaignDiagnosis
 from bayesplate.campaign.learning import Learnt, learn
-from bayesplate.campaign.population import BoardConstants, Population, find_population
+from bayesplate.campaign.population import BoardConstants, Population, find_population, prior_of
 from bayesplate.campaign.summary import (
     FORMAT,
     CampaignSummary,
@@ -25,113 +30,171 @@ from bayesplate.campaign.summary import (
     shared_numbers,
 )
 from bayesplate.commands.campaign import Campaign
-from bayesplate.commands.campaign_result import CampaignFitResult, write_campaign_pages
-from bayesplate.commands.fitting import Fitted, fitted, not_converged
-from bayesplate.commands.stages import Stages
-from bayesplate.errors import CheckpointError, NotConvergedError
-from bayesplate.files import write_text
+from bayesplate.commands.fitting import FIT, FitResult, Run, Stages, not_converged
+from bayesplate.commands.shown import show_fit
+from bayesplate.errors import Fault, InputError, NotConvergedError
+from bayesplate.files import write_text, writing
 from bayesplate.posterior.assessment import assess
-from bayesplate.posterior.inference import Inference
-from bayesplate.posterior.sampling import Progress, SamplerSettings
-from bayesplate.results.contract import json_text
-from bayesplate.results.folder import BOARDS, SUMMARY, OutputFolder
+from bayesplate.posterior.sampling import SamplerSettings
+from bayesplate.report.plots import CampaignPlots
+from bayesplate.results.archive import to_arviz, write_tree
+from bayesplate.results.contract import as_json, json_text
+from bayesplate.results.folder import ARCHIVE, BOARDS, OF_POPULATION, PAGE, SUMMARY
 from bayesplate.results.summarise import sampler_health, summarise
 from bayesplate.results.summary import versions
 
-_FIT, _SHARED = 3.0, 1.0
-"""How long a board and what is shared take beside each other."""
+SHARED = 1.0
+"""How long what is shared takes beside a fit."""
 _BOARD_LINE = 17
 
 
-def fit_campaign(
-    campaign: Campaign,
-    *,
-    out: str | os.PathLike[str] | None = None,
-    report: bool = True,
-    seed: int = 1,
-    force: bool = False,
-    resume: bool = False,
-    progress: Callable[[Progress], None] | None = None,
-) -> CampaignFitResult:
-    """Fit a campaign; `bayesplate.fit` says what the arguments mean and what is raised."""
-    folder = None if out is None else OutputFolder(Path(out))
-    if folder is not None:
-        folder.require_usable(force=force, resume=resume)
-    stages = Stages(progress, len(campaign.problems) * _FIT + _SHARED)
-    campaign.pose()
-    for problem in campaign.problems:
-        SamplerSettings(seed=seed).walkers(problem.posed.parameters.n_dim)
-    if folder is not None:
-        open_folder(folder, resume=resume)
-    with telling_failure(folder, campaign, seed):
-        result = fitted_together(campaign, seed, None if folder is None else folder.checkpoint, stages)
-    if folder is not None:
-        result = replace(result, folder=folder.path)
-        result.write(folder.path)
+@dataclass(frozen=True, eq=False, repr=False)
+class CampaignFitResult:
+    """What a fit of a campaign leaves.
+
+    Attributes
+    ----------
+    folder : Path or None
+        Where its files are; None if none were asked for.
+    campaign : Campaign
+    summary : CampaignSummary
+        What summary.json holds.
+    boards : dict of FitResult
+        By name: each board under what all teach.
+    alone : dict of FitResult
+        The same of each board alone.
+    learnt : Learnt or None
+        What is shared; None where nothing is.
+    population : Population or None
+    """
+
+    folder: Path | None
+    campaign: Campaign
+    summary: CampaignSummary
+    boards: Mapping[str, FitResult]
+    alone: Mapping[str, FitResult]
+    learnt: Learnt | None
+    population: Population | None
+
+    @cached_property
+    def prior(self) -> PriorCard | None:
+        """What the boards teach of the next one, as a prior card; None where they share no population."""
+        if self.population is None:
+            return None
+        source = f"{len(self.boards)} boards of the campaign {self.campaign.name}"
+        rng = np.random.default_rng([self.summary.seed, _BOARD_LINE])
+        return prior_of(self.population, f"{self.campaign.name}{OF_POPULATION}", source, rng)
+
+    @cached_property
+    def plot(self) -> CampaignPlots:
+        """The figures: `result.plot.shared()`."""
+        return CampaignPlots(self.summary)
+
+    def to_arviz(self) -> Any:
+        """The draws of what is shared, as in posterior.nc; each board has its own in `boards[NAME].to_arviz()`.
+
+        Raises
+        ------
+        InputError
+            If nothing is shared.
+        """
+        if self.learnt is None:
+            wanted, remedy = "a campaign that shares something", "every board has its own draws: boards[NAME]"
+            raise InputError(Fault("to_arviz", wanted, "nothing shared", remedy))
+        return to_arviz(shared_tree(self.learnt, self._attributes))
+
+    @property
+    def _attributes(self) -> dict[str, str]:
+        return {
+            "card": self.campaign.card.text,
+            "card_sha256": self.summary.card_sha256,
+            "versions": json.dumps(as_json(self.summary.versions)),
+            "seed": str(self.summary.seed),
+        }
+
+    def write(self, folder: Path, *, report: bool = True, diagnosis: CampaignDiagnosis | None = None) -> None:
+        """Write summary.json, posterior.nc, the prior card of the next board, pages, and a folder for each board.
+
+        Raises
+        ------
+        UnwritableError
+            If the disk is full or the place is not ours.
+        """
+        from bayesplate.report.campaign import write_campaign_report
+
+        for name, one in self.boards.items():
+            one.write(folder / BOARDS / name)
+            if report:
+                one.write_page(folder / BOARDS / name)
+        if self.prior is not None:
+            write_text(folder / f"{self.prior.name}.toml", self.prior.to_toml())
+        if self.learnt is not None:
+            write_tree(folder / ARCHIVE, shared_tree(self.learnt, self._attributes))
+        write_text(folder / SUMMARY, json_text(self.summary))
         if report:
-            write_campaign_pages(folder.path, result)
-        folder.close()
+            with writing(folder / PAGE):
+                write_campaign_report(folder, self.campaign.card.title, self.summary, diagnosis)
+
+    def _repr_html_(self) -> str:
+        """The tables as a notebook shows them."""
+        return show_fit(self.summary).html(self.campaign.card.title or self.campaign.name)
+
+    def __repr__(self) -> str:
+        return repr(self.summary).replace("<CampaignSummary", "<CampaignFitResult", 1)
+
+
+def fit_campaign(campaign: Campaign, run: Run, *, report: bool) -> CampaignFitResult:
+    """Fit a campaign; `bayesplate.fit` says what is raised."""
+    with campaign_run(campaign, run, len(campaign.problems) * FIT + SHARED):
+        result = replace(fitted_together(campaign, run), folder=run.path)
+    if run.folder is not None:
+        result.write(run.folder.path, report=report)
+        run.folder.close()
     return result
 
 
-def open_folder(folder: OutputFolder, *, resume: bool) -> None:
-    """Open the folder of a campaign's run.
-
-    Raises
-    ------
-    CheckpointError
-        If there is nothing to resume.
-    """
-    if resume and not folder.has_checkpoint:
-        raise CheckpointError(f"{folder.path}: wanted a saved run, got none to resume (--force runs it anew)")
-    folder.open(resume=resume)
-
-
 @contextmanager
-def telling_failure(folder: OutputFolder | None, campaign: Campaign, seed: int) -> Iterator[None]:
-    """Where something does not converge, summary.json says so."""
+def campaign_run(campaign: Campaign, run: Run, left: float, place: str = "") -> Iterator[None]:
+    """A run that begins with each board alone, at a place of the checkpoint; where one fails, summary.json says so."""
+    run.open({f"{place}{BOARDS}/{one.board.name}": one for one in campaign.problems}, left)
     try:
         yield
     except NotConvergedError as error:
-        if folder is not None:
+        if run.path is not None:
             summary = UnconvergedCampaign(
-                FORMAT, campaign.name, seed, versions(), campaign.card.sha256, converged=False, warnings=(str(error),)
+                FORMAT,
+                campaign.name,
+                run.seed,
+                versions(),
+                campaign.card.sha256,
+                converged=False,
+                warnings=(str(error),),
             )
-            write_text(folder.path / SUMMARY, json_text(summary))
+            write_text(run.path / SUMMARY, json_text(summary))
         raise
 
 
-def fit_boards(campaign: Campaign, seed: int, checkpoints: Path | None, stages: Stages) -> dict[str, Fitted]:
-    """Every board alone, one after another.
-
-    Parameters
-    ----------
-    checkpoints : Path or None
-        Folder of the unfinished run's chunks, one subfolder per board; None keeps none.
-    stages : Stages
-        Told of each board.
-    """
-    found = {}
-    for problem in campaign.problems:
-        name = problem.board.name
-        stages.begin(f"board {name}", _FIT)
-        own = None if checkpoints is None else checkpoints / BOARDS / name
-        found[name] = fitted(problem, seed, own, _refusing(name), stages.sampled)
-    return found
+def fit_boards(campaign: Campaign, run: Run, place: str = "") -> dict[str, FitResult]:
+    """Every board alone, one after another, each with a folder of its own at a place of the checkpoint."""
+    names = [one.board.name for one in campaign.problems]
+    return {
+        name: run.fit(one, f"{place}{BOARDS}/{name}", f"board {name}", of=f"board {name}")
+        for name, one in zip(names, campaign.problems, strict=True)
+    }
 
 
-def fitted_together(campaign: Campaign, seed: int, checkpoints: Path | None, stages: Stages) -> CampaignFitResult:
-    """Boards and what they share, nothing written but checkpoints; parameters as of `fit_boards`."""
-    alone = fit_boards(campaign, seed, checkpoints, stages)
-    stages.begin("what the boards share", _SHARED)
-    learnt, boards, warnings = _together(campaign, alone, seed, stages)
-    return summed_up(campaign, alone, boards, learnt, warnings, seed)
+def fitted_together(campaign: Campaign, run: Run) -> CampaignFitResult:
+    """Boards and what they share, nothing written but checkpoints."""
+    alone = fit_boards(campaign, run)
+    run.stages.begin("what the boards share", SHARED)
+    learnt, boards, warnings = _together(campaign, alone, run.seed, run.stages)
+    return summed_up(campaign, alone, boards, learnt, warnings, run.seed)
 
 
 def summed_up(
     campaign: Campaign,
-    alone: Mapping[str, Fitted],
-    boards: Mapping[str, Fitted],
+    alone: Mapping[str, FitResult],
+    boards: Mapping[str, FitResult],
     learnt: Learnt | None,
     warnings: tuple[str, ...],
     seed: int,
@@ -143,8 +206,8 @@ def summed_up(
 
 
 def _together(
-    campaign: Campaign, alone: Mapping[str, Fitted], seed: int, stages: Stages
-) -> tuple[Learnt | None, Mapping[str, Fitted], tuple[str, ...]]:
+    campaign: Campaign, alone: Mapping[str, FitResult], seed: int, stages: Stages
+) -> tuple[Learnt | None, Mapping[str, FitResult], tuple[str, ...]]:
     """What is shared, every board under what all teach, and what a reader must know of it."""
     if not campaign.shared:
         return None, alone, ()
@@ -160,12 +223,12 @@ def _together(
         assessment = assess(inference, draws)
         sha256 = before.problem.prepared.card.sha256
         summary = summarise(inference, draws, assessment, seed, versions(), sha256)
-        boards[member.name] = Fitted(before.problem, inference, draws, summary)
+        boards[member.name] = FitResult(before.problem, inference, draws, summary)
     return learnt, boards, learning_warnings(learnt, effective)
 
 
 def _population(
-    campaign: Campaign, boards: Mapping[str, Fitted], learnt: Learnt | None, seed: int
+    campaign: Campaign, boards: Mapping[str, FitResult], learnt: Learnt | None, seed: int
 ) -> Population | None:
     if campaign.population is None:
         return None
@@ -183,7 +246,7 @@ def _population(
 
 def _summary(
     campaign: Campaign,
-    boards: Mapping[str, Fitted],
+    boards: Mapping[str, FitResult],
     learnt: Learnt | None,
     population: Population | None,
     warnings: tuple[str, ...],
@@ -208,13 +271,6 @@ def _summary(
     )
 
 
-def boards_of(found: Mapping[str, Fitted]) -> dict[str, Board]:
+def boards_of(found: Mapping[str, FitResult]) -> dict[str, Board]:
     """The boards that were fitted, by name."""
     return {name: one.inference.problem.board for name, one in found.items()}
-
-
-def _refusing(name: str) -> Callable[[Inference], None]:
-    def refuse(inference: Inference) -> None:
-        raise not_converged(inference.convergence, inference.problem.doubts, of=f"board {name}")
-
-    return refuse

@@ -9,15 +9,19 @@ from typing import Annotated
 import numpy as np
 
 from bayesplate.board.material import MODULI, moduli
-from bayesplate.campaign.checking import CampaignCheck
+from bayesplate.campaign.checking import CampaignCheck, CheckedShared
+from bayesplate.campaign.given import GivenShared
+from bayesplate.campaign.pulls import Pull, moments_before
+from bayesplate.campaign.scatter import expected_width
+from bayesplate.campaign.shared import Shared
 from bayesplate.commands.arguments import checked
 from bayesplate.commands.campaign import Campaign, problem_or_campaign
-from bayesplate.commands.one_thread import one_thread_each
 from bayesplate.commands.options import CARD, Effects, SetupFile
 from bayesplate.commands.prepare import Card
 from bayesplate.commands.problem import Problem
 from bayesplate.commands.shown import show_check
 from bayesplate.diagnosis.signatures import INVISIBLE, Signature, look_alikes, signatures
+from bayesplate.diagnosis.terms import normalised
 from bayesplate.estimates.identifiability import remarks
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.posing import PosedProblem
@@ -60,7 +64,6 @@ class CheckResult(CheckReport):
         return show_check(self).html(self.title or self.name)
 
 
-@one_thread_each()
 @checked()
 def check(
     card: Annotated[Problem | Card | Campaign, CARD],
@@ -89,14 +92,10 @@ def check(
         As `fit` would.
     """
     given = problem_or_campaign(card, effects=effects, setup=setup)
-    if isinstance(given, Campaign):
-        from bayesplate.commands.campaign_check import check_campaign  # which checks boards in turn
-
-        return check_campaign(given)
-    return check_board(given)
+    return _check_campaign(given) if isinstance(given, Campaign) else _check_board(given)
 
 
-def check_board(given: Problem, *, candidates: bool = True) -> CheckResult:
+def _check_board(given: Problem, *, candidates: bool = True) -> CheckResult:
     """Check one board; without candidates, what effects that are not declared would do is not computed."""
     problem = given.posed
     board = problem.board
@@ -179,3 +178,50 @@ def expected_sd(problem: PosedProblem) -> dict[str, float]:
     values = problem.parameters.values(draws)
     constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
     return {name: float(np.nanstd(np.log(v))) for name, v in zip(MODULI, constants, strict=True)}
+
+
+def _check_campaign(campaign: Campaign) -> CampaignCheck:
+    """What each board and all together would tell."""
+    campaign.pose()
+    population = campaign.population
+    return CampaignCheck(
+        name=campaign.name,
+        title=campaign.card.title,
+        shared=_shared(campaign) if campaign.shared else {},
+        population=None if population is None else population.name,
+        boards={problem.board.name: _check_board(problem, candidates=False) for problem in campaign.problems},
+    )
+
+
+def _shared(campaign: Campaign) -> dict[str, CheckedShared]:
+    """What normal approximations of the boards' posteriors say of the shared numbers."""
+    pulls = {one.board.name: _pull(one.posed, campaign) for one in campaign.problems}
+    width = expected_width(campaign.shared)
+    alone = {name: expected_sds(campaign.shared, [pull]) for name, pull in pulls.items()}
+    every = expected_sds(campaign.shared, [one.scattered(width) for one in pulls.values()])
+    return {
+        one.name: CheckedShared(
+            unit=one.unit,
+            prior_q05=float(one.prior.quantile(0.05)),
+            prior_q50=float(one.prior.quantile(0.5)),
+            prior_q95=float(one.prior.quantile(0.95)),
+            expected_sd=every[i],
+            boards={name: each[i] for name, each in alone.items()},
+        )
+        for i, one in enumerate(campaign.shared)
+    }
+
+
+def expected_sds(shared: Sequence[Shared], pulls: Sequence[Pull]) -> list[float]:
+    """Standard deviation of each shared number after what some boards say, over that of its prior, bounds kept."""
+    before = np.array([moments_before(one.prior)[1] for one in shared])
+    precision = np.diag(1.0 / before) + np.sum([one.precision for one in pulls], axis=0)
+    return [float(sd) for sd in np.sqrt(np.diagonal(np.linalg.inv(precision)) / before)]
+
+
+def _pull(posed: PosedProblem, campaign: Campaign) -> Pull:
+    theta = np.random.default_rng(0).multivariate_normal(posed.centre, posed.covariance, _N_DRAWS)
+    given = GivenShared(posed.posterior, campaign.shared)
+    z, log_weights = given.z_of(theta), given.log_reweighting(theta)
+    kept = np.isfinite(z).all(axis=1) & np.isfinite(log_weights)
+    return Pull.of_draws(z[kept], normalised(log_weights[kept]), [one.prior for one in campaign.shared])

@@ -10,7 +10,6 @@ from typing import Annotated, Any, get_args
 from bayesplate.commands.arguments import checked
 from bayesplate.commands.check import expected_sd
 from bayesplate.commands.fitting import not_converged
-from bayesplate.commands.one_thread import one_thread_each
 from bayesplate.commands.options import CARD, Coefficients, Effects, Force, OnProgress, OutOfComparison, Seed
 from bayesplate.commands.prepare import Card
 from bayesplate.commands.problem import Problem, as_problem
@@ -87,7 +86,6 @@ class CompareResult(Comparison):
         return show_compare(self).html(f"{self.name}: every method side by side")
 
 
-@one_thread_each()
 @checked()
 def compare(
     card: Annotated[Problem | Card, CARD],

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +16,11 @@ from bayesplate.board.prior import PriorCard
 from bayesplate.board.values import Key
 from bayesplate.commands.arguments import checked, whole
 from bayesplate.commands.campaign import Campaign, problem_or_campaign
-from bayesplate.commands.fit import refuse_unconverged, write_fit, write_page
-from bayesplate.commands.fitting import Fitted, fitted, opened, with_board
-from bayesplate.commands.one_thread import one_thread_each
+from bayesplate.commands.campaign_diagnose import CampaignDiagnoseResult, diagnose_campaign
+from bayesplate.commands.fitting import FIT, FitResult, Run, with_board
 from bayesplate.commands.options import CARD, Effects, Force, OnProgress, Out, Report, Resume, Seed, SetupFile
 from bayesplate.commands.prepare import Card
 from bayesplate.commands.problem import Problem
-from bayesplate.commands.stages import Stages
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.claim import Claim, judge_claim, named_in_part, nested_of
 from bayesplate.diagnosis.findings import Case, Side, diagnosis_of
@@ -39,25 +37,21 @@ from bayesplate.diagnosis.told import relabelled_sentence
 from bayesplate.diagnosis.verdict import Verdict, answer_words, decide
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
 from bayesplate.estimates.leave_one_out import carrying_modes, indices_of, united
-from bayesplate.files import make_folder, write_text
+from bayesplate.files import write_text
 from bayesplate.planning.drawn_up import first_of
 from bayesplate.planning.explained import believed, survivors
 from bayesplate.planning.proposals import BELIEFS, Planner
-from bayesplate.posterior.inference import Inference
 from bayesplate.report.plots import DiagnosePlots
 from bayesplate.results.contract import json_text
 from bayesplate.results.folder import BEFORE, DIAGNOSIS, run_of_its_own
 from bayesplate.results.summary import Summary
 from bayesplate.streams import stream
 
-if TYPE_CHECKING:
-    from bayesplate.commands.campaign_diagnose import CampaignDiagnoseResult
-
 FEWEST_NULL = math.ceil(1.0 / min(BY_CHANCE, FALSE_ALARMS)) - 1
 """Among n simulated boards the one at hand is first by chance in a share of 1 / (n + 1), which is to be that small."""
 _NULL_LINE = 7
 _MOST_FINALISTS = 3
-_FIT, _SEARCH, _KNOWN, _CONTROL, _CHOICE = 3.0, 3.0, 0.5, 0.5, 0.5
+_SEARCH, _KNOWN, _CONTROL, _CHOICE = 3.0, 0.5, 0.5, 0.5
 """How long the parts take beside each other, for the time that is left."""
 
 
@@ -70,14 +64,14 @@ class DiagnoseResult:
     folder : Path or None
         Where its files are; None if none were asked for.
     diagnosis : Diagnosis
-    before, after : Fitted
+    before, after : FitResult
         The same where nothing was added.
     """
 
     folder: Path | None
     diagnosis: Diagnosis
-    before: Fitted
-    after: Fitted
+    before: FitResult
+    after: FitResult
 
     @property
     def summary(self) -> Summary:
@@ -106,7 +100,6 @@ class DiagnoseResult:
         return self.diagnosis._repr_html_()
 
 
-@one_thread_each()
 @run_of_its_own()
 @checked()
 def diagnose(
@@ -159,28 +152,15 @@ def diagnose(
         As `bayesplate.fit`, of the fit without further effects; also if a problem asks for robust noise.
     """
     problem = problem_or_campaign(card, effects=effects, setup=setup)
+    run = Run(seed, out, force=force, resume=resume, progress=progress)
     if isinstance(problem, Campaign):
-        from bayesplate.commands.campaign_diagnose import diagnose_campaign
-
-        return diagnose_campaign(
-            problem, out=out, report=report, seed=seed, force=force, resume=resume, progress=progress
-        )
+        return diagnose_campaign(problem, run, report=report)
     if problem.robust:
         wanted = "a problem with normal noise, which the search for an effect assumes"
         raise InputError(Fault("robust", wanted, "Student's distribution"))
-    begun = opened(problem, seed, out, force=force, resume=resume, first=BEFORE)
-    folder = begun.folder
-
-    stages = Stages(progress, _FIT + _SEARCH + _KNOWN + _CONTROL + _FIT + _CHOICE)
-
-    def run(under: Problem, name: str, stage: str) -> Fitted:
-        def refuse(inference: Inference) -> None:
-            refuse_unconverged(inference, seed, under, begun.path if name == BEFORE else None)
-
-        stages.begin(stage, _FIT)
-        return fitted(under, seed, begun.checkpoints(name), refuse, stages.sampled)
-
-    before = run(problem, BEFORE, "fit without further effects")
+    run.open({BEFORE: problem}, 2.0 * FIT + _SEARCH + _KNOWN + _CONTROL + _CHOICE)
+    stages = run.stages
+    before = run.fit(problem, BEFORE, "fit without further effects", tells_failure=True)
     posed = before.inference.problem
     stages.begin("search for effects", _SEARCH)
     ground, found = full_search(baseline_of(posed), tell=stages.reached)
@@ -192,13 +172,13 @@ def diagnose(
     folded = nested_of(found, control, verdict.tried)
     in_part = named_in_part(found, verdict, folded)
     finals = verdict.fitted_again[:_MOST_FINALISTS]
-    stages.left = _FIT * len(finals) + (_CHOICE if verdict.index else 0.0)
+    stages.left = FIT * len(finals) + (_CHOICE if verdict.index else 0.0)
     fits, failures = {0: before}, []
     for answer in finals:
         try:
             name = "-".join((*answer.members, str(answer.index)))
             stage = f"fit with {answer_words(found, answer)}"
-            fits[answer.index] = run(with_board(problem, refit_board(found, answer.index)), name, stage)
+            fits[answer.index] = run.fit(with_board(problem, refit_board(found, answer.index)), name, stage)
         except (NotIdentifiableError, NotConvergedError) as error:
             failures.append(f"the model could not be fitted again with {' and '.join(answer.members)}: {error}")
     last = verdict.tried if (verdict.index or in_part) and verdict.tried in fits else 0
@@ -235,19 +215,19 @@ def diagnose(
             carrying=carrying_any,
         )
     )
-    if folder is not None:
+    if run.folder is not None:
+        path = run.folder.path
         if last:
-            make_folder(folder.path / BEFORE)
-            write_fit(folder.path / BEFORE, before)
-        write_fit(folder.path, after)
-        write_text(folder.path / DIAGNOSIS, json_text(diagnosis_json(diagnosis)))
+            before.write(path / BEFORE)
+        after.write(path)
+        write_text(path / DIAGNOSIS, json_text(diagnosis_json(diagnosis)))
         if report:
-            write_page(folder.path, after, diagnosis)
-        folder.close()
-    return DiagnoseResult(begun.path, diagnosis, before, after)
+            after.write_page(path, diagnosis)
+        run.folder.close()
+    return DiagnoseResult(run.path, diagnosis, before, after)
 
 
-def _measured(one: Fitted) -> NDArray[np.float64]:
+def _measured(one: FitResult) -> NDArray[np.float64]:
     """Frequencies of the readings that have a label in a fit: (n_modes,) array, Hz."""
     return np.concatenate([setup.measured for setup in one.inference.problem.board.setups])
 

@@ -15,12 +15,10 @@ from bayesplate.board.values import Key, read_table
 from bayesplate.commands.arguments import checked, effect_list, instance_of, read_switch, refused, whole, word
 from bayesplate.commands.fit import fit
 from bayesplate.commands.fitting import fitted
-from bayesplate.commands.one_thread import one_thread_each
-from bayesplate.commands.prepare import Prepared, prepare, prepared_card
+from bayesplate.commands.prepare import prepare, prepared_card
 from bayesplate.commands.problem import Problem
-from bayesplate.errors import Fault, NotConvergedError
+from bayesplate.errors import Fault
 from bayesplate.frequencies.laws import LawName
-from bayesplate.posterior.inference import Inference
 from bayesplate.results.summary import Summary
 
 
@@ -61,7 +59,6 @@ def _read_request(value: object) -> object:
     return value
 
 
-@one_thread_each()
 @checked()
 def fit_board(
     board: Annotated[Board, Key(instance_of(Board))],
@@ -89,7 +86,7 @@ def fit_board(
         As of `fit`.
     """
     request = FitRequest() if request is None else request
-    return fitted(_problem(board, prior, request), request.seed, None, _refuse).summary
+    return fitted(_problem(board, prior, request), request.seed).summary
 
 
 def fit_board_into(folder: Path, report: bool, board: Board, prior: PriorCard, request: FitRequest) -> Summary:
@@ -99,12 +96,8 @@ def fit_board_into(folder: Path, report: bool, board: Board, prior: PriorCard, r
 
 
 def _problem(board: Board, prior: PriorCard, request: FitRequest) -> Problem:
-    return Problem(_prepared(board, prior, request), request.law, request.robust)
-
-
-def _prepared(board: Board, prior: PriorCard, request: FitRequest) -> Prepared:
     if board.card is None or board != Board.from_card(board.card):
-        return prepare(board, request.effects, prior=prior)
+        return Problem(prepare(board, request.effects, prior=prior), request.law, request.robust)
     lacking = tuple(
         Fault(
             f"request tables {setup.name}",
@@ -115,9 +108,5 @@ def _prepared(board: Board, prior: PriorCard, request: FitRequest) -> Prepared:
         for setup in board.setups
         if setup.table_name and setup.name not in request.tables
     )
-    return prepared_card(board, NamedCards(prior, request.tables, lacking), request.effects)
-
-
-def _refuse(inference: Inference) -> None:
-    reasons = "\n".join(inference.convergence.reasons)
-    raise NotConvergedError(f"the sampler did not converge, so no constants are given:\n{reasons}")
+    named = NamedCards(prior, request.tables, lacking)
+    return Problem(prepared_card(board, named, request.effects), request.law, request.robust)

@@ -1,19 +1,22 @@
-"""One fit, from a problem to draws and a summary, with the law that serves; what `fit` and `diagnose` share."""
+"""One fit, from a problem to draws, a summary and files, with the law that serves; and the run that it is part of."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from bayesplate.board.board import Board
-from bayesplate.commands.problem import Problem
+from bayesplate.commands.problem import Problem, pose_all
+from bayesplate.commands.shown import show_fit
+from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.errors import CheckpointError, NotConvergedError
+from bayesplate.files import make_folder, write_text, writing
 from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.convergence import Convergence
@@ -23,30 +26,44 @@ from bayesplate.posterior.likely_labels import with_likely_labels
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.reweighting import linear_is_enough, linearisation
 from bayesplate.posterior.sampling import Progress, SamplerSettings
-from bayesplate.results.archive import attributes_of, posterior_tree, to_arviz
-from bayesplate.results.folder import OutputFolder
-from bayesplate.results.summarise import summarise
+from bayesplate.report.plots import FitPlots
+from bayesplate.results.archive import attributes_of, posterior_tree, to_arviz, write_tree
+from bayesplate.results.contract import json_text
+from bayesplate.results.folder import ARCHIVE, PAGE, SUMMARY, OutputFolder
+from bayesplate.results.summarise import summarise, unconverged_summary
 from bayesplate.results.summary import Summary, versions
 
+FIT = 3.0
+"""How long a fit takes beside the other parts of a run."""
 
-@dataclass(frozen=True, eq=False)
-class Fitted:
-    """A converged fit.
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FitResult:
+    """A converged fit, and where its files are.
 
     Attributes
     ----------
+    problem : Problem
     inference : Inference
         Chains and the verdict of the convergence gate.
     draws : Draws
         The thinned posterior by name.
     summary : Summary
         What summary.json holds: constants, modes, errors, the sampler's health.
+    folder : Path or None
+        None if no files were asked for.
     """
 
     problem: Problem
     inference: Inference
     draws: Draws
     summary: Summary
+    folder: Path | None = None
+
+    @cached_property
+    def plot(self) -> FitPlots:
+        """The figures: `result.plot.constants()`."""
+        return FitPlots(self.inference, self.draws, self.summary)
 
     @cached_property
     def tree(self) -> Any:
@@ -63,49 +80,71 @@ class Fitted:
         """
         return to_arviz(self.tree)
 
+    def write(self, folder: Path) -> None:
+        """Write posterior.nc and summary.json.
 
-@dataclass(frozen=True, eq=False)
-class Opened:
-    """A run that may begin: its problem is posed and its folder open.
+        Raises
+        ------
+        UnwritableError
+            If the disk is full or the place is not ours.
+        """
+        make_folder(folder)
+        write_tree(folder / ARCHIVE, self.tree)
+        write_text(folder / SUMMARY, json_text(self.summary))
+
+    def write_page(self, folder: Path, diagnosis: Diagnosis | None = None) -> None:
+        """Write report.html, its figures and tables; with a diagnosis its verdict too. Raises as `write`."""
+        from bayesplate.report.page import write_report
+
+        with writing(folder / PAGE):
+            write_report(folder, self.problem.prepared.card, self.inference, self.draws, self.summary, diagnosis)
+
+    def __repr__(self) -> str:
+        return repr(self.summary).replace("<Summary", "<FitResult", 1)
+
+    def _repr_html_(self) -> str:
+        """The tables as a notebook shows them."""
+        return show_fit(self.summary).html(self.problem.board.title or self.summary.name)
+
+
+@dataclass
+class Stages:
+    """The progress of a run of several parts: tells each part and the share of the whole, which never falls.
 
     Attributes
     ----------
-    folder : OutputFolder or None
-        None if nothing is to be written.
+    left : float
+        How long the parts that are still to come take, begun ones not counted, in any unit of time.
     """
 
-    problem: Problem
-    seed: int
-    folder: OutputFolder | None
+    tell: Callable[[Progress], None] | None
+    left: float
+    _stage: str = ""
+    _past: float = 0.0
+    _length: float = 0.0
+    _done: float = 0.0
 
-    @property
-    def path(self) -> Path | None:
-        """Where the files go; None if nothing is to be written."""
-        return None if self.folder is None else self.folder.path
+    def begin(self, stage: str, length: float) -> None:
+        """Begin the next part, which takes so long beside the others."""
+        self._past += self._length
+        self._stage, self._length = stage, length
+        self.left = max(self.left - length, 0.0)
+        self.reached(0.0)
 
-    def checkpoints(self, part: str = "") -> Path | None:
-        """Where the chunks of the run, or of one of its fits, are kept."""
-        return None if self.folder is None else self.folder.checkpoint / part
+    def sampled(self, progress: Progress) -> None:
+        """Tell of sampling within the part."""
+        self.reached(progress.sampled, progress)
+
+    def reached(self, share: float, progress: Progress | None = None) -> None:
+        """Tell that a share of the part is done."""
+        whole = self._past + self._length + self.left
+        self._done = max(self._done, (self._past + share * self._length) / whole)
+        if self.tell is not None:
+            self.tell(replace(progress or Progress(0, 0), stage=self._stage, done=self._done))
 
 
-Refuse = Callable[[Inference], None]
-
-
-def with_board(problem: Problem, board: Board) -> Problem:
-    """The same card with another model of the board: one more effect, or two labels exchanged."""
-    return replace(problem, prepared=replace(problem.prepared, board=board))
-
-
-def opened(
-    problem: Problem,
-    seed: int,
-    out: str | os.PathLike[str] | None,
-    *,
-    force: bool = False,
-    resume: bool = False,
-    first: str = "",
-) -> Opened:
-    """Pose a problem and open the folder of its run; whatever is refused is refused before that.
+class Run:
+    """A run of one fit or several: its seed, its progress, and its output folder.
 
     Parameters
     ----------
@@ -113,53 +152,122 @@ def opened(
         Output folder; None writes nothing.
     force, resume : bool
         Replace the results in the folder, or continue an interrupted run.
-    first : str
-        Which of several fits comes first: the subfolder of its checkpoint.
-
-    Raises
-    ------
-    InputError
-        If the folder may not be used; then nothing is written, nor with the following.
-    NotIdentifiableError
-        If the data leave a constant open.
-    CheckpointError
-        If there is nothing to resume.
+    progress : callable, optional
+        Told of the parts of the run and of its sampling.
     """
-    folder = None if out is None else OutputFolder(Path(out))
-    if folder is not None:
-        folder.require_usable(force=force, resume=resume)
-    posed = problem.posed
-    SamplerSettings(seed=seed).walkers(posed.parameters.n_dim)
-    if folder is not None:
-        if resume and not checkpoint_in(folder.checkpoint / first, problem, posed).exists():
-            wanted = f"a saved run under the {posed.posterior.law} law"
-            raise CheckpointError(f"{folder.path}: wanted {wanted}, got none to resume (--force runs it anew)")
-        folder.open(resume=resume)
-    return Opened(problem, seed, folder)
+
+    def __init__(
+        self,
+        seed: int = 1,
+        out: str | os.PathLike[str] | None = None,
+        *,
+        force: bool = False,
+        resume: bool = False,
+        progress: Callable[[Progress], None] | None = None,
+    ) -> None:
+        self.seed, self.stages = seed, Stages(progress, 0.0)
+        self.folder = None if out is None else OutputFolder(Path(out))
+        self._force, self._resume = force, resume
+
+    @property
+    def path(self) -> Path | None:
+        """Where the files go; None if nothing is to be written."""
+        return None if self.folder is None else self.folder.path
+
+    def open(self, first: Mapping[str, Problem], left: float = 0.0) -> None:
+        """Pose problems and open the folder; whatever is refused is refused before that, and nothing is written.
+
+        Parameters
+        ----------
+        first : dict of Problem
+            What is fitted first, by the subfolders of the checkpoint.
+        left : float
+            How long the parts of the run take.
+
+        Raises
+        ------
+        InputError
+            If the folder may not be used.
+        NotIdentifiableError
+            If the data leave a constant open.
+        CheckpointError
+            If there is nothing to resume.
+        """
+        self.stages.left = left
+        if self.folder is not None:
+            self.folder.require_usable(force=self._force, resume=self._resume)
+        pose_all(list(first.values()))
+        for problem in first.values():
+            SamplerSettings(seed=self.seed).walkers(problem.posed.parameters.n_dim)
+        if self.folder is not None:
+            (place, problem), *others = first.items()
+            saved = checkpoint_in(self.folder.checkpoint / place, problem, problem.posed)
+            if self._resume and not (self.folder.has_checkpoint if others else saved.exists()):
+                wanted = "a saved run" if others else f"a saved run under the {problem.posed.posterior.law} law"
+                raise CheckpointError(f"{self.path}: wanted {wanted}, got none to resume (--force runs it anew)")
+            self.folder.open(resume=self._resume)
+
+    def fit(
+        self, problem: Problem, place: str = "", stage: str = "", *, of: str = "", tells_failure: bool = False
+    ) -> FitResult:
+        """Fit one problem of the run.
+
+        Parameters
+        ----------
+        place : str
+            Subfolder of its checkpoint.
+        stage : str
+            What the progress says; without it that of the sampler alone is told.
+        of : str
+            What is fitted, for the message where it does not converge.
+        tells_failure : bool
+            Whether summary.json then says so.
+        """
+        if stage:
+            self.stages.begin(stage, FIT)
+        checkpoints = None if self.folder is None else self.folder.checkpoint / place
+        progress = self.stages.sampled if stage else self.stages.tell
+        failure = self.path if tells_failure else None
+        return fitted(problem, self.seed, checkpoints, progress, of=of, failure=failure)
+
+
+def with_board(problem: Problem, board: Board) -> Problem:
+    """The same card with another model of the board: one more effect, or two labels exchanged."""
+    return replace(problem, prepared=replace(problem.prepared, board=board))
 
 
 def fitted(
     problem: Problem,
     seed: int,
-    checkpoints: Path | None,
-    refuse: Refuse,
+    checkpoints: Path | None = None,
     progress: Callable[[Progress], None] | None = None,
-) -> Fitted:
+    *,
+    of: str = "",
+    failure: Path | None = None,
+) -> FitResult:
     """Sample a problem, and once more under the exact law if the draws show that the linear one does not serve.
 
     Parameters
     ----------
     checkpoints : Path or None
         Folder of the unfinished run's chunks, one subfolder per law; None keeps none.
-    refuse : callable
-        Called with an inference that failed the convergence gate; raises.
+    of : str
+        What is fitted, for the message of the error, where a run fits more than one board.
+    failure : Path or None
+        Where summary.json says that the sampler did not converge.
     """
 
     def sampled(under: PosedProblem) -> tuple[Inference, Draws]:
         checkpoint = None if checkpoints is None else checkpoint_in(checkpoints, problem, under)
         inference = infer(under, SamplerSettings(seed=seed), checkpoint=checkpoint, progress=progress)
-        if not inference.convergence.passed:
-            refuse(inference)
+        convergence = inference.convergence
+        if not convergence.passed:
+            if failure is not None:
+                told = unconverged_summary(
+                    inference.problem, inference.chains, convergence, seed, versions(), problem.prepared.card.sha256
+                )
+                write_text(failure / SUMMARY, json_text(told))
+            raise not_converged(convergence, inference.problem.doubts, of=of)
         return with_likely_labels(inference, seed)
 
     inference, draws = sampled(problem.posed)
@@ -171,23 +279,13 @@ def fitted(
         errors = linearisation(inference, draws)
     assessment = assess(inference, draws, errors)
     summary = summarise(inference, draws, assessment, seed, versions(), problem.prepared.card.sha256)
-    return Fitted(problem, inference, draws, summary)
+    return FitResult(problem, inference, draws, summary)
 
 
 def not_converged(
     convergence: Convergence, doubts: Sequence[str] = (), *, of: str = "", so: str = "no constants are given"
 ) -> NotConvergedError:
-    """The error of draws that failed the gate.
-
-    Parameters
-    ----------
-    doubts : sequence of str
-        What is unusual about the board that they are of: the likeliest cause.
-    of : str
-        What was sampled, where a run samples more than one board.
-    so : str
-        What follows.
-    """
+    """The error of draws that failed the gate, with what follows and the likeliest causes."""
     what = f"the sampler did not converge{f' for {of}' if of else ''}, so {so}:"
     return NotConvergedError("\n".join((what, *convergence.reasons, *(f"A likely cause: {doubt}" for doubt in doubts))))
 

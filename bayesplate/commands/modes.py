@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,9 +11,8 @@ import numpy as np
 
 from bayesplate.board.board import Board, Values
 from bayesplate.commands.arguments import checked
-from bayesplate.commands.one_thread import one_thread_each
 from bayesplate.commands.options import CARD, Effects, Force, Out, Seed, SetupFile
-from bayesplate.commands.prepare import Card, Prepared, prepare
+from bayesplate.commands.prepare import Card, Prepared
 from bayesplate.commands.problem import Problem, as_problem
 from bayesplate.commands.shown import show_modes
 from bayesplate.errors import NotIdentifiableError
@@ -66,7 +64,6 @@ class ModesResult:
         return show_modes(self.summary).html(self.summary.title or self.summary.name)
 
 
-@one_thread_each()
 @checked()
 def modes(
     card: Annotated[Problem | Card, CARD],
@@ -107,7 +104,7 @@ def modes(
     InputError
         If the card or the folder cannot be used; then nothing is written.
     """
-    prepared = _prepared(card, effects, setup)
+    prepared = as_problem(card, effects=effects, setup=setup, may_lack_frequencies=True).prepared
     board = prepared.board
     stems = ["modes"] if len(board.setups) == 1 else [f"modes-{setup.name}" for setup in board.setups]
     names = [f"{stem}.{ending}" for stem in stems for ending in ("png", "svg")]
@@ -131,13 +128,6 @@ def modes(
         files=tuple(str(path) for path in files),
     )
     return ModesResult(report, sheets, files)
-
-
-def _prepared(card: Problem | Card, effects: Sequence[str] | None, setup: str | os.PathLike[str] | None) -> Prepared:
-    """As for a fit, but a board that was not measured yet will do."""
-    if isinstance(card, Problem):
-        return as_problem(card, effects=effects, setup=setup).prepared
-    return prepare(card, effects, may_lack_frequencies=True, setup=setup)
 
 
 def _constants(prepared: Prepared) -> tuple[Values, Precision | None, list[str]]:

@@ -8,24 +8,22 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
+
 from bayesplate.board.board import Board
-from bayesplate.board.campaign import is_campaign
-from bayesplate.board.prior import PriorCard
+from bayesplate.board.campaign import CampaignCard
 from bayesplate.board.words import EFFECT_NAMES
-from bayesplate.campaign.shared import Shared
 from bayesplate.commands.arguments import checked
 from bayesplate.commands.campaign import Campaign, problem_or_campaign
-from bayesplate.commands.one_thread import one_thread_each
+from bayesplate.commands.fitting import Stages
 from bayesplate.commands.options import CARD, Between, Effects, Force, Goal, Minutes, OnProgress, Out, Seed
-from bayesplate.commands.prepare import Card, Prepared, prepare
-from bayesplate.commands.problem import Problem, as_problem
+from bayesplate.commands.prepare import Card, Prepared
+from bayesplate.commands.problem import Problem
 from bayesplate.commands.shown import show_plan
-from bayesplate.commands.stages import Stages
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.hypotheses import RELABELLING
 from bayesplate.diagnosis.joint import full_search
-from bayesplate.diagnosis.search import Found
-from bayesplate.diagnosis.verdict import WITHIN, Answer
+from bayesplate.diagnosis.verdict import WITHIN
 from bayesplate.effects import effect_faults
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.files import make_folder, require_new, write_text
@@ -81,7 +79,6 @@ class PlanResult:
         return show_plan(self.summary).html(self.summary.title or self.summary.name)
 
 
-@one_thread_each()
 @checked()
 def plan(
     card: Annotated[Problem | Card | Campaign, CARD],
@@ -133,45 +130,22 @@ def plan(
     NotIdentifiableError
         If explanations are to be told apart on a board whose frequencies do not even tell the constants.
     """
-    given = _given(card, effects)
+    given = problem_or_campaign(card, effects=effects, may_lack_frequencies=True)
     files = () if out is None else require_new(Path(out), _names(), force=force)
-    asked = _Asked(goal, between, seed, None if out is None else Path(out), progress)
-    beliefs = asked.of_board(given.boards[0]) if len(given.boards) == 1 else asked.of_campaign(given)
+    named: Board | CampaignCard
+    if isinstance(given, Campaign):
+        named, problems, shared = given.card, given.problems, given.shared
+        beliefs = _of_campaign(given, goal, between, progress)
+    else:
+        named, problems, shared = given.board, (given,), ()
+        folder = None if out is None else Path(out)
+        beliefs = _of_board(given.prepared, goal, between, stream(seed, BELIEFS), folder, progress)
     planner = Planner(beliefs, seed, goal, Costs(**(costs or {})))
-    made, drawn = drawn_up(planner, given.name, given.title, given.card_sha256, given.priors, given.shared)
+    priors = [one.prior for one in problems]
+    made, drawn = drawn_up(planner, named.name, named.title, named.sha256, priors, shared)
     if out is not None:
         _write(made, drawn, Path(out), files)
     return PlanResult(made, drawn, tuple(path for path in files if path.exists()))
-
-
-@dataclass(frozen=True)
-class _Given:
-    """The boards to plan for: one, or those of a campaign, with what they share."""
-
-    name: str
-    title: str
-    card_sha256: str
-    boards: tuple[Prepared, ...]
-    shared: tuple[Shared, ...] = ()
-
-    @property
-    def priors(self) -> list[PriorCard]:
-        """Of the boards."""
-        return [one.prior for one in self.boards]
-
-
-def _given(card: Problem | Card | Campaign, effects: Sequence[str] | None) -> _Given:
-    """What was given; a board that was not measured yet will do."""
-    if is_campaign(card) or isinstance(card, Campaign):
-        many = problem_or_campaign(card, effects=effects)
-        assert isinstance(many, Campaign)
-        boards = tuple(one.prepared for one in many.problems)
-        return _Given(many.name, many.card.title, many.card.sha256, boards, many.shared)
-    if isinstance(card, Problem):
-        prepared = as_problem(card, effects=effects).prepared
-    else:
-        prepared = prepare(card, effects, may_lack_frequencies=True)
-    return _Given(prepared.board.name, prepared.board.title, prepared.card.sha256, (prepared,))
 
 
 def _names() -> list[str]:
@@ -179,55 +153,58 @@ def _names() -> list[str]:
     return [PLAN, *(f"{stem}.{ending}" for stem in (_GAINS, _BENCH, f"{_BENCH}-2") for ending in ("png", "svg"))]
 
 
-@dataclass(frozen=True)
-class _Asked:
-    """What a plan was asked for: see `plan`."""
+def _of_board(
+    prepared: Prepared,
+    goal: str | None,
+    between: Sequence[str] | None,
+    rng: np.random.Generator,
+    folder: Path | None,
+    progress: OnProgress,
+) -> Beliefs:
+    """What is believed of a board: from a search, from a finished one, or from the prior."""
+    board, prior = prepared.board, prepared.prior
+    if between is not None:
+        _require_possible(board, between)
+    stages = Stages(progress, _POSE + _SEARCH + _PLAN)
+    stages.begin("estimate", _POSE)
+    asks_of_effects = between is not None or goal == EXPLANATIONS
+    if not any(setup.readings or setup.peaks for setup in board.setups):
+        if asks_of_effects:
+            raise InputError(_untold("between" if between else "goal", "a board without any"))
+        return prior_beliefs(board, prior, rng)
+    try:
+        baseline = baseline_of(Problem(prepared).posed)
+    except NotIdentifiableError as error:
+        if asks_of_effects:
+            raise
+        return prior_beliefs(board, prior, rng, (f"planned from the prior alone: {error}",))
+    finished = None if folder is None or between else _finished(folder, prepared)
+    tried = between or (None if finished is None else sorted({name for one in finished.support for name in one}))
+    stages.begin("search for effects", _SEARCH)
+    _, searched = full_search(baseline, tried, stages.reached)
+    stages.begin("gains of further readings", _PLAN)
+    among = None
+    if between:
+        among = asked(searched, between)
+    elif finished is not None:
+        among = surviving(searched, finished.support, finished.none, finished.rivals)
+    return believed(searched, prior, rng, among)
 
-    goal: str | None
-    between: Sequence[str] | None
-    seed: int
-    out: Path | None
-    progress: OnProgress
 
-    def of_board(self, prepared: Prepared) -> Beliefs:
-        """What is believed of a board: from a search, from a finished one, or from the prior."""
-        board, prior, between = prepared.board, prepared.prior, self.between
-        if between is not None:
-            _require_possible(board, between)
-        rng, stages = stream(self.seed, BELIEFS), Stages(self.progress, _POSE + _SEARCH + _PLAN)
-        stages.begin("estimate", _POSE)
-        asks_of_effects = between is not None or self.goal == EXPLANATIONS
-        if not any(setup.readings or setup.peaks for setup in board.setups):
-            if asks_of_effects:
-                raise InputError(_untold("between" if between else "goal", "a board without any"))
-            return prior_beliefs(board, prior, rng)
-        try:
-            baseline = baseline_of(Problem(prepared).posed)
-        except NotIdentifiableError as error:
-            if asks_of_effects:
-                raise
-            return prior_beliefs(board, prior, rng, (f"planned from the prior alone: {error}",))
-        finished = None if self.out is None or between else _finished(self.out, prepared)
-        tried = between or (None if finished is None else sorted({name for one in finished.support for name in one}))
-        stages.begin("search for effects", _SEARCH)
-        _, searched = full_search(baseline, tried, stages.reached)
-        among = _among(searched, between, finished)
-        stages.begin("gains of further readings", _PLAN)
-        return believed(searched, prior, rng, among)
-
-    def of_campaign(self, given: _Given) -> Beliefs:
-        """What is believed of several boards and of what their card shares: effects are not searched for."""
-        if self.between is not None:
-            raise InputError(_untold("between", "a campaign"))
-        if self.goal == EXPLANATIONS:
-            wanted = "E_x, E_y, G_xy or constants for a campaign, or none for what its boards share"
-            raise InputError(Fault("goal", wanted, EXPLANATIONS, "plan one of its boards to tell explanations apart"))
-        stages = Stages(self.progress, _SEARCH + _PLAN)
-        stages.begin("boards of the campaign", _SEARCH)
-        boards = [one.board for one in given.boards]
-        beliefs = beliefs_together(boards, given.priors, given.shared, stages.reached)
-        stages.begin("gains of further readings", _PLAN)
-        return beliefs
+def _of_campaign(campaign: Campaign, goal: str | None, between: Sequence[str] | None, progress: OnProgress) -> Beliefs:
+    """What is believed of several boards and of what their card shares: effects are not searched for."""
+    if between is not None:
+        raise InputError(_untold("between", "a campaign"))
+    if goal == EXPLANATIONS:
+        wanted = "E_x, E_y, G_xy or constants for a campaign, or none for what its boards share"
+        raise InputError(Fault("goal", wanted, EXPLANATIONS, "plan one of its boards to tell explanations apart"))
+    stages = Stages(progress, _SEARCH + _PLAN)
+    stages.begin("boards of the campaign", _SEARCH)
+    boards = [one.prepared.board for one in campaign.problems]
+    priors = [one.prior for one in campaign.problems]
+    beliefs = beliefs_together(boards, priors, campaign.shared, stages.reached)
+    stages.begin("gains of further readings", _PLAN)
+    return beliefs
 
 
 def _untold(place: str, got: str) -> Fault:
@@ -273,13 +250,6 @@ def _finished(folder: Path, prepared: Prepared) -> _Finished | None:
     rivals = frozenset(members for members in support if members and set(members) <= set(listed))
     near = {one: p for one, p in support.items() if one and p > 0.0 and (WITHIN * p >= highest or one in rivals)}
     return _Finished(near, none, rivals) if near else None
-
-
-def _among(found: Found, between: Sequence[str] | None, finished: _Finished | None) -> tuple[Answer, ...] | None:
-    """The explanations to tell apart, if not those that survive the search at hand."""
-    if between:
-        return asked(found, between)
-    return None if finished is None else surviving(found, finished.support, finished.none, finished.rivals)
 
 
 def _write(made: Plan, drawn: Sequence[Bench], folder: Path, files: Sequence[Path]) -> None:

@@ -30,16 +30,7 @@ Card = str | os.PathLike[str] | Board
 
 @dataclass(frozen=True)
 class Prepared:
-    """A board, the cards that it names, and what its declared effects add to it.
-
-    Attributes
-    ----------
-    stated : Board
-        As its card states it, and the prior what the card does not: what to vary by `dataclasses.replace`. A board made
-        in Python is read from its own table.
-    board : Board
-        With the parameters of its declared effects, those that its sensors and its air imply included.
-    """
+    """The cards that a board names, the board as stated, and the board with the parameters of its declared effects."""
 
     named: NamedCards
     stated: Board
@@ -67,13 +58,7 @@ class Prepared:
 
 
 def default_folder(card: str | os.PathLike[str]) -> Path:
-    """Where the command line writes the results of a card unless it is told: results/NAME.
-
-    Raises
-    ------
-    InputError
-        If there is no shipped board or campaign of that name.
-    """
+    """Where the command line writes the results of a card unless it is told: results/NAME."""
     return Path("results") / find("campaigns" if is_campaign(card) else "boards", card).stem
 
 
@@ -87,19 +72,14 @@ def prepare(
 ) -> Prepared:
     """Read a board card and everything it names.
 
+    A board made in Python goes through its own card: what would be refused there is refused here, with the same places.
+
     Parameters
     ----------
-    card : str, path or Board
-        Name of a shipped card, or a path. A board goes through its own card: what would be refused there is refused
-        here, with the same places.
-    effects : sequence of str, optional
-        Declared effects in place of the card's.
-    prior : str, path or PriorCard, optional
-        In place of the prior that the card names.
+    effects, prior, setup
+        In place of what the card says: see `Problem.from_card`.
     may_lack_frequencies : bool
         Whether a board that was not measured yet will do.
-    setup : str or path, optional
-        A file with a table [setup] that takes the place of the card's, key by key: what `pick` writes.
 
     Raises
     ------

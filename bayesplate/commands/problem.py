@@ -18,7 +18,7 @@ from bayesplate.board.values import Key
 from bayesplate.commands.arguments import checked, or_none, read_prior
 from bayesplate.commands.options import CARD, Effects, Law, Robust, SetupFile
 from bayesplate.commands.prepare import Card, Prepared, prepare
-from bayesplate.errors import Fault, InputError
+from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.posing import PosedProblem, pose
@@ -270,6 +270,26 @@ class Problem:
         return found if np.ndim(theta) == 2 else found[0][()]
 
 
+def pose_all(problems: Sequence[Problem]) -> None:
+    """Solve boards around their estimates, so that what cannot be fitted is known before anything is sampled.
+
+    Raises
+    ------
+    NotIdentifiableError
+        With every board that leaves a constant open.
+    """
+    told = []
+    for problem in problems:
+        try:
+            _ = problem.posed
+        except NotIdentifiableError as error:
+            if len(problems) == 1:
+                raise
+            told.append(f"{problem.board.name}: {error}")
+    if told:
+        raise NotIdentifiableError("\n".join(told))
+
+
 def as_problem(
     given: Problem | Card,
     *,
@@ -277,8 +297,9 @@ def as_problem(
     law: LawName | None = None,
     robust: bool = False,
     setup: str | os.PathLike[str] | None = None,
+    may_lack_frequencies: bool = False,
 ) -> Problem:
-    """What a command was given, as a problem; the options are those of `Problem.from_card`.
+    """What a command was given, as a problem; the options are those of `Problem.from_card` and of `prepare`.
 
     Raises
     ------
@@ -286,7 +307,8 @@ def as_problem(
         If the card cannot be used, or a problem is given together with what it states itself.
     """
     if not isinstance(given, Problem):
-        return Problem(prepare(given, effects, setup=setup), law, robust)
+        prepared = prepare(given, effects, setup=setup, may_lack_frequencies=may_lack_frequencies)
+        return Problem(prepared, law, robust)
     told = {"effects": effects is not None, "law": law is not None, "robust": robust, "setup": setup is not None}
     if any(told.values()):
         stated = ", ".join(name for name, is_told in told.items() if is_told)

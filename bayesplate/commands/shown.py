@@ -25,7 +25,7 @@ from bayesplate.grading.tables import MOST_ON_TERMINAL, doubts_sentence, grading
 from bayesplate.planning.plan import Plan
 from bayesplate.planning.tables import plan_tables
 from bayesplate.posterior.convergence import Gate
-from bayesplate.posterior.sampling import Progress
+from bayesplate.posterior.sampling import Progress as Progress  # for the terminal, which sees the commands alone
 from bayesplate.results.checking import CheckReport
 from bayesplate.results.command_tables import (
     METHODS_REMARK,
@@ -36,28 +36,12 @@ from bayesplate.results.command_tables import (
     sheet_tables,
 )
 from bayesplate.results.comparison import Comparison
-from bayesplate.results.contract import json_text
+from bayesplate.results.contract import json_text as json_text
 from bayesplate.results.fit_tables import fitted_constants, modes_table, peaks_table
 from bayesplate.results.sheets import ModesReport
 from bayesplate.results.summary import Summary
 from bayesplate.results.tables import Table, notebook, render
 from bayesplate.results.words import percent, two_digits
-
-__all__ = [
-    "Progress",
-    "Shown",
-    "Table",
-    "json_text",
-    "progress_text",
-    "show_batch",
-    "show_check",
-    "show_compare",
-    "show_diagnosis",
-    "show_fit",
-    "show_modes",
-    "show_plan",
-]
-
 
 PLAN_REMARK = (
     "gain: nats, the drop of the doubt between explanations and the mean logarithm by which the intervals shrink, or "
@@ -90,17 +74,12 @@ class Shown:
 def show_check(report: CheckReport | CampaignCheck) -> Shown:
     """The report of `bayesplate.commands.check.check` for a person."""
     if isinstance(report, CampaignCheck):
-        return _show_campaign_check(report)
+        notes = tuple(f"{name}: {note}" for name, one in report.boards.items() for note in one.notes)
+        n_doubts = sum(one.n_doubts for one in report.boards.values())
+        closing = f"nothing was sampled. bayesplate check tells more of each board. {_next_after_check(n_doubts)}"
+        return Shown(campaign_check_tables(report), (), notes, closing)
     closing = f"{report.law} law; nothing was sampled. {_next_after_check(report.n_doubts)}"
     return Shown(check_tables(report), (*report.identifiability, report.invisible), report.notes, closing)
-
-
-def _show_campaign_check(report: CampaignCheck) -> Shown:
-    """The report of `bayesplate.commands.check.check` on a campaign for a person."""
-    notes = tuple(f"{name}: {note}" for name, one in report.boards.items() for note in one.notes)
-    n_doubts = sum(one.n_doubts for one in report.boards.values())
-    closing = f"nothing was sampled. bayesplate check tells more of each board. {_next_after_check(n_doubts)}"
-    return Shown(campaign_check_tables(report), (), notes, closing)
 
 
 def _next_after_check(n_doubts: int) -> str:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from bayesplate.board.material import MODULI, RIGIDITIES
-from bayesplate.results.contract import JOINT, Joint, Spread, as_json
+from bayesplate.results.contract import JOINT, Joint, Spread
 from bayesplate.results.summary import Summary
 
 FITTED = "fitted"
@@ -52,12 +52,8 @@ class BoardRow:
         Of the error; empty for a fitted board.
     doubt : str
         Why the constants of a fitted board are not to be trusted; empty where nothing speaks against them.
-    card_sha256 : str
-        Empty where no card could be read.
-    told : dict of str
-        Theory, law, effects and prior of a fitted board.
-    numbers : dict of float
-        Those of `NUMBERS` that a fitted board has.
+    told, numbers
+        By the names of `WORDS` and `NUMBERS`, of a fitted board.
     joint : Joint or None
         How its constants vary together.
     readings_sha256 : str
@@ -85,19 +81,6 @@ class BoardRow:
         told, numbers = self.told or {}, self.numbers or {}
         texts = [self.name, self.outcome, self.message, self.doubt, self.card_sha256, self.seed]
         return [*texts, *(told.get(word) for word in WORDS[len(texts) :]), *(numbers.get(name) for name in NUMBERS)]
-
-    def to_json(self) -> dict[str, Any]:
-        """The row as JSON keeps it between two runs."""
-        return as_json(self)
-
-    @classmethod
-    def from_json(cls, entry: Mapping[str, Any]) -> BoardRow:
-        """The row again, to the last bit."""
-        joint = entry["joint"]
-        if joint is not None:
-            rows = tuple(tuple(row) for row in joint["log_covariance"])
-            joint = Joint(tuple(joint["names"]), tuple(joint["log_mean"]), rows)
-        return cls(**{**entry, "joint": joint})
 
 
 def row_of(summary: Summary) -> BoardRow:
@@ -145,56 +128,21 @@ def _correlation(joint: Joint, a: str, b: str) -> float | None:
 _MOST_NAMED = 3
 
 
-def told_rows(rows: Sequence[BoardRow], place: Callable[[int], str]) -> Sequence[BoardRow]:
-    """Rows with their places in messages, and with a doubt where readings are alike.
-
-    Parameters
-    ----------
-    place : callable
-        Where the board of a row stands, "tops.csv row 3"; empty where its own file says so.
-
-    Returns
-    -------
-    sequence of BoardRow
-        Each is made when it is asked for.
-    """
-    places: dict[int, str] = {}
-    alike: dict[str, list[int]] = {}
-    for at, row in enumerate(rows):
-        if not row.is_fitted:
-            places[at] = place(at)
-        elif row.readings_sha256:
-            alike.setdefault(row.readings_sha256, []).append(at)
-    doubts = dict(_copies(rows, [group for group in alike.values() if len(group) > 1]))
-    return _Told(rows, places, doubts)
-
-
-def _copies(rows: Sequence[BoardRow], groups: Sequence[Sequence[int]]) -> Iterator[tuple[int, str]]:
-    for group in groups:
-        names = [rows[at].name for at in group]
-        for i, at in enumerate(group):
-            others = [*names[:i], *names[i + 1 :]]
+def with_copies_in_doubt(rows: Sequence[BoardRow]) -> list[BoardRow]:
+    """The rows; those of boards whose readings are alike to the last digit say so among their doubts."""
+    alike: dict[str, list[str]] = defaultdict(list)
+    for row in rows:
+        alike[row.readings_sha256].append(row.name)
+    found = []
+    for row in rows:
+        others = [name for name in alike[row.readings_sha256] if name != row.name] if row.readings_sha256 else []
+        if others:
             more = f" and {len(others) - _MOST_NAMED} more" if len(others) > _MOST_NAMED else ""
-            which = f"{', '.join(others[:_MOST_NAMED])}{more}"
-            yield at, f"every reading is that of {which} to the last digit: one board twice, or a copy?"
-
-
-@dataclass(frozen=True)
-class _Told(Sequence[BoardRow]):
-    rows: Sequence[BoardRow]
-    places: Mapping[int, str]
-    doubts: Mapping[int, str]
-
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    def __getitem__(self, at: Any) -> Any:
-        row, place = self.rows[at], self.places.get(at, "")
-        if place:
-            row = replace(row, message=f"{place} -> {row.message}")
-        if at in self.doubts:
-            row = replace(row, doubt="; ".join(one for one in (self.doubts[at], row.doubt) if one))
-        return row
+            which = ", ".join(others[:_MOST_NAMED]) + more
+            copied = f"every reading is that of {which} to the last digit: one board twice, or a copy?"
+            row = replace(row, doubt="; ".join(filter(None, (copied, row.doubt))))
+        found.append(row)
+    return found
 
 
 FORMAT = 1

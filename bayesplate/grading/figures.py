@@ -1,8 +1,8 @@
-"""What makers compute of a board as sums of logarithms, and the probability that such figures lie between limits."""
+"""Figures of makers as sums of logarithms of a board's constants, and the probability that they lie between limits."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,20 +15,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LogFigure:
-    """A product of powers of constants and density.
+    """A factor times powers of constants and density, by their names in `JOINT`.
 
     Attributes
     ----------
-    words : str
-        What it is.
-    powers : dict of float
-        Name of `JOINT` -> its power.
     unit : str
         As people write it.
     per_unit : float
         That unit in SI.
-    factor : float
-        What the product is multiplied by.
     """
 
     words: str
@@ -42,37 +36,15 @@ class LogFigure:
         """The powers in the order of `JOINT`: (7,) array."""
         return np.array([self.powers.get(name, 0.0) for name in JOINT])
 
-    def log(self, log_mean: Floats, triangles: Floats) -> tuple[Floats, Floats]:
-        """Mean and standard deviation of its logarithm, SI: (n,) arrays from (n, 7) and (n, 28) arrays."""
-        variance = covariance_along(self.direction[None], triangles)[:, 0, 0]
+    def log(self, log_mean: Floats, log_covariance: Floats) -> tuple[Floats, Floats]:
+        """Mean and standard deviation of its logarithm, SI: (n,) arrays from (n, 7) and (n, 7, 7) arrays."""
+        variance = covariance_along(self.direction[None], log_covariance)[:, 0, 0]
         return log_mean @ self.direction + np.log(self.factor), np.sqrt(np.maximum(variance, 0.0))
 
 
-_ROW, _COLUMN = np.triu_indices(len(JOINT))
-
-
-def triangle(log_covariance: Sequence[Sequence[float]]) -> list[float]:
-    """The upper triangle of a covariance of `JOINT`, row after row: 28 numbers say all of it."""
-    return [log_covariance[i][j] for i, j in zip(_ROW.tolist(), _COLUMN.tolist(), strict=True)]
-
-
-def covariance_along(directions: Floats, triangles: Floats) -> Floats:
-    """Covariance of some sums of logarithms.
-
-    Parameters
-    ----------
-    directions : (k, 7) array
-        Their coefficients.
-    triangles : (n, 28) array
-        Of each board's covariance.
-
-    Returns
-    -------
-    (n, k, k) array
-    """
-    product = directions[:, None, _ROW] * directions[None, :, _COLUMN]
-    both = np.where(_ROW == _COLUMN, product, product + product.swapaxes(0, 1))
-    return np.einsum("np,abp->nab", triangles, both)
+def covariance_along(directions: Floats, covariance: Floats) -> Floats:
+    """Covariance of sums with coefficients `directions`, (k, 7) array, of each board: (n, k, k) from (n, 7, 7)."""
+    return directions @ covariance @ directions.T
 
 
 def _along(axis: str) -> dict[str, LogFigure]:
@@ -105,15 +77,7 @@ FIGURES: Mapping[str, LogFigure] = {
 
 
 def target_thickness(rigidity: float) -> LogFigure:
-    """The thickness at which a board of the same constants has a rigidity along the grain.
-
-    D_x grows with the third power of the thickness: h_target = h (D_target / D_x)^(1/3).
-
-    Parameters
-    ----------
-    rigidity : float, N m
-        D_target.
-    """
+    """The thickness at which a board of the same constants has D_x = `rigidity` (N m): h (rigidity / D_x)^(1/3)."""
     powers = {**_THICKNESS, "D_x": -1.0 / 3.0}
     words = f"thickness for D_x = {rigidity:g} N m"
     return LogFigure(words, powers, "mm", 1e-3, (3.0 * rigidity) ** (1.0 / 3.0))
@@ -127,20 +91,17 @@ def limit_told(name: str, limit: tuple[float | None, float | None]) -> str:
     return f"{name} {ends} {figure.unit}".removesuffix(" 1")
 
 
-_N_POINTS = 1024
-_AT_ONCE = 8
-_PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37)
-MOST = len(_PRIMES) + 1
-"""Numbers that may be limited together."""
+_LOG2_POINTS = 10
+_AT_ONCE = 256
+"""Boards that are integrated together, so that the memory hardly grows with their number."""
 _RIDGE = 1e-12
-"""Share of a variance that is added to it, so that numbers that follow from one another are no obstacle."""
+"""Share of a variance that is added to it, so that figures that follow from one another are no obstacle."""
 
 
 def box_probability(mean: Floats, covariance: Floats, low: Floats, high: Floats) -> Floats:
-    """Probability of low <= x <= high in every component.
+    """Probability of low <= x <= high in every component of a normal distribution, to 1e-3 with three components.
 
-    The components are taken one after the other, each given those before it, at the points of a lattice in the unit
-    cube: with three of them the result errs by less than 1e-3.
+    The components are taken one after the other, each given those before it, at Sobol points of the unit cube.
 
     Parameters
     ----------
@@ -157,39 +118,29 @@ def box_probability(mean: Floats, covariance: Floats, low: Floats, high: Floats)
     ----------
     Genz, "Numerical computation of multivariate normal probabilities", J. Comp. Graph. Stat. 1, 1992, 141.
     """
-    found = np.empty(len(mean))
-    for start in range(0, len(mean), _AT_ONCE):
-        some = slice(start, start + _AT_ONCE)
-        found[some] = _some(low - mean[some], high - mean[some], covariance[some])
-    return found
+    starts = range(0, len(mean), _AT_ONCE)
+    parts = (slice(start, start + _AT_ONCE) for start in starts)
+    return np.concatenate([np.empty(0), *(_some(low - mean[p], high - mean[p], covariance[p]) for p in parts)])
 
 
 def _some(low: Floats, high: Floats, covariance: Floats) -> Floats:
-    """The same of a few, limits less means: (n, k) arrays."""
+    """The same of a few boards, from limits less means: (n, k) arrays."""
     from scipy.special import ndtr, ndtri
+    from scipy.stats.qmc import Sobol
 
     n, k = low.shape
     scale = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 1e-24))
     low, high = low / scale, high / scale
     correlation = covariance / (scale[:, :, None] * scale[:, None, :])
     root = np.linalg.cholesky(correlation + _RIDGE * k * np.eye(k))
-    points = _lattice(k - 1)
-    given = np.zeros((n, k, points.shape[0]))
-    product = np.ones((n, points.shape[0]))
+    points = Sobol(k, scramble=False).random_base2(_LOG2_POINTS) + 0.5**_LOG2_POINTS / 2.0
+    given = np.zeros((n, k, len(points)))
+    product = np.ones((n, len(points)))
     for i in range(k):
         before = np.einsum("nj,njp->np", root[:, i, :i], given[:, :i])
         own = root[:, i, i, None]
         below, above = ndtr((low[:, i, None] - before) / own), ndtr((high[:, i, None] - before) / own)
         width = np.maximum(above - below, 0.0)
         product *= width
-        if i < k - 1:
-            inside = np.clip(below + points[:, i] * width, 1e-300, 1.0 - 1e-16)
-            given[:, i] = ndtri(inside)
+        given[:, i] = ndtri(np.clip(below + points[:, i] * width, 1e-300, 1.0 - 1e-16))
     return np.asarray(product.mean(axis=1))
-
-
-def _lattice(k: int) -> Floats:
-    """Points that fill the unit cube evenly: (n_points, k) array."""
-    steps = np.sqrt(np.array(_PRIMES[:k], dtype=float))
-    at = np.mod(np.outer(np.arange(1, _N_POINTS + 1), steps) + 0.5 * steps, 1.0)
-    return np.abs(2.0 * at - 1.0) if k else np.zeros((1, 0))

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 
 from bayesplate.board.material import MODULI
-from bayesplate.files import whole_file, writing
+from bayesplate.files import write_text
 from bayesplate.grading.figures import FIGURES, LogFigure, limit_told
 from bayesplate.grading.matching import Grading
-from bayesplate.grading.storage import write_rows
-from bayesplate.results.tables import Cell, Row, Table
+from bayesplate.results.tables import Cell, Row, Table, csv_text
 from bayesplate.results.words import Value, percent
 
 GRADING = "grading.csv"
 MOST_LISTED, MOST_ON_TERMINAL = 100, 20
 """Boards that a table for people has; all of them are in grading.csv."""
 _MARK = "?"
-_AT_ONCE = 256
-"""Boards whose figures are computed together."""
 
 
 def best_first(graded: Grading) -> list[int]:
@@ -32,13 +28,7 @@ def best_first(graded: Grading) -> list[int]:
 
 
 def grading_tables(graded: Grading, most: int = MOST_LISTED) -> dict[str, Table]:
-    """The tables for people, by what they hold, from "constants" to "doubts"; none that would be empty.
-
-    Parameters
-    ----------
-    most : int
-        Boards, or pairs, in each.
-    """
+    """The tables for people, with at most so many boards or pairs, by what they hold; none that would be empty."""
     if not graded.names:
         return {}
     order = best_first(graded)
@@ -96,7 +86,7 @@ def _head(name: str, figure: LogFigure) -> str:
 
 def _column(graded: Grading, some: list[int], figure: LogFigure) -> list[Value]:
     middle = graded.spread(figure, some)[0]
-    sd = figure.log(graded.log_mean[some], graded.triangles[some])[1]
+    sd = graded.log(figure, some)[1]
     return [Value(float(one), float(one * share)) for one, share in zip(middle, sd, strict=True)]
 
 
@@ -122,37 +112,25 @@ def _pairs_table(graded: Grading, most: int) -> Table:
 
 def _apart(graded: Grading, first: int, second: int, name: str) -> str:
     """By how much a constant of the second board differs from the first one's, with the standard deviation."""
-    both = [first, second]
-    mean, sd = FIGURES[name].log(graded.log_mean[both], graded.triangles[both])
+    mean, sd = graded.log(FIGURES[name], [first, second])
     ratio = math.exp(mean[1] - mean[0])
     return f"{100.0 * (ratio - 1.0):+.0f} ± {100.0 * ratio * math.hypot(*sd):.0f} %"
 
 
-def write_grading(folder: Path, graded: Grading) -> Path:
-    """Write the table of the grading, SI units, completely or not at all."""
-    path = folder / GRADING
-    with writing(path), whole_file(path) as stream:
-        write_rows(stream, _header(graded), _rows(graded))
-    return path
-
-
-def _header(graded: Grading) -> list[Cell]:
-    figures = (*MODULI, *graded.request.figures)
-    limits = (f"probability_{name}" for name in graded.meets)
-    whole = [] if graded.meets_all is None else ["probability_all_limits"]
-    ends = (f"{name}_{end}" for name in figures for end in ("q50", "q05", "q95"))
-    return ["name", *ends, *limits, *whole, "partner", "probability_of_match", "doubt"]
-
-
-def _rows(graded: Grading) -> Iterator[list[Cell]]:
-    figures = [*(FIGURES[name] for name in MODULI), *graded.request.figures.values()]
-    partner, probability = graded.partners
-    for start in range(0, len(graded.names), _AT_ONCE):
-        places = range(start, min(start + _AT_ONCE, len(graded.names)))
-        spreads = [end * one.per_unit for one in figures for end in graded.spread(one, places)]
-        for i in places:
-            numbers = [float(end[i - start]) for end in spreads]
-            limits = [float(one[i]) for one in graded.meets.values()]
-            whole = [] if graded.meets_all is None else [float(graded.meets_all[i])]
-            match = [None, None] if partner[i] < 0 else [graded.names[partner[i]], float(probability[i])]
-            yield [graded.names[i], *numbers, *limits, *whole, *match, graded.doubts[i]]
+def write_grading(folder: Path, graded: Grading) -> None:
+    """Write grading.csv, SI units."""
+    figures = {**{name: FIGURES[name] for name in MODULI}, **graded.request.figures}
+    columns: dict[str, list[Cell]] = {"name": list(graded.names)}
+    for name, figure in figures.items():
+        for end, values in zip(("q50", "q05", "q95"), graded.spread(figure), strict=True):
+            columns[f"{name}_{end}"] = (values * figure.per_unit).tolist()
+    for name, probability in graded.meets.items():
+        columns[f"probability_{name}"] = probability.tolist()
+    if graded.meets_all is not None:
+        columns["probability_all_limits"] = graded.meets_all.tolist()
+    partners = graded.partners
+    matches = [partners.get(i, (None, None)) for i in range(len(graded.names))]
+    columns["partner"] = [None if partner is None else graded.names[partner] for partner, _ in matches]
+    columns["probability_of_match"] = [probability for _, probability in matches]
+    columns["doubt"] = list(graded.doubts)
+    write_text(folder / GRADING, csv_text(list(columns), list(zip(*columns.values(), strict=True))))

@@ -189,7 +189,7 @@ def pairs_picture(graded: Grading) -> Picture:
     for row, pair in enumerate(shown):
         at = [pair.first, pair.second]
         for step, name in zip(np.linspace(-0.22, 0.22, len(names)), names, strict=True):
-            mean, sd = FIGURES[name].log(graded.log_mean[at], graded.triangles[at])
+            mean, sd = graded.log(FIGURES[name], at)
             apart, spread = float(mean[1] - mean[0]), NINETY * float(np.sqrt((sd**2).sum()))
             ends = 100.0 * np.expm1(apart + spread * np.array([-1.0, 0.0, 1.0]))
             whisker(panel, row + step, tuple(ends), *_STYLES[name])

@@ -127,8 +127,8 @@ def read_boards(content: str | bytes) -> None:
     path = written("boards.csv", content)
 
     def read() -> Any:
-        boards = boards_of(path, BENCH["folder"] / "template.toml")
-        return [accepted_or_refused(lambda at=at: boards.card(at)) for at in range(len(boards.names))]
+        boards, _ = boards_of(path, BENCH["folder"] / "template.toml")
+        return [accepted_or_refused(board.card) for board in boards]
 
     accepted_or_refused(read, BENCH["folder"])
 
@@ -138,8 +138,7 @@ def read_folder(content: str | bytes) -> None:
     written("fragment.toml", content)
 
     def read() -> Any:
-        boards = boards_of(BENCH["folder"], None)
-        return [accepted_or_refused(lambda at=at: boards.card(at)) for at in range(len(boards.names))]
+        return [accepted_or_refused(board.card) for board in boards_of(BENCH["folder"], None)[0]]
 
     accepted_or_refused(read, BENCH["folder"])
 
@@ -192,8 +191,8 @@ def test_what_is_spoilt_here_was_sound():
     whole, _ = merged(table, "board.toml", written("fragment.toml", FRAGMENT))
     assert len(Board.from_text(toml_text(whole), BOARD).setups[0].readings) == 1
     assert load_campaign(written("together.toml", CAMPAIGN)).name == "together"
-    boards = boards_of(written("boards.csv", ROWS), BENCH["folder"] / "template.toml")
-    assert [boards.card(at).name for at in range(len(boards.names))] == ["a", "b"]
+    boards, _ = boards_of(written("boards.csv", ROWS), BENCH["folder"] / "template.toml")
+    assert [board.card().name for board in boards] == ["a", "b"]
 
 
 HUGE = "0x" + "f" * 5000
@@ -205,10 +204,10 @@ def test_a_huge_number_in_one_card_stops_no_batch(tmp_path):
     for name, length in (("a", "253"), ("b", HUGE), ("c", "9" * 400)):
         text = CARD.replace(BOARD, name).replace("length_x_mm = 253", f"length_x_mm = {length}")
         (tmp_path / f"{name}.toml").write_text(text)
-    boards = boards_of(tmp_path, None)
-    found = [accepted_or_refused(lambda at=at: boards.card(at)) for at in range(len(boards.names))]
+    boards, _ = boards_of(tmp_path, None)
+    found = [accepted_or_refused(board.card) for board in boards]
 
-    assert list(boards.names) == ["a", "b", "c"]
+    assert [board.name for board in boards] == ["a", "b", "c"]
     assert [isinstance(one, InputError) for one in found] == [False, True, True]
 
 
@@ -218,11 +217,11 @@ def test_a_huge_number_beside_a_fragment_or_a_table_is_a_fault_of_its_key(tmp_pa
     (tmp_path / "fragment.toml").write_text(FRAGMENT)
     (tmp_path / "template.toml").write_text(TEMPLATE.replace("length_x_mm = 253", f"length_x_mm = {HUGE}"))
     (tmp_path / "boards.csv").write_text(ROWS)
-    boards = boards_of(tmp_path / "boards.csv", tmp_path / "template.toml")
+    boards, _ = boards_of(tmp_path / "boards.csv", tmp_path / "template.toml")
 
     for read in (
         lambda: Board.from_card(CardFile(table, f"{BOARD}.toml"), setup=tmp_path / "fragment.toml"),
-        lambda: boards.card(0),
+        lambda: boards[0].card(),
     ):
         with pytest.raises(InputError, match=r"length_x_mm: wanted a number from .*, got a whole number of 20000 bits"):
             read()

@@ -6,7 +6,7 @@ import pytest
 from made_campaigns import write_campaign
 
 import bayesplate
-from bayesplate.commands import campaign_result
+from bayesplate.commands.fitting import FitResult
 
 
 @pytest.fixture(scope="package")
@@ -24,11 +24,11 @@ def campaign(card):
 @pytest.fixture(scope="package")
 def fitted_campaign(card, campaign):
     """Its fit, with files; the page of a board is that of its fit, and written whole for the first one only."""
-    whole = campaign_result.write_page
+    whole = FitResult.write_page
 
-    def first_whole(folder, result):
-        return whole(folder, result) if folder.name == "board-0" else (folder / "report.html").write_text("a page")
+    def first_whole(result, folder):
+        return whole(result, folder) if folder.name == "board-0" else (folder / "report.html").write_text("a page")
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(campaign_result, "write_page", first_whole)
+        patch.setattr(FitResult, "write_page", first_whole)
         return bayesplate.fit(campaign, out=card.parent / "out")

@@ -15,7 +15,7 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.campaign.boards import Member
 from bayesplate.campaign.pulls import Pull
 from bayesplate.campaign.shared import Shared
-from bayesplate.commands.campaign_check import expected_sds
+from bayesplate.commands.check import expected_sds
 from bayesplate.errors import InputError
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.results.folder import OutputFolder

@@ -17,7 +17,7 @@ from bayesplate.campaign.likelihood import moments
 from bayesplate.campaign.scatter import scatters_of
 from bayesplate.commands.campaign_diagnose import _without_shared
 from bayesplate.commands.campaign_fit import fit_boards
-from bayesplate.commands.stages import Stages
+from bayesplate.commands.fitting import Run
 from bayesplate.posterior.sampling import SamplerSettings, sample
 
 SHARED = "attached_mass.mass"
@@ -157,7 +157,7 @@ def test_the_truth_is_inside_and_sharing_narrows(fitted_campaign):
 
 
 def test_a_sensor_on_all_boards_is_claimed_from_those_left_out(campaign, fitted_campaign):
-    before = fit_boards(_without_shared(campaign), 1, None, Stages(None, 1.0))
+    before = fit_boards(_without_shared(campaign), Run())
     members = {name: Member(one.inference, one.draws, ()) for name, one in before.items()}
     taught = taught_boards(fitted_campaign.learnt, members, 1)
 

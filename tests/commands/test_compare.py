@@ -30,10 +30,6 @@ PAPER_FE = {
     "finnish-spruce-cantilever": {"(1,0)": 51, "(1,1)": 100, "(2,0)": 315, "(1,2)": 336, "(2,1)": 394, "(2,2)": 629},
     "fiemme-spruce-clamped": {"(0,0)": 56, "(0,1)": 98, "(1,0)": 130, "(1,1)": 161, "(0,2)": 169, "(1,2)": 221},
 }
-PERCENTILE = {
-    "finnish-spruce-cantilever": {"E_x": 13.0e9, "E_y": 702e6, "G_xy": 668e6},
-    "fiemme-spruce-clamped": {"E_x": 10.4e9, "E_y": 1003e6, "G_xy": 530e6},
-}
 
 
 @pytest.fixture(scope="session")
@@ -83,15 +79,6 @@ def test_every_method_stands_under_both_theories(comparisons, card):
                 assert entry["mean"] > 0
                 assert (entry["sd"] is not None) == (one["name"] != "paper_least_squares")
                 assert (entry["q05"] is not None) == one["name"].endswith("_posterior")
-
-
-@pytest.mark.parametrize("card", EXPECTED)
-def test_the_percentile_method_is_the_printed_one(comparisons, card):
-    """The printed means, to the last digit or the 0.3 % that 310 for 311 Hz makes."""
-    elastic = method(comparisons[card]["theories"][0], "percentile")["elastic"]
-
-    for name, printed in PERCENTILE[card].items():
-        assert elastic[name]["mean"] == pytest.approx(printed, rel=0.008)
 
 
 @pytest.mark.parametrize("card", EXPECTED)

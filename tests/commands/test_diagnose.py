@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Sequence
 from functools import partial
 from itertools import combinations
@@ -18,10 +17,7 @@ from runs import files_in, read_json
 from bayesplate.cli import main
 from bayesplate.commands.check import check
 from bayesplate.commands.diagnose import diagnose as run_diagnose
-from bayesplate.commands.fit import fit
 from bayesplate.diagnosis.joint import full_search
-from bayesplate.errors import InputError
-from bayesplate.posterior.checkpoint import CHAINS
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.results.folder import OutputFolder
@@ -56,7 +52,7 @@ def quickly(patch: pytest.MonkeyPatch, *, page: bool = False) -> None:
     patch.setattr("bayesplate.commands.fitting.SamplerSettings", partial(SamplerSettings, gate=LOOSE_GATE))
     patch.setattr("bayesplate.commands.diagnose.full_search", partial(full_search, tried=TRIED))
     if not page:
-        patch.setattr("bayesplate.commands.diagnose.write_page", lambda *_: None)
+        patch.setattr("bayesplate.commands.fitting.FitResult.write_page", lambda *_: None)
 
 
 @pytest.fixture
@@ -224,7 +220,6 @@ def test_what_somebody_else_keeps_in_before_stays(tmp_path, has_notes):
     ("arguments", "code"),
     [
         (("no-such-board",), 3),
-        ((CALM, "--effects", "no_such_effect"), 3),
         ((CALM, "--force", "--resume"), 2),
     ],
 )
@@ -233,14 +228,6 @@ def test_refused_input_leaves_no_folder(tmp_path, arguments, code):
     assert run.exit_code == code
     assert not run.folder.exists()
     assert "Traceback" not in run.stderr
-
-
-@pytest.mark.parametrize("command", [run_diagnose, fit])
-def test_settings_that_cannot_be_sampled_leave_no_folder(tmp_path, command):
-    """Fit and diagnose open their folder in one way: after everything that may be refused."""
-    with pytest.raises(InputError, match="seed"):
-        command(CALM, out=tmp_path / "out", seed=-1)
-    assert not (tmp_path / "out").exists()
 
 
 def card_of_few(folder: Path, board: str, labels: Sequence[str]) -> str:
@@ -290,7 +277,8 @@ def test_there_is_nothing_to_resume(tmp_path):
     assert "none to resume" in run.stderr
 
 
-@pytest.mark.parametrize("place", [pytest.param("full_search", marks=pytest.mark.slow), "diagnosis_of"])
+@pytest.mark.slow
+@pytest.mark.parametrize("place", ["full_search", "diagnosis_of"])
 def test_an_interrupted_diagnosis_resumes_to_the_same_bytes(tmp_path, quick, monkeypatch, with_shear, place):
     """Stopped after the first fit, and after both; what is computed between the two is of the resumed run."""
 
@@ -310,38 +298,6 @@ def test_an_interrupted_diagnosis_resumes_to_the_same_bytes(tmp_path, quick, mon
     resumed = diagnose(tmp_path / "out", WITH_SHEAR, "--resume", "--quiet")
     assert resumed.exit_code == 0, resumed.stderr
     assert resumed.files == with_shear.files
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_while_sampling_is_heeded_and_the_run_resumes(tmp_path, stop):
-    """The whole of it, all candidates, in a process of its own."""
-    import os
-    import subprocess
-    import sys
-    import time
-
-    def heed_interrupts() -> None:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-    folder = tmp_path / "out"
-    program = [sys.executable, "-m", "bayesplate", "diagnose", CALM, "--out", str(folder), "--quiet"]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    with subprocess.Popen(program, **pipes, text=True, env=dict(os.environ), preexec_fn=heed_interrupts) as process:
-        chains = folder / "checkpoint" / "before" / "linear" / CHAINS
-        deadline = time.monotonic() + 120
-        while not chains.exists() and process.poll() is None:
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
-        process.send_signal(stop)
-        _, stderr = process.communicate(timeout=120)
-    assert process.returncode == 130
-    assert stderr == "interrupted; --resume continues from the last checkpoint\n"
-    assert not (FIT | {"diagnosis.json"}) & set(files_in(folder))
-
-    assert diagnose(folder, CALM, "--resume", "--quiet").exit_code == 0
-    whole = diagnose(tmp_path / "whole", CALM, "--quiet")
-    assert files_in(folder) == whole.files
 
 
 def test_a_mode_that_alone_carries_a_constant_counts_in_no_error_of_a_diagnosis(tmp_path, quick):

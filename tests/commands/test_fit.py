@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -36,21 +35,6 @@ def summaries(fiemme: bayesplate.FitResult, finnish: Run, free: Run) -> dict[str
 def _text(result: bayesplate.FitResult) -> str:
     assert result.folder is not None
     return (result.folder / "summary.json").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize("board", ["fiemme", "finnish", "free"])
-def test_errors_belong_to_the_predictions_beside_them(summaries, board):
-    """Every number of the modes by hand from the measured and the predicted frequency; their rms is the error."""
-    summary = summaries[board]
-    for mode in summary["modes"]:
-        measured, predicted = mode["measured_hz"], mode["predicted_hz"]
-        ends = [1200 * np.log2(measured / predicted[end]) for end in ("q95", "q05")]
-        assert mode["residual_cents"] == pytest.approx(1200 * np.log2(measured / predicted["mean"]), abs=1e-9)
-        assert mode["residual_interval_cents"] == pytest.approx(ends, abs=1e-9)
-        half = [1200 * np.log2(1 + sign * 0.5 / measured) for sign in (-1, 1)]
-        assert mode["rounding_cents"] == (None if board == "free" else pytest.approx(half, abs=1e-9))
-    squares = [mode["residual_cents"] ** 2 for mode in summary["modes"]]
-    assert summary["error"]["in_sample_rms_cents"] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-12)
 
 
 @pytest.mark.parametrize("board", ["fiemme", "finnish", "free"])
@@ -169,18 +153,6 @@ def test_the_archive_of_a_board_with_peaks_holds_what_each_factor_says(free):
     assert group["factor"].values.tolist() == ["free peaks"]
 
 
-def test_peaks_narrow_the_constants(tmp_path):
-    """Sixteen peaks in place of nine labels: at the expected noise the constants are known better."""
-    shipped = shelf_folder("boards") / "spruce-free-2R.toml"
-    text = shipped.read_text(encoding="utf-8")
-    without = tmp_path / "spruce-free-2R.toml"
-    without.write_text(re.sub(r"\[\[setup\.peaks\]\]\n(.+\n)+", "", text), encoding="utf-8")
-    noise_alone = [bayesplate.Problem.from_card(card, effects=[]).posed.identifiability for card in (shipped, without)]
-    shrunk = noise_alone[0].standard_errors / noise_alone[1].standard_errors
-    assert (shrunk < 0.95).all()
-    assert shrunk[0] < 0.7  # bending along the grain, which the bare peaks are mostly
-
-
 @pytest.fixture(scope="module")
 def archive(fiemme: bayesplate.FitResult) -> Any:
     assert fiemme.folder is not None
@@ -204,21 +176,6 @@ def test_the_archive_opens_in_arviz_with_its_five_groups(archive, fiemme):
     assert {"lp", "tau", "rhat", "ess"} <= set(archive["sample_stats"].data_vars)
     for name, entry in fiemme.summary.elastic.items():
         assert float(posterior[name].mean()) == pytest.approx(entry.mean, rel=1e-12)
-
-
-def test_a_chain_is_an_ensemble_walker_after_walker(archive, fiemme):
-    """The first draws of a chain are the kept steps of its first walker; then come those of the second."""
-    chains, tau = fiemme.inference.chains, fiemme.inference.convergence.tau_max
-    n_steps = chains.draws.shape[1]
-    every = max(int(tau / 2), -(-(n_steps - chains.burn_in) // (4000 // 32)))  # at most 4000 draws a chain
-    log_D_x = np.log(archive["posterior"]["D_x"].values)
-    n_kept = len(range(chains.burn_in, n_steps, every))
-
-    assert log_D_x.shape == (4, 32 * n_kept)
-    for ensemble, walker in ((0, 0), (0, 1), (3, 31)):
-        expected = chains.draws[ensemble, chains.burn_in :: every, walker, 0]
-        found = log_D_x[ensemble, walker * n_kept : (walker + 1) * n_kept]
-        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
 
 def test_sample_stats_are_our_own(archive, summaries):

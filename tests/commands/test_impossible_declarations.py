@@ -15,7 +15,6 @@ Change = tuple[str, str]
 
 FREE = 'edges = { x0 = "free", x1 = "free", y0 = "free", y1 = "free" }'
 CANTILEVER = (FREE, 'edges = { x0 = "clamped", x1 = "free", y0 = "free", y1 = "free" }')
-SUPPORTED = (FREE, FREE.replace("free", "supported"))
 CLAMPED = (FREE, FREE.replace("free", "clamped"))
 CLAMPED_LABEL = ('"(1,1)" = 150', '"(0,0)" = 900')
 PLACE = "at_mm = [200, 20]"
@@ -57,26 +56,12 @@ TOO_HEAVY = "my-board.toml [setup] attached 1 mass_g: wanted less than the board
 VACUUM = "wanted a positive number, got {} (air at the ground is 1.2 kg/m3, water is 997)"
 
 CASES: dict[str, tuple[list[Change], list[str]]] = {
-    "a clamp that turns on a free board": (
-        [declaring("clamp_rotation")], [refused("clamp_rotation", NO_CLAMP)],
-    ),
-    "a clamp that turns on a hinged board": (
-        [declaring("clamp_rotation"), SUPPORTED, CLAMPED_LABEL], [refused("clamp_rotation", NO_CLAMP)],
-    ),
-    "a clamp that gives way on a free board": (
-        [declaring("clamp_translation")], [refused("clamp_translation", NO_CLAMP)],
-    ),
-    "a frame around a free board": ([declaring("support_mass")], [refused("support_mass", NO_FRAME)]),
+    "a clamp that turns on a free board": ([declaring("clamp_rotation")], [refused("clamp_rotation", NO_CLAMP)]),
     "a frame around a cantilever": ([declaring("support_mass"), CANTILEVER], [refused("support_mass", NO_FRAME)]),
-    "tension in a free board": ([declaring("membrane_tension")], [refused("membrane_tension", NO_PULL)]),
-    "tension in a cantilever": (
-        [declaring("membrane_tension"), CANTILEVER], [refused("membrane_tension", NO_PULL)],
-    ),
     "foam under a clamped board": (
         [declaring("support_stiffness"), CLAMPED, CLAMPED_LABEL],
         [refused("support_stiffness", "an edge is held, so the board does not lie or hang on anything else")],
     ),
-    "an outline that was not read": ([declaring("outline_profile")], [refused("outline_profile", NO_WIDTHS)]),
     "an outline between clamps": (
         [declaring("outline_profile"), WIDTHS, CLAMPED, CLAMPED_LABEL],
         [refused("outline_profile", "neither y0 nor y1 is free, and a held edge is straight")],
@@ -89,30 +74,13 @@ CASES: dict[str, tuple[list[Change], list[str]]] = {
         [declaring("attached_mass"), NO_ITEM],
         [refused("attached_mass", "no [[setup.attached]] says what is fixed to the board and where")],
     ),
-    "a sensor off the board": ([(PLACE, "at_mm = [300, 20]")], [OFF_BOARD]),
-    "a sensor heavier than the board": ([item("mass_g = 50")], [TOO_HEAVY]),
     "a sensor that weighs less than nothing": (
         [item("mass_g = -0.6")], ["my-board.toml [setup] attached 1 mass_g: wanted a positive number, got -0.6"],
-    ),
-    "a heavy sensor of stated mass that roved": (
-        [(PLACE, "at_mm = [[200, 20], [20, 20]]\nmass_g = 3")],
-        [f"my-board.toml [setup]: wanted a setup in which attached_mass can act, got {ROVED}"],
     ),
     "a sensor of unknown mass that roved over a light board": (
         [declaring("attached_mass"), (PLACE, "at_mm = [[200, 20], [20, 20]]")], [refused("attached_mass", ROVED)],
     ),
-    "air lighter than nothing": (
-        [air("density_kg_m3 = -1.2")], ["my-board.toml [setup] fluid.density_kg_m3: " + VACUUM.format("-1.2")],
-    ),
     "no air": ([air("density_kg_m3 = 0")], ["my-board.toml [setup] fluid.density_kg_m3: " + VACUUM.format("0")]),
-    "half a baffle": (
-        [air('baffle = "half"')], ['my-board.toml [setup] fluid.baffle: wanted "none" or "full", got "half"'],
-    ),
-    "shear moduli below nothing": (
-        [declaring("transverse_shear"), ("poisson_xy = 0.4", "poisson_xy = 0.4\nshear_xz_gpa = -1\nshear_yz_gpa = 0")],
-        ["my-board.toml [material] shear_xz_gpa: wanted a positive number, got -1",
-         "my-board.toml [material] shear_yz_gpa: wanted a positive number, got 0"],
-    ),
     "a clamp on a free edge": (
         [("[setup.frequencies_hz]", "clamped_mm = { x0 = 30 }\n[setup.frequencies_hz]")],
         ["my-board.toml [setup] clamped_mm.x0: wanted a clamped edge, got a free one"],
@@ -142,15 +110,6 @@ def test_refused_with_the_reason(case):
     assert result.stderr.splitlines() == lines
     assert result.stdout == ""
     assert [path.name for path in Path().iterdir()] == ["my-board.toml"]
-
-
-def test_checked_and_fitted_alike():
-    """The longest list, by both commands and as JSON."""
-    changes, lines = CASES["all at once"]
-    Path("my-board.toml").write_text(spoiled(*changes), encoding="utf-8")
-
-    for command in ("check", "fit"):
-        assert_refused(command, "my-board.toml", lines)
 
 
 def test_the_same_by_the_option():
@@ -189,7 +148,6 @@ def test_a_setup_whose_own_statement_cannot_be_computed_is_not_passed_over():
     ("effect", "changes"),
     [
         ("clamp_rotation", [CANTILEVER]),
-        ("support_mass", [CLAMPED, CLAMPED_LABEL]),
         ("membrane_tension", [CLAMPED, CLAMPED_LABEL]),
         ("attached_mass", []),
         ("outline_profile", [WIDTHS]),
@@ -204,9 +162,9 @@ def test_the_possible_is_not_refused(effect, changes):
     assert [one.name for one in system_of(board, board.setups[0]).effects] == [effect]
 
 
-@pytest.mark.parametrize(("mass", "is_rough"), [(0.05, False), (0.081, False), (0.083, True), (0.3, True)])
+@pytest.mark.parametrize(("mass", "is_rough"), [(0.081, False), (0.083, True), (0.81, True)])
 def test_what_roved_is_said_to_be_rough(mass, is_rough):
-    """From 0.2 % of the board of 41 g on, 0.082 g."""
+    """From 0.2 % of the board of 41 g on, 0.082 g; above 2 % it is refused."""
     Path("my-board.toml").write_text(
         spoiled((PLACE, f"at_mm = [[200, 20], [20, 20]]\nmass_g = {mass}")), encoding="utf-8"
     )
@@ -214,16 +172,6 @@ def test_what_roved_is_said_to_be_rough(mass, is_rough):
 
     assert len(said) == is_rough
     assert not is_rough or f"weighs {100.0 * mass / 41.0:.1f} % of the board" in said[0]
-
-
-@pytest.mark.parametrize(("mass", "is_refused"), [(0.81, False), (0.83, True)])
-def test_what_roved_may_weigh_two_percent_of_the_board(mass, is_refused):
-    """Of 41 g: 0.82 g."""
-    Path("my-board.toml").write_text(
-        spoiled((PLACE, f"at_mm = [[200, 20], [20, 20]]\nmass_g = {mass}")), encoding="utf-8"
-    )
-    if not is_refused:
-        assert prepare("my-board.toml").board.effects == ("attached_mass",)
-        return
+    Path("my-board.toml").write_text(spoiled((PLACE, "at_mm = [[200, 20], [20, 20]]\nmass_g = 0.83")))
     with pytest.raises(InputError, match="above 2% of the board roved"):
         prepare("my-board.toml")

@@ -18,8 +18,8 @@ from made_campaigns import MASS, write_campaign
 from runs import files_in
 
 from bayesplate.cli import main
-from bayesplate.commands import campaign_fit
-from bayesplate.commands.stages import Stages
+from bayesplate.commands.campaign_fit import fit_boards
+from bayesplate.commands.fitting import Run
 from bayesplate.errors import InputError
 from bayesplate.locks import take
 from bayesplate.posterior import checkpoint
@@ -83,14 +83,14 @@ def moments(n: int, n_of: int, seed: int) -> list[int]:
     return [int(rng.integers(first, last)) + 1 for first, last in pairwise(ends)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "n"),
     [
-        ("fit", 2),
-        pytest.param("fit and report", 20, marks=pytest.mark.slow),
-        pytest.param("diagnose", 20, marks=pytest.mark.slow),
-        pytest.param("batch", 20, marks=pytest.mark.slow),
-        pytest.param("campaign", 20, marks=pytest.mark.slow),
+        ("fit and report", 20),
+        ("diagnose", 20),
+        ("batch", 20),
+        ("campaign", 20),
     ],
     indirect=["arguments"],
 )
@@ -189,15 +189,11 @@ def test_force_lays_aside_what_a_campaign_left_of_each_board_and_nothing_else(tm
     assert files_in(folder.path) == before
 
 
-def test_a_board_of_a_campaign_may_have_the_name_of_a_file_of_the_checkpoint(tmp_path, monkeypatch):
+def test_a_board_of_a_campaign_may_have_the_name_of_a_file_of_the_checkpoint(monkeypatch):
     """Each board has a place for its chunks among those of boards alone."""
     kept = []
-    monkeypatch.setattr(campaign_fit, "fitted", lambda problem, seed, place, *others: kept.append(place))
+    monkeypatch.setattr(Run, "fit", lambda run, problem, place, *others, **told: kept.append(place))
     problems = [SimpleNamespace(board=SimpleNamespace(name=name)) for name in ("lock", "earlier", "before")]
-    campaign_fit.fit_boards(SimpleNamespace(problems=problems), 1, tmp_path, Stages(None, 1.0))
+    fit_boards(SimpleNamespace(problems=problems), Run())
 
-    assert [place.relative_to(tmp_path).as_posix() for place in kept] == [
-        "boards/lock",
-        "boards/earlier",
-        "boards/before",
-    ]
+    assert kept == ["boards/lock", "boards/earlier", "boards/before"]

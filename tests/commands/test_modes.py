@@ -76,16 +76,6 @@ def test_the_table_of_the_cantilever_board(finnish_sheet):
     assert (by_label["(1,0)"]["a"], by_label["(1,0)"]["b"]) == pytest.approx((3.21, -0.34), abs=0.05)
 
 
-def test_the_combined_modes_decouple_the_constants(finnish_sheet):
-    (setup,) = runs.read_json(finnish_sheet.stdout)["setups"]
-    measured = [mode for mode in setup["modes"] if mode["measured_hz"] is not None]
-    weights = np.array([[one["weights"][mode["label"]] for mode in measured] for one in setup["combined"]])
-    coefficients = np.array([[mode[letter] for letter in "abc"] for mode in measured])
-
-    assert [one["name"] for one in setup["combined"]] == ["alpha", "beta", "gamma"]
-    np.testing.assert_allclose(weights @ coefficients, np.eye(3), atol=1e-8)
-
-
 def test_the_sheet_is_written_once_and_replaced_only_if_forced(finnish_sheet):
     first = runs.files_in(finnish_sheet.folder)
     arguments = ["modes", "finnish-spruce-cantilever", "--out", str(finnish_sheet.folder)]
@@ -135,13 +125,6 @@ def test_the_band_follows_the_prior(unmeasured):
         half_width = 0.967 * np.sqrt(np.sum((shares * log_sds / 2) ** 2))
         low, high = np.log(np.array(mode.likely_hz))
         assert (high - low) / 2 == pytest.approx(half_width, rel=0.1)
-
-
-def test_a_fit_still_wants_frequencies(unmeasured):
-    result = CliRunner().invoke(main, ["fit", str(unmeasured)])
-
-    assert result.exit_code == 3
-    assert "wanted measured frequencies" in result.stderr
 
 
 def test_a_sheet_does_not_keep_a_fit_from_the_folder(finnish_sheet):

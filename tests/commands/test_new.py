@@ -13,6 +13,7 @@ from bayesplate.board.board import Board
 from bayesplate.board.setup_keys import edge_letters
 from bayesplate.cli import main
 from bayesplate.commands.new import new
+from bayesplate.commands.prepare import prepare
 from bayesplate.frequencies.labels import label_faults
 from bayesplate.labels import Label
 
@@ -28,7 +29,7 @@ def invoke(*arguments: str, answers: str = ""):
     return CliRunner().invoke(main, ["new", *arguments], input=answers)
 
 
-def test_answers_become_a_card_that_check_takes():
+def test_answers_become_a_card_without_a_fault():
     """A decimal comma is asked again; the modes asked about are modes of the board."""
     result = invoke(answers="\n".join(ANSWERS) + "\n")
     card = Board.from_toml("my-board.toml")
@@ -42,7 +43,7 @@ def test_answers_become_a_card_that_check_takes():
     assert card.card.table["notes"] == "Küche, 21 °C"
     readings = {str(label): hz.mean for label, hz in frequencies(card.setups[0]).items()}
     assert readings == {"(1,1)": 35, "(2,0)": 50, "(0,2)": 111, "(2,1)": 86}
-    assert bayesplate.check("my-board.toml").name == "my-board"
+    assert prepare("my-board.toml").board.name == "my-board"
 
 
 def test_the_line_for_peaks_without_a_label_can_be_used():

@@ -10,10 +10,7 @@ from matplotlib.figure import Figure
 from read_pages import ALLOWED, Read
 
 import bayesplate
-from bayesplate.results.archive import GROUPS
 from bayesplate.results.contract import as_json
-
-BOARD = "fiemme-spruce-clamped"
 
 
 @pytest.fixture(scope="module")
@@ -79,28 +76,6 @@ def test_a_figure_of_what_is_not_there_is_refused(results):
     assert len(results["fit"].plot.corner(["E_x"]).axes) == 1
 
 
-def test_a_corner_plot_has_a_panel_for_every_pair_and_marks_least_squares(results):
-    result = results["fit"]
-    figure = result.plot.corner(["E_x", "D_y"])
-    panels = np.reshape(figure.axes, (2, 2))
-
-    assert [panels[1, 0].get_xlabel(), panels[1, 0].get_ylabel()] == ["$E_{x}$, GPa", "$D_{y}$, N m"]
-    marked = panels[0, 0].lines[-1].get_xdata()[0]
-    assert marked == pytest.approx(result.summary.weighted_least_squares.E_x / 1e9)
-
-
-def test_arviz_gets_what_posterior_nc_holds(fiemme):
-    import arviz
-
-    written, made = arviz.from_netcdf(str(fiemme.folder / "posterior.nc"), engine="h5netcdf"), fiemme.to_arviz()
-    for group in GROUPS:
-        assert set(made[group].data_vars) == set(written[group].data_vars)
-        for name, values in written[group].data_vars.items():
-            assert made[group][name].dims == values.dims
-            np.testing.assert_array_equal(made[group][name].values, values.values)
-    assert {key: value for key, value in written.attrs.items() if key in made.attrs} == dict(made.attrs)
-
-
 def test_the_factors_of_the_prior_multiply_to_it(fiemme):
     """A board with exact inputs has two of them, one with uncertain ones three."""
     theta = fiemme.draws.theta
@@ -115,19 +90,3 @@ def test_the_factors_of_the_prior_multiply_to_it(fiemme):
     assert set(factors) == {"constants", "noise", "inputs"}
     np.testing.assert_allclose(sum(factors.values()), uncertain.log_prior(at), rtol=1e-12)
     assert group["constants"].values.shape == theta.shape[:2]
-
-
-def test_prior_sensitivity_runs_on_the_group_and_not_without_it(fiemme):
-    import arviz
-
-    def sensitivity(data):
-        if "psens" in vars(arviz):
-            by_name = arviz.psens(data, var_names=["E_x", "G_xy"], component="prior", component_var_names=["constants"])
-            return float(by_name["G_xy"])
-        return float(arviz.psense_summary(data, var_names=["G_xy"])["prior"].iloc[0])
-
-    made = fiemme.to_arviz()
-    assert 0.0 < sensitivity(made) < 1.0
-    del made["log_prior"]
-    with pytest.raises((ValueError, AttributeError, TypeError, KeyError)):
-        sensitivity(made)

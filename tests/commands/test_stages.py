@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from bayesplate.commands.fitting import Stages
 from bayesplate.commands.shown import progress_text
-from bayesplate.commands.stages import Stages
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import Progress
 from bayesplate.terminal import progress_line
@@ -28,12 +28,6 @@ def test_the_share_is_that_of_the_whole_and_never_falls():
     assert [one.stage for one in told] == ["one", "one", "two", "two", "two"]
     assert [one.done for one in told] == pytest.approx([0.0, 1 / 8, 2 / 8, 3 / 4, 3 / 4])
     assert told[1].n_steps == 100
-
-
-def test_nobody_needs_to_be_told():
-    stages = Stages(None, 1.0)
-    stages.begin("one", 1.0)
-    stages.reached(1.0)
 
 
 @pytest.mark.parametrize(

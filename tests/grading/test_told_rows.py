@@ -1,11 +1,11 @@
-"""Rows of a batch as they are told: where it stands, and whether another has the same readings."""
+"""Rows of a batch: whether another board has the same readings."""
 
 from __future__ import annotations
 
-from bayesplate.grading.boards import BoardRow, told_rows
+from bayesplate.grading.boards import BoardRow, with_copies_in_doubt
 
 
-def test_boards_of_the_same_readings_are_in_doubt_and_what_was_refused_says_where_it_stands():
+def test_boards_of_the_same_readings_are_in_doubt():
     rows = [
         BoardRow("a", "fitted", doubt="misread?", readings_sha256="1"),
         BoardRow("b", "refused", "b.toml [plate] mass_g: wanted"),
@@ -15,12 +15,9 @@ def test_boards_of_the_same_readings_are_in_doubt_and_what_was_refused_says_wher
         BoardRow("f", "fitted"),
         BoardRow("g", "fitted"),
     ]
-    found = list(told_rows(rows, lambda at: f"t.csv row {10 - at}"))
-    doubts = {row.name: row.doubt for row in found if row.doubt}
+    doubts = {row.name: row.doubt for row in with_copies_in_doubt(rows) if row.doubt}
 
-    assert found[1].message == "t.csv row 9 -> b.toml [plate] mass_g: wanted"
     assert doubts["a"] == "every reading is that of d to the last digit: one board twice, or a copy?; misread?"
     assert doubts["d"].startswith("every reading is that of a to")
     assert "that of e0, e1, e2 and 2 more to" in doubts["e5"]
     assert set(doubts) == {"a", "d", *(f"e{i}" for i in range(6))}
-    assert list(told_rows(rows[1:2], lambda at: "")) == rows[1:2]

@@ -1,0 +1,135 @@
+"""Who computes the boards of a batch: processes of this machine, or a Dask cluster; few boards wait at a time."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
+from types import ModuleType
+from typing import Any, TypeVar
+
+from bayesplate.errors import Fault, InputError
+
+_PATIENCE = "20s"
+_PRELOADED = ("bayesplate.commands.fit_board", "scipy.stats", "scipy.sparse.linalg", "emcee", "skfem")
+"""What every fit imports, loaded once for all workers."""
+
+Key = TypeVar("Key")
+Call = tuple[Callable[..., Any], tuple[Any, ...]]
+"""A function and its arguments, to be computed anywhere."""
+
+
+class WorkerDied(Exception):
+    """A worker ended without an answer: it was killed, or ran out of memory."""
+
+
+def computed(free: list[Executor], calls: Iterable[tuple[Key, Call]]) -> Iterator[tuple[Key, Future[Any]]]:
+    """Compute calls, and give each with its key as it is done; the death of a worker is that of its one call.
+
+    Parameters
+    ----------
+    free : list of Executor
+        Each has one call at a time.
+    """
+    under_way: dict[Future[Any], tuple[Key, Executor]] = {}
+
+    def answers() -> Iterator[tuple[Key, Future[Any]]]:
+        done, _ = wait(under_way, return_when=FIRST_COMPLETED)
+        for future in done:
+            key, executor = under_way.pop(future)
+            if isinstance(future.exception(), BrokenExecutor):
+                executor, future = _process(), Future()
+                future.set_exception(WorkerDied("the worker ended without an answer: killed, or out of memory"))
+            free.append(executor)
+            yield key, future
+
+    for key, (function, arguments) in calls:
+        while not free:
+            yield from answers()
+        executor = free.pop()
+        with _without_script():
+            try:
+                future = executor.submit(function, *arguments)
+            except BrokenExecutor:  # it died since its last call
+                executor = _process()
+                future = executor.submit(function, *arguments)
+        under_way[future] = key, executor
+    while under_way:
+        yield from answers()
+
+
+@contextmanager
+def processes(n: int) -> Iterator[list[Executor]]:
+    """Processes of this machine, which start with their first call and end with this one however it ends."""
+    known = set(multiprocessing.active_children())
+    try:
+        yield [_process() for _ in range(n)]
+    finally:
+        for process in set(multiprocessing.active_children()) - known:
+            process.terminate()
+
+
+def _process() -> Executor:
+    """One process that begins clean: a fork would copy threads and locks in whatever state they are."""
+    methods = multiprocessing.get_all_start_methods()
+    context: Any = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
+    if "forkserver" in methods:
+        context.set_forkserver_preload(list(_PRELOADED))
+    return ProcessPoolExecutor(1, mp_context=context, initializer=_begin)
+
+
+def _begin() -> None:
+    """A worker leaves interruptions to its parent, and does not outlive it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+
+        def follow() -> None:
+            parent.join()
+            os._exit(1)
+
+        threading.Thread(target=follow, daemon=True).start()
+
+
+@contextmanager
+def _without_script() -> Iterator[None]:
+    """Workers that start here do not run the user's script, which would begin the batch again in each of them."""
+    script = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = script
+
+
+@contextmanager
+def dask_cluster(address: str) -> Iterator[list[Executor]]:
+    """A cluster of Dask that is at work already, by the address of its scheduler: "tcp://127.0.0.1:8786".
+
+    Raises
+    ------
+    InputError
+        If the library is not there, or no scheduler answers, or it has no workers.
+    """
+    place = f"--dask {address}"
+    try:
+        from distributed import Client
+    except ImportError:
+        remedy = 'pip install "bayesplate[dask]", here and on the cluster'
+        raise InputError(Fault(place, "Dask", "no such library", remedy)) from None
+    try:
+        client = Client(address, timeout=_PATIENCE, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise InputError(Fault(place, "the address of a scheduler that answers", str(error) or "no answer")) from None
+    try:
+        n_threads = sum(client.nthreads().values())
+        if not n_threads:
+            raise InputError(Fault(place, "a cluster with workers", "none", "start them: dask worker ADDRESS"))
+        yield [client.get_executor(pure=False)] * (2 * n_threads)  # none waits for the network
+    finally:
+        client.close()
