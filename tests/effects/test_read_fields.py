@@ -127,15 +127,15 @@ def held(seeds, kind=lambda board: board):
     return np.sum(np.abs(errors) < NINETY, axis=0)
 
 
-@pytest.mark.parametrize("n", [12, pytest.param(60, marks=pytest.mark.slow)])
-def test_intervals_hold_the_truth_at_the_stated_rate(n):
+def test_intervals_hold_the_truth_at_the_stated_rate():
+    n = 12
     counts = held(range(1000, 1000 + n))
     lowest, highest = binom.ppf([MISSED, 1.0 - MISSED], n, 0.9)
     assert np.all(counts >= lowest)
     assert np.all(counts <= highest)
 
 
-@pytest.mark.parametrize("n", [8, pytest.param(30, marks=pytest.mark.slow)])
-def test_readings_that_are_taken_for_exact_do_not(n):
+def test_readings_that_are_taken_for_exact_do_not():
     """Control: the course that they make probable, taken for the truth."""
+    n = 8
     assert np.all(held(range(1000, 1000 + n), taken_for_exact) < binom.ppf(MISSED, n, 0.9))

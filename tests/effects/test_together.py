@@ -166,21 +166,12 @@ def differing(plate: Plate, board: Board, pairs: Iterable[tuple[str, str]]) -> d
 
 
 @pytest.mark.usefixtures("coarse")
-def test_three_masses_in_any_order_give_the_same_frequencies():
-    """A sensor, the air and a frame: sparse matrices and projected ones by turns."""
-    orders = permutations(("attached_mass", "fluid_loading", "support_mass"))
-    found = np.array([hertz(FIEMME, BOARDS["CCCC"], order) for order in orders])
-
-    assert np.abs(found / found[0] - 1.0).max() < 1e-9
-
-
-@pytest.mark.parametrize("edges", [pytest.param("CFFF", marks=pytest.mark.slow), "CCCC"])
-@pytest.mark.usefixtures("coarse")
-def test_what_adds_terms_alone_leaves_the_plate_itself(edges):
+def test_what_adds_terms_alone_leaves_the_plate_itself():
     """Air, a frame that moves, springs, tension and a cup are terms beside the plate's own: its sides stay, and these.
 
     The warp has no twist here: with one beside a curvature the halves of the board differ, and so do its sides.
     """
+    edges = "CCCC"
     untwisted = replace(BOARDS[edges], warp={"twist": Quantity.exact(0.0)})
     plates = {}
     for name in ("", *TOGETHER[edges]):
@@ -246,14 +237,6 @@ NO_SPRING = 0.01
 """Hz: a magnet on no spring is a mode below all of a board's own, which are then those of the bare plate."""
 PAPER_THIN = 0.1
 """Of the boards' thickness: rotary inertia falls with its square."""
-
-
-def test_every_effect_stands_beside_every_two_other_kinds():
-    """Seven other kinds make 21 twos, and some board allows each of them."""
-    kind = {name: kind for kind, names in KINDS.items() for name in names}
-    met = {(name, *sorted({kind[n] for n in triple} - {kind[name]})) for triple in TRIPLES for name in triple}
-
-    assert len(met) == 21 * len(EFFECTS)
 
 
 @pytest.mark.parametrize("edges", sorted(set(TRIPLES.values())))
