@@ -115,7 +115,7 @@ def test_pairs_with_shear_are_left_to_the_sampler(finnish_few):
     laws = {name: one.laws[0] for name, one in finnish_few.ground.candidates.items()}
 
     assert not joint._is_cheap(laws["transverse_shear"])
-    assert joint._is_cheap(laws["clamp_rotation"])
+    assert joint._is_cheap(laws["clamp_translation"])
 
 
 @pytest.mark.slow
