@@ -214,7 +214,9 @@ PLANTED = [
 """Sensors, whether shear is planted besides, and what is to be found."""
 
 
-@pytest.fixture(scope="module", params=PLANTED)
+@pytest.fixture(
+    scope="module", params=[PLANTED[0], *(pytest.param(one, marks=pytest.mark.slow) for one in PLANTED[1:])]
+)
 def found_on_boards(request, tmp_path_factory):
     """What is planted on boards, and their tables of shear and a sensor."""
     masses, has_shear, *_ = request.param

@@ -7,7 +7,7 @@ import pytest
 
 from bayesplate.diagnosis.hypotheses import log_evidences, probabilities
 
-N_SETS = 4000
+N_SETS = 1500
 N_BINS = 10
 ALLOWED = 4.0
 """Standard errors; some thirty are looked at."""

@@ -19,9 +19,9 @@ QUICK = [
     (CANTILEVER, "clamp_rotation clamp_translation"),
     (CANTILEVER, "grain_angle"),
     (CLAMPED, "support_mass"),
-    (FREE, "thickness_profile"),
 ]
 MORE = [
+    (FREE, "thickness_profile"),
     (CANTILEVER, "attached_mass"),
     (CANTILEVER, "warp"),
     (CANTILEVER, "density_gradient transverse_shear"),
