@@ -15,7 +15,6 @@ from bayesplate.campaign.boards import Member, _joint
 from bayesplate.campaign.claim import judge, rms_cents, taught_boards
 from bayesplate.campaign.learning import learn
 from bayesplate.campaign.likelihood import moments
-from bayesplate.campaign.scatter import scatters_of
 from bayesplate.commands.campaign_diagnose import _without_shared
 from bayesplate.commands.campaign_fit import fit_boards
 from bayesplate.commands.stages import Stages
@@ -45,59 +44,6 @@ def joint_run(members, is_exact=False):
     chains, convergence = sample(log_posterior, centre, covariance, SamplerSettings(seed=2))
     assert convergence.passed
     return chains.pooled, convergence.ess
-
-
-def joint_run_with_scatter(members, shared):
-    """Draws of one shared number, of its scatter and of each board's own: (n, 2 + n_boards) array, effective sizes.
-
-    Each board's own number is the middle and so many widths, these of unit spread.
-    """
-    (scatter,), given = scatters_of(shared), [one.quick(one.inference.surrogate) for one in members]
-    ends, n = np.cumsum([one.own_columns.size for one in given]), len(members)
-
-    def own_numbers(theta):
-        middle, u = theta[:, -2], theta[:, -1]
-        return middle[:, None] + scatter.width(u)[:, None] * theta[:, ends[-1] : -2]
-
-    def log_posterior(theta):
-        apart, middle, u = theta[:, ends[-1] : -2], theta[:, -2], theta[:, -1]
-        total = shared[0].prior.log_prior(middle) + scatter.prior.log_prior(u) - 0.5 * (apart**2).sum(axis=1)
-        possible = np.isfinite(total)
-        z = own_numbers(theta[possible])
-        blocks = np.split(theta[possible, : ends[-1]], ends[:-1], axis=1)
-        for i, (one, own) in enumerate(zip(given, blocks, strict=True)):
-            total[possible] += one.log_density(own, z[:, i : i + 1])
-        return total
-
-    own = [m.draws.flat[:, g.own_columns] for m, g in zip(members, given, strict=True)]
-    z = np.concatenate([m.alone.z for m in members])
-    centre = np.concatenate([each.mean(axis=0) for each in own] + [np.zeros(n), z.mean(axis=0), [0.8]])
-    blocks = [np.cov(each.T) for each in own] + [np.eye(n), np.atleast_2d(np.cov(z.T)) / n, [[0.3]]]
-    chains, convergence = sample(log_posterior, centre, block_diag(*blocks), SamplerSettings(seed=2))
-    assert convergence.ess_min > 2000  # in so many directions walkers go slowly
-    assert convergence.rhat.max() < 1.01
-    draws = chains.pooled
-    found = np.column_stack([draws[:, -2:], own_numbers(draws)])
-    return found, np.minimum(convergence.ess[-2], convergence.ess[-1])
-
-
-@pytest.mark.slow
-def test_numbers_that_scatter_are_those_of_a_joint_run(fitted_campaign):
-    """Middle, scatter and each board's own; and none of it what it is without scatter."""
-    shared = tuple(replace(one, scatter=0.5) for one in fitted_campaign.learnt.together.shared)
-    members = [replace(one, shared=shared) for one in fitted_campaign.learnt.members]
-    learnt = learn(members, SamplerSettings(seed=1))
-    reference, ess = joint_run_with_scatter(members, shared)
-    both = min(ess, learnt.convergence.ess_min) / 2
-
-    for i in range(2):
-        assert max(in_errors(learnt.chains.pooled[:, i], reference[:, i], both)) < 4.0
-    for i, member in enumerate(members):
-        _, draws, effective = learnt.board(i, np.random.default_rng(0), 1)
-        z = member.given.z_of(draws.flat)[:, 0]
-        assert max(in_errors(z, reference[:, 2 + i], min(effective, both))) < 4.0
-    same = fitted_campaign.learnt.chains.pooled[:, 0]
-    assert max(in_errors(same, reference[:, 0], both)) > 4.0
 
 
 def in_errors(draws, reference, ess):
@@ -197,20 +143,6 @@ def test_a_draw_that_ends_where_there_is_no_plate_has_no_weight(fitted_campaign)
     assert moved.weights[0] == 0.0
     assert moved.weights[1:] == pytest.approx(1.0 / 199)
     assert np.isfinite(rms_cents(inference, draws))
-
-
-@pytest.mark.slow
-def test_a_board_walked_anew_is_that_of_weights(fitted_campaign, monkeypatch):
-    """The way that is taken where few of a board's own draws are left gives the same where many are."""
-    learnt = fitted_campaign.learnt
-    monkeypatch.setattr(learning, "FEWEST_WEIGHTED_DRAWS", np.inf)
-    for i, member in enumerate(learnt.members):
-        _, anew, effective = learnt.board(i, np.random.default_rng(0), 1)
-        usual = fitted_campaign.boards[member.name].draws
-        assert effective > 500
-        for name, values in usual.moduli.items():
-            both = max(in_errors(np.log(anew.moduli[name]).ravel(), np.log(values).ravel(), effective / 2))
-            assert both < 5.0, (member.name, name)
 
 
 def others_at(member, sds):
