@@ -48,6 +48,7 @@ def test_what_three_of_eight_have_is_not_claimed(size, n):
     [
         ([2.0, 2.5, 3.0], True),
         ([2.0, 2.5, -9.0], False),  # no more than its scatter
+        ([6.0, 0.5, 1.0], False),  # 1.4 standard errors
         ([0.5, 0.5, 0.5], False),  # no more than ln 20
         ([9.0, -0.1, -0.1, -0.1], False),  # one board alone
     ],

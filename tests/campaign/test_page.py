@@ -146,7 +146,7 @@ def test_a_campaign_that_shares_nothing_is_boards_side_by_side(campaign, fitted_
     """Boards as they were fitted before anything was shared."""
     alone = {name: one for name, one in fitted_campaign.alone.items() if name != "board-0"}
     monkeypatch.setattr("bayesplate.commands.campaign_fit.fit_boards", lambda *_: alone)
-    found = bayesplate.fit(replace(campaign, problems=campaign.problems[1:], shared=()))
+    found = bayesplate.fit(replace(campaign, problems=campaign.problems[1:], shared=(), population=None))
 
     assert found.learnt is None
     assert found.summary.shared == {}

@@ -46,18 +46,6 @@ def finnish_few() -> Grounded:
 
 
 @pytest.fixture(scope="session")
-def simulated() -> Grounded:
-    """The paper's simulation of that board: hardly any noise, so that everything can be seen."""
-    return grounded("paper-cantilever-fe")
-
-
-@pytest.fixture(scope="session")
-def fiemme() -> Grounded:
-    """The paper's clamped board."""
-    return grounded("fiemme-spruce-clamped")
-
-
-@pytest.fixture(scope="session")
 def diagnosed() -> Callable[[str], DiagnoseResult]:
     """The whole of `diagnose` on a shipped board, once each, without files."""
 

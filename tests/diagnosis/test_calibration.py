@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from bayesplate.diagnosis.hypotheses import log_evidences, probabilities
 
@@ -53,8 +52,7 @@ def found_in(ground, readings):
     return probabilities(ground.hypotheses, log_evidences(ground.hypotheses, ground.baseline, readings))
 
 
-@pytest.mark.parametrize("board", ["finnish_few", pytest.param("simulated", marks=pytest.mark.slow)])
-def test_probabilities_are_frequencies(board, request):
-    ground = request.getfixturevalue(board).ground
+def test_probabilities_are_frequencies(finnish_few):
+    ground = finnish_few.ground
     drawn, readings = simulated_sets(ground, np.random.default_rng(1), N_SETS)
     assert np.abs(misses(found_in(ground, readings), drawn)).max() < ALLOWED

@@ -11,8 +11,6 @@ from browser import Page, browser_path, running_browser
 from diagnoses import DIAGNOSES
 from payloads import PAYLOADS, shown
 
-WIDTHS = (390, 1280)
-
 pytestmark = [
     pytest.mark.skipif(browser_path() is None, reason="no chromium on this machine: the page is only parsed"),
     pytest.mark.skipif(not Path("/bin/bash").exists(), reason="the browser is started through a shell's descriptors"),
@@ -40,8 +38,7 @@ def outside(page: Page, own: Path) -> list[str]:
     return [one for one in page.requests if not one.startswith("data:") and one != own.as_uri()]
 
 
-@pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("which", ["fit", "diagnosis"])
+@pytest.mark.parametrize(("which", "width"), [("diagnosis", 390), ("fit", 1280)])
 def test_it_opens_whole_and_quiet(page, reports, which, width):
     own = reports[which]
     page.open(own.as_uri(), width)
