@@ -44,6 +44,7 @@ def test_chance_is_seldom_called_clear_of_zero(n_boards):
     found = np.mean([bool(clear_of_zero(one)) for one in campaigns])
     each = np.mean([any(abs(m.mean_cents) > 2.0 * m.error_cents for m in one.values()) for one in campaigns])
 
+    assert CLEAR == 0.05
     assert found < CLEAR + 3.0 * np.sqrt(CLEAR / N_CAMPAIGNS)
     assert each > 0.15
 
