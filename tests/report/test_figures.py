@@ -357,6 +357,9 @@ def test_percentiles_are_of_the_modes_that_the_table_has():
 
     assert len(problem.board.setups[0].readings) == 7
     assert "42" in picture.caption
+    bands = [one for one in picture.figure.axes[0].patches if "percentile method" in str(one.get_label())]
+    low, high = bands[0].get_extents().transformed(picture.figure.axes[0].transData.inverted()).intervalx
+    assert 10.0 < low < high < 16.0  # E_x of the board in GPa, within a few sd
 
 
 def test_one_estimate_is_no_picture_of_the_percentile_method():
