@@ -42,11 +42,6 @@ class Placing:
     seen: tuple[float, ...]
     taps: tuple[Place, ...]
 
-    @property
-    def are_all_seen(self) -> bool:
-        """Whether no mode has a nodal line at sensor or hammer."""
-        return min(self.seen) > NODAL_LINE
-
 
 def placing(shapes: Floats, grid: Floats, sensor: Place | None = None) -> Placing:
     """Sensor and hammer for some modes.

@@ -7,6 +7,15 @@ from made_campaigns import write_campaign
 
 import bayesplate
 from bayesplate.commands.fitting import FitResult
+from bayesplate.posterior.slips import Remarks
+
+
+@pytest.fixture(scope="package", autouse=True)
+def _no_slips():
+    """Without the search for slips of the readings, which takes most of a fit and has tests of its own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("bayesplate.posterior.posing.reading_remarks", lambda *_: Remarks((), ()))
+        yield
 
 
 @pytest.fixture(scope="package")

@@ -36,7 +36,7 @@ def noise(rng, n_boards, offset=0.0, unlike=0.4):
     }
 
 
-@pytest.mark.parametrize("n_boards", [2, 3, 6])
+@pytest.mark.parametrize("n_boards", [2, 6])
 def test_chance_is_seldom_called_clear_of_zero(n_boards):
     """In one campaign of twenty at most; two errors for each mode call it so in many: the negative control."""
     rng = np.random.default_rng(n_boards)
@@ -44,6 +44,7 @@ def test_chance_is_seldom_called_clear_of_zero(n_boards):
     found = np.mean([bool(clear_of_zero(one)) for one in campaigns])
     each = np.mean([any(abs(m.mean_cents) > 2.0 * m.error_cents for m in one.values()) for one in campaigns])
 
+    assert CLEAR == 0.05
     assert found < CLEAR + 3.0 * np.sqrt(CLEAR / N_CAMPAIGNS)
     assert each > 0.15
 

@@ -142,9 +142,11 @@ def test_figures_and_draws_of_a_result(fitted_campaign):
     assert repr(fitted_campaign) == "<CampaignFitResult of together: 3 boards; attached_mass.mass>"
 
 
-def test_a_campaign_that_shares_nothing_is_boards_side_by_side(card, tmp_path, campaign):
-    alone = replace(campaign, problems=campaign.problems[1:], shared=())
-    found = bayesplate.fit(alone)
+def test_a_campaign_that_shares_nothing_is_boards_side_by_side(campaign, fitted_campaign, monkeypatch):
+    """Boards as they were fitted before anything was shared."""
+    alone = {name: one for name, one in fitted_campaign.alone.items() if name != "board-0"}
+    monkeypatch.setattr("bayesplate.commands.campaign_fit.fit_boards", lambda *_: alone)
+    found = bayesplate.fit(replace(campaign, problems=campaign.problems[1:], shared=(), population=None))
 
     assert found.learnt is None
     assert found.summary.shared == {}

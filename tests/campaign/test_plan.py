@@ -20,9 +20,11 @@ SHARED = "attached_mass.mass"
 
 
 @pytest.fixture(scope="module")
-def planned(campaign, tmp_path_factory):
+def planned(campaign, planner, tmp_path_factory):
     """A plan of three boards with one sensor, with its files."""
-    return bayesplate.plan(campaign, out=tmp_path_factory.mktemp("plan"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("bayesplate.commands.plan.beliefs_together", lambda *_: planner.beliefs)
+        return bayesplate.plan(campaign, out=tmp_path_factory.mktemp("plan"))
 
 
 def test_what_narrows_the_shared_parameter_most_comes_first(planned):
@@ -152,8 +154,9 @@ def test_boards_that_tell_most_may_be_held_another_way(planner, listed):
     assert of_shared[0] < 1.0
 
 
-def test_the_sheets_are_those_of_the_steps_that_are_proposed_together(campaign, tmp_path, monkeypatch):
+def test_the_sheets_are_those_of_the_steps_that_are_proposed_together(campaign, planner, tmp_path, monkeypatch):
     """Where modes are all that could be read, the best three are of three boards; two of them get a sheet."""
+    monkeypatch.setattr("bayesplate.commands.plan.beliefs_together", lambda *_: planner.beliefs)
     every = Planner.ranked
     monkeypatch.setattr(
         Planner, "ranked", lambda *given: tuple(one for one in every(*given) if one.entry.what in ("modes", "edges"))

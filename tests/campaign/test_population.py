@@ -41,6 +41,27 @@ def test_the_population_of_many_boards_is_found():
     assert np.abs(np.log(found.sds.mean(axis=0) / SD)).max() < 4.0 / np.sqrt(80)
 
 
+def test_what_all_boards_are_off_by_alike_does_not_average_out():
+    """What is known of the means then has the variance of the common error besides: slopes times its width, squared."""
+    slopes, width = np.array([[0.5], [-0.6], [0.4]]), 0.4
+    boards = [replace(one, slopes=slopes) for _, one in boards_of(np.random.default_rng(300), 12, sd=0.2 * SD)]
+    own, common = (
+        find_population(some, load_prior("spruce"), SamplerSettings(seed=1), covariance).means.var(axis=0)
+        for some, covariance in (
+            ([replace(one, slopes=slopes[:, :0]) for one in boards], None),
+            (boards, width**2 * np.eye(1)),
+        )
+    )
+    # The priors of the three means narrow the common error.
+    log_sd = np.array([load_prior("spruce").constants[name].log_sd for name in ("E_x", "E_y", "G_xy")])
+    squared = slopes[:, 0] ** 2
+    expected = own + squared / (1.0 / width**2 + np.sum(squared / log_sd**2))
+
+    assert own.max() < 0.1 * (width * 0.4) ** 2
+    assert common == pytest.approx(expected, rel=0.1)
+
+
+@pytest.mark.slow
 def test_means_and_widths_are_covered_at_the_stated_rate():
     """90 % intervals over 12 small populations, whose truths are drawn from what is believed of them."""
     prior = load_prior("spruce")
@@ -57,44 +78,6 @@ def test_means_and_widths_are_covered_at_the_stated_rate():
 
     low, high = binom.ppf([0.0005, 0.9995], len(hits), 0.9)
     assert low <= sum(hits) <= high
-
-
-def test_what_all_boards_are_off_by_alike_does_not_average_out():
-    """90 % intervals of the means of 8 populations whose boards share an error; without it they miss."""
-    slopes, width = np.array([[0.5], [-0.6], [0.4]]), 0.4
-    hits = {"common": [], "own": []}
-    for seed in range(8):
-        rng = np.random.default_rng(300 + seed)
-        off = slopes[:, 0] * width * rng.standard_normal()
-        boards = [one for _, one in boards_of(rng, 12, sd=0.5 * SD)]
-        common = [replace(one, mean=one.mean - off, slopes=slopes) for one in boards]
-        own = [replace(one, slopes=slopes[:, :0]) for one in common]
-        for kind, some, covariance in (("common", common, width**2 * np.eye(1)), ("own", own, None)):
-            found = find_population(some, load_prior("spruce"), SamplerSettings(seed=seed), covariance)
-            low, high = np.quantile(found.means, [0.05, 0.95], axis=0)
-            hits[kind] += list((low <= MEAN) & (high >= MEAN))
-
-    assert sum(hits["common"]) >= binom.ppf(0.0005, 8, 0.9) * 3  # three constants of one population go together
-    assert sum(hits["own"]) < sum(hits["common"]) - 6
-
-
-def test_pooling_draws_a_poorly_measured_board_to_the_others():
-    rng = np.random.default_rng(3)
-    poor = BoardConstants("poor", MEAN + 0.15, 0.15**2 * np.eye(3))
-    found = found_of([*boards_of(rng, 12, sd=0.3 * SD), (MEAN, poor)])
-    pooled = found.pooled(12, rng)
-
-    assert (np.abs(pooled.mean(axis=0) - MEAN) < 0.6 * 0.15).all()
-    assert (pooled.std(axis=0) < 0.15).all()
-
-
-def test_pooling_leaves_a_well_measured_board_where_it_is():
-    """The negative control."""
-    rng = np.random.default_rng(4)
-    boards = boards_of(rng, 8)
-    pooled = found_of(boards).pooled(0, rng)
-
-    assert np.abs(pooled.mean(axis=0) - boards[0][1].mean).max() < 0.5 * OWN.max()
 
 
 def test_a_board_given_the_population_is_the_closed_form():

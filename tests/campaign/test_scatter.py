@@ -52,7 +52,7 @@ def together_of(boards, shared):
     return Together.of(shared, names, boards, [pull_of(one) for one in boards])
 
 
-@pytest.mark.parametrize("n_shared", [1, 2, 3])
+@pytest.mark.parametrize("n_shared", [1, 3])
 def test_a_normal_board_is_integrated_exactly(n_shared):
     rng = np.random.default_rng(n_shared)
     (board,), _ = scattered_boards(rng, 1, n_shared, 0.5)
@@ -185,6 +185,7 @@ def test_what_is_taught_keeps_the_bounds_of_a_number_that_does_not_scatter():
         assert share == pytest.approx((draws < end).mean(), rel=0.15)
 
 
+@pytest.mark.slow
 def test_p_values_are_uniform_where_boards_scatter_and_not_where_that_is_left_out(monkeypatch):
     """Scatter drawn from its prior: the p-value of a board against the others; moments of few points are enough."""
     monkeypatch.setattr(together, "_N_POINTS", dict.fromkeys((1, 2), 2**11))

@@ -9,12 +9,12 @@ import pytest
 from made_campaigns import MASS
 from scipy.linalg import block_diag
 
-from bayesplate.campaign import boards, learning
+from bayesplate.campaign import learning
+from bayesplate.campaign.agreement import left_out
 from bayesplate.campaign.boards import Member, _joint
 from bayesplate.campaign.claim import judge, rms_cents, taught_boards
 from bayesplate.campaign.learning import learn
 from bayesplate.campaign.likelihood import moments
-from bayesplate.campaign.scatter import scatters_of
 from bayesplate.commands.campaign_diagnose import _without_shared
 from bayesplate.commands.campaign_fit import fit_boards
 from bayesplate.commands.fitting import Run
@@ -46,59 +46,6 @@ def joint_run(members, is_exact=False):
     return chains.pooled, convergence.ess
 
 
-def joint_run_with_scatter(members, shared):
-    """Draws of one shared number, of its scatter and of each board's own: (n, 2 + n_boards) array, effective sizes.
-
-    Each board's own number is the middle and so many widths, these of unit spread.
-    """
-    (scatter,), given = scatters_of(shared), [one.quick(one.inference.surrogate) for one in members]
-    ends, n = np.cumsum([one.own_columns.size for one in given]), len(members)
-
-    def own_numbers(theta):
-        middle, u = theta[:, -2], theta[:, -1]
-        return middle[:, None] + scatter.width(u)[:, None] * theta[:, ends[-1] : -2]
-
-    def log_posterior(theta):
-        apart, middle, u = theta[:, ends[-1] : -2], theta[:, -2], theta[:, -1]
-        total = shared[0].prior.log_prior(middle) + scatter.prior.log_prior(u) - 0.5 * (apart**2).sum(axis=1)
-        possible = np.isfinite(total)
-        z = own_numbers(theta[possible])
-        blocks = np.split(theta[possible, : ends[-1]], ends[:-1], axis=1)
-        for i, (one, own) in enumerate(zip(given, blocks, strict=True)):
-            total[possible] += one.log_density(own, z[:, i : i + 1])
-        return total
-
-    own = [m.draws.flat[:, g.own_columns] for m, g in zip(members, given, strict=True)]
-    z = np.concatenate([m.alone.z for m in members])
-    centre = np.concatenate([each.mean(axis=0) for each in own] + [np.zeros(n), z.mean(axis=0), [0.8]])
-    blocks = [np.cov(each.T) for each in own] + [np.eye(n), np.atleast_2d(np.cov(z.T)) / n, [[0.3]]]
-    chains, convergence = sample(log_posterior, centre, block_diag(*blocks), SamplerSettings(seed=2))
-    assert convergence.ess_min > 2000  # in so many directions walkers go slowly
-    assert convergence.rhat.max() < 1.01
-    draws = chains.pooled
-    found = np.column_stack([draws[:, -2:], own_numbers(draws)])
-    return found, np.minimum(convergence.ess[-2], convergence.ess[-1])
-
-
-@pytest.mark.slow
-def test_numbers_that_scatter_are_those_of_a_joint_run(fitted_campaign):
-    """Middle, scatter and each board's own; and none of it what it is without scatter."""
-    shared = tuple(replace(one, scatter=0.5) for one in fitted_campaign.learnt.together.shared)
-    members = [replace(one, shared=shared) for one in fitted_campaign.learnt.members]
-    learnt = learn(members, SamplerSettings(seed=1))
-    reference, ess = joint_run_with_scatter(members, shared)
-    both = min(ess, learnt.convergence.ess_min) / 2
-
-    for i in range(2):
-        assert max(in_errors(learnt.chains.pooled[:, i], reference[:, i], both)) < 4.0
-    for i, member in enumerate(members):
-        _, draws, effective = learnt.board(i, np.random.default_rng(0), 1)
-        z = member.given.z_of(draws.flat)[:, 0]
-        assert max(in_errors(z, reference[:, 2 + i], min(effective, both))) < 4.0
-    same = fitted_campaign.learnt.chains.pooled[:, 0]
-    assert max(in_errors(same, reference[:, 0], both)) > 4.0
-
-
 def in_errors(draws, reference, ess):
     """Difference of means, and of the logarithms of the sds, in standard errors of the reference.
 
@@ -111,6 +58,7 @@ def in_errors(draws, reference, ess):
     return abs(draws.mean() - reference.mean()) / sd * np.sqrt(ess), spread
 
 
+@pytest.mark.slow
 def test_the_shared_posterior_is_that_of_a_joint_run(fitted_campaign):
     members = fitted_campaign.learnt.members
     reference, ess = joint_run(members)
@@ -126,25 +74,6 @@ def test_the_shared_posterior_is_that_of_a_joint_run(fitted_campaign):
             assert max(in_errors(own[:, column], reference[:, ends[i] + column], few / 2)) < 4.5
 
 
-@pytest.mark.slow
-def test_the_surrogate_leaves_no_trace_in_the_shared_posterior(fitted_campaign):
-    members = fitted_campaign.learnt.members
-    assert any(one.inference.surrogate is not None for one in members)
-    reference, ess = joint_run(members, is_exact=True)
-    z = fitted_campaign.learnt.chains.pooled[:, 0]
-
-    assert max(in_errors(z, reference[:, -1], min(ess[-1], fitted_campaign.learnt.convergence.ess[0]) / 2)) < 4.0
-
-
-def test_without_a_board_the_shared_posterior_is_another(fitted_campaign):
-    """The negative control."""
-    members = fitted_campaign.learnt.members
-    fewer = learn(members[:2], SamplerSettings(seed=1))
-    z, less = fitted_campaign.learnt.chains.pooled[:, 0], fewer.chains.pooled[:, 0]
-
-    assert max(in_errors(less, z, fitted_campaign.learnt.convergence.ess[0] / 2)) > 4.0
-
-
 def test_the_truth_is_inside_and_sharing_narrows(fitted_campaign):
     one = fitted_campaign.summary.shared[SHARED]
 
@@ -156,6 +85,23 @@ def test_the_truth_is_inside_and_sharing_narrows(fitted_campaign):
     assert not any(one.refuses for one in fitted_campaign.summary.left_out_boards.values())
 
 
+def test_what_is_told_of_boards_that_are_left_out(fitted_campaign):
+    """Against each board alone, which here has the sensor as well."""
+    learnt, alone = fitted_campaign.learnt, fitted_campaign.alone
+    members = {name: Member(one.inference, one.draws, ()) for name, one in alone.items()}
+    taught = taught_boards(learnt, members, 1)
+
+    for i, (told, score) in enumerate(zip(taught.values(), left_out(learnt.together), strict=True)):
+        name = learnt.members[i].name
+        assert told.log_score_gain == pytest.approx(score.log_score - members[name].alone.log_evidence)
+        assert told.before_rms_cents == pytest.approx(rms_cents(alone[name].inference, alone[name].draws))
+        assert told.after_rms_cents == pytest.approx(told.before_rms_cents, rel=0.3)
+        others = fitted_campaign.summary.shared[SHARED].others[name]
+        assert told.others[SHARED].mean == pytest.approx(others.mean, rel=0.05)
+        assert (told.p_value, told.refuses) == (score.p_value, False)
+
+
+@pytest.mark.slow
 def test_a_sensor_on_all_boards_is_claimed_from_those_left_out(campaign, fitted_campaign):
     before = fit_boards(_without_shared(campaign), Run())
     members = {name: Member(one.inference, one.draws, ()) for name, one in before.items()}
@@ -169,7 +115,7 @@ def test_a_sensor_on_all_boards_is_claimed_from_those_left_out(campaign, fitted_
         assert one.others["attached_mass.mass"].mean == pytest.approx(others.mean, rel=0.05)
 
 
-@pytest.mark.parametrize("scatter", [0.0, 0.5])
+@pytest.mark.parametrize("scatter", [0.0, pytest.param(0.5, marks=pytest.mark.slow)])
 def test_a_board_that_is_left_out_has_what_the_others_teach(fitted_campaign, scatter):
     """Its shared number as they teach it; its constants as they go with such numbers."""
     shared = tuple(replace(one, scatter=scatter) for one in fitted_campaign.learnt.together.shared)
@@ -199,19 +145,6 @@ def test_a_draw_that_ends_where_there_is_no_plate_has_no_weight(fitted_campaign)
     assert np.isfinite(rms_cents(inference, draws))
 
 
-def test_a_board_walked_anew_is_that_of_weights(fitted_campaign, monkeypatch):
-    """The way that is taken where few of a board's own draws are left gives the same where many are."""
-    learnt = fitted_campaign.learnt
-    monkeypatch.setattr(learning, "FEWEST_WEIGHTED_DRAWS", np.inf)
-    for i, member in enumerate(learnt.members):
-        _, anew, effective = learnt.board(i, np.random.default_rng(0), 1)
-        usual = fitted_campaign.boards[member.name].draws
-        assert effective > 500
-        for name, values in usual.moduli.items():
-            both = max(in_errors(np.log(anew.moduli[name]).ravel(), np.log(values).ravel(), effective / 2))
-            assert both < 5.0, (member.name, name)
-
-
 def others_at(member, sds):
     """What others teach so many of a board's own standard deviations off: ln of its density, mean and covariance."""
     mean, covariance = moments(member.alone.z, member.alone.weights)
@@ -220,8 +153,8 @@ def others_at(member, sds):
     return lambda z: -0.5 * ((z[:, 0] - middle[0]) / width) ** 2, (middle, width**2 * np.eye(1))
 
 
-def test_a_board_that_others_lead_far_off_is_walked_where_its_law_is_known(fitted_campaign, monkeypatch):
-    """Five standard deviations off, where its own draws end: as a walk on the law itself; one surrogate does not do."""
+def test_a_board_that_others_lead_far_off_is_walked_where_its_law_is_known(fitted_campaign):
+    """Five standard deviations off, where its own draws end: as a walk on the law itself."""
     member = fitted_campaign.learnt.members[0]
     others, aim = others_at(member, 5.0)
     drawn = member.anew(others, member.alone, aim, 1)
@@ -237,10 +170,6 @@ def test_a_board_that_others_lead_far_off_is_walked_where_its_law_is_known(fitte
         ours, exact = drawn.theta[:, own[i]], chains.pooled[:, i]
         mean, spread = drawn.weights @ ours, exact.std()
         assert abs(mean - exact.mean()) < 5.0 * spread * np.sqrt(1.0 / effective + 1.0 / convergence.ess_min)
-
-    monkeypatch.setattr(boards, "_MOST_WALKS", 1)
-    once = member.anew(others, member.alone, aim, 1)
-    assert once.effective(once.weights) < learning.FEWEST_WEIGHTED_DRAWS
 
 
 def test_where_no_draw_has_a_density_by_the_law_what_was_there_before_stays(fitted_campaign):

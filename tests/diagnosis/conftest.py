@@ -12,7 +12,6 @@ from bayesplate.commands.diagnose import DiagnoseResult, diagnose
 from bayesplate.commands.problem import Problem
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.search import Ground, prepare_search
-from bayesplate.effects import EFFECTS
 from bayesplate.posterior.posing import PosedProblem
 
 N_NULL = 100
@@ -39,27 +38,11 @@ def finnish() -> Grounded:
 
 
 @pytest.fixture(scope="session")
-def finnish_most() -> Grounded:
-    """The same board without the candidates of many forms: a mass that may be anywhere, curvatures and a twist."""
-    return grounded("finnish-spruce-cantilever", [name for name in EFFECTS if name not in ("attached_mass", "warp")])
-
-
-@pytest.fixture(scope="session")
 def finnish_few() -> Grounded:
-    """The same board with three candidates only, for rules that look at these: a fifth of the work."""
-    return grounded("finnish-spruce-cantilever", ("transverse_shear", "clamp_rotation", "poisson_ratio"))
-
-
-@pytest.fixture(scope="session")
-def simulated() -> Grounded:
-    """The paper's simulation of that board: hardly any noise, so that everything can be seen."""
-    return grounded("paper-cantilever-fe")
-
-
-@pytest.fixture(scope="session")
-def fiemme() -> Grounded:
-    """The paper's clamped board."""
-    return grounded("fiemme-spruce-clamped")
+    """The same board with a few candidates: another theory, springs, projected terms, fields."""
+    return grounded(
+        "finnish-spruce-cantilever", ("transverse_shear", "clamp_translation", "fluid_loading", "thickness_profile")
+    )
 
 
 @pytest.fixture(scope="session")

@@ -101,7 +101,7 @@ def test_readings_at_places_are_tried_as_the_components_that_they_leave_open():
     assert [free.name for free in cut.free] == ["outline_profile.field_1", "outline_profile.field_2"]
 
 
-@pytest.mark.parametrize("n", range(1, 21))
+@pytest.mark.parametrize("n", [1, 2, 3, 5, 20])
 def test_a_table_stays_small_whatever_the_number_of_parameters(n):
     for cells, most in ((FINE, 256), (COARSE, 27)):
         along = cells_along(n, cells)

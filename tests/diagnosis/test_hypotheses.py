@@ -150,7 +150,7 @@ def test_labels_are_exchanged_in_their_own_setup():
     assert second.labels == tuple(base.board.setups[1].labels[i] for i in (1, 0, 2))
 
 
-@pytest.mark.parametrize("mode", range(6))
+@pytest.mark.parametrize("mode", [0, 3])
 def test_a_fold_knows_nothing_of_the_reading_that_is_left_out(base, mode):
     """Also where labels are exchanged: the reading is then left out under its other label."""
     rng = np.random.default_rng(5)

@@ -13,7 +13,6 @@ from scipy.stats import chi2
 from bayesplate.board.material import MODULI, RIGIDITIES, moduli
 from bayesplate.board.parameter import BOARD, Owner
 from bayesplate.board.quantity import Quantity
-from bayesplate.commands.check import check
 from bayesplate.commands.problem import Problem
 from bayesplate.diagnosis import known
 from bayesplate.diagnosis.known import (
@@ -24,7 +23,6 @@ from bayesplate.diagnosis.known import (
     stated_effects,
     with_combination,
 )
-from bayesplate.diagnosis.known_words import known_models, known_sentence
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
@@ -81,29 +79,16 @@ def fits(fiemme):
     return {one.effects: one for one in known_fits(fiemme)}
 
 
-@pytest.mark.parametrize("effects", [(), (SHEAR,), (AIR,), (SHEAR, AIR)])
+@pytest.mark.parametrize("effects", [(), (SHEAR, AIR)])
 def test_the_figures_are_those_of_full_solves_with_the_effects_declared(fits, effects):
     """This card states exact shear moduli, and half a baffle is the mean of its prior as well as the median."""
     assert are_alike(fits[effects], *by_hand(FIEMME, effects))
 
 
-def test_they_are_the_figures_of_a_check(fits, monkeypatch):
-    monkeypatch.setattr("bayesplate.commands.check.signatures", lambda _: [])  # of the other effects: not looked at
-    checked = check(FIEMME, effects=(SHEAR,))
-    assert are_alike(fits[SHEAR,], checked.in_sample_rms_cents, [checked.estimate[name] for name in MODULI])
-
-
-def test_a_size_is_the_median_of_its_prior_where_the_card_states_none(tmp_path):
-    stated_card = card_of(tmp_path, without=SHEAR_LINES, lines=("shear_xz_gpa = 0.62", "shear_yz_gpa = 0.030"))
-    expected = by_hand(stated_card, (SHEAR,))
-    found = known_fit(Problem.from_card(card_of(tmp_path, without=SHEAR_LINES)).posed, (SHEAR,))
-    assert are_alike(found, *expected)
-
-
 def test_the_left_out_errors_are_those_of_full_refits(fiemme, fits):
     board = with_combination(fiemme.board, (AIR,))
     (setup,) = board.setups
-    errors, some = [], [0, 3, 5]
+    errors, some = [], [3]
     for i in some:
         fewer = replace(setup, readings=setup.readings[:i] + setup.readings[i + 1 :])
         values = weighted_least_squares(replace(board, setups=(fewer,))).values
@@ -112,8 +97,8 @@ def test_the_left_out_errors_are_those_of_full_refits(fiemme, fits):
     assert cents(fits[AIR,].errors.left_out[some]) == pytest.approx(cents(errors), abs=0.2, rel=2e-3)
 
 
-def test_nothing_is_fitted_but_the_constants(tmp_path, monkeypatch):
-    """However uncertain sizes and inputs are: with the same middles the same fit, of three parameters."""
+def test_nothing_is_fitted_but_the_constants(fits, tmp_path, monkeypatch):
+    """However uncertain an input is: with the same middle the same fit, of three parameters."""
     sizes = []
 
     def spy(law, target, scales, start):
@@ -124,16 +109,13 @@ def test_nothing_is_fitted_but_the_constants(tmp_path, monkeypatch):
     monkeypatch.setattr(known, "refit", spy)
     card = card_of(tmp_path)
     text = card.read_text(encoding="utf-8")
-    found = []
-    for sd in (0.001, 0.1):
-        card.write_text(text.replace("thickness_mm = 3\n", f"thickness_mm = {{ mean = 3, sd = {sd} }}\n"), "utf-8")
-        problem = Problem.from_card(card).posed
-        assert "thickness" in problem.board.uncertain_inputs
-        found.append([known_fit(problem), known_fit(problem, (AIR,))])
+    card.write_text(text.replace("thickness_mm = 3\n", "thickness_mm = { mean = 3, sd = 0.1 }\n"), "utf-8")
+    problem = Problem.from_card(card).posed
+    assert "thickness" in problem.board.uncertain_inputs
+    found = known_fit(problem, (AIR,))
     assert set(sizes) == {3}
-    for narrow, broad in zip(*found, strict=True):
-        assert rms(narrow.errors.in_sample) == pytest.approx(rms(broad.errors.in_sample), abs=WITHIN)
-        assert narrow.moduli == pytest.approx(broad.moduli, rel=1e-4)
+    assert rms(found.errors.in_sample) == pytest.approx(rms(fits[AIR,].errors.in_sample), abs=WITHIN)
+    assert found.moduli == pytest.approx(fits[AIR,].moduli, rel=1e-4)
 
 
 def test_sizes_are_fixed_at_their_medians_and_all_else_is_left(fiemme):
@@ -193,24 +175,11 @@ def test_a_sensor_of_stated_mass_is_shown_by_leaving_it_out(tmp_path, monkeypatc
     assert told == pytest.approx(np.arange(1.0, 9.0) / 8.0)
 
 
-def test_what_a_card_states_and_does_not_declare_is_computed_as_if_it_did(tmp_path):
-    """The stated sensor of a card whose effects are taken from it, and the same card with the sensor declared."""
-    card = card_of(tmp_path, after=ATTACHED.format(mass=5))
-    declared, bare = (Problem.from_card(card, effects=effects).posed for effects in (None, ()))
-    assert (declared.board.effects, bare.board.effects) == ((MASS,), ())
-    wanted, found = known_fit(declared), known_fit(bare, (MASS,))
-    assert (found.effects, found.without) == ((MASS,), ())
-    assert rms(found.errors.in_sample) == pytest.approx(rms(wanted.errors.in_sample), abs=WITHIN)
-    assert found.moduli == pytest.approx(wanted.moduli, rel=5e-4)
-
-
 def test_a_declared_size_of_the_library_is_fixed_in_combinations_and_learnt_as_the_board_stands(tmp_path, monkeypatch):
     card = card_of(tmp_path, without=SHEAR_LINES)
     problem = Problem.from_card(card, effects=(SHEAR,)).posed
-    bare = Problem.from_card(card).posed
-    found, wanted = known_fit(problem, (SHEAR,)), known_fit(bare, (SHEAR,))
-    assert rms(found.errors.in_sample) == pytest.approx(rms(wanted.errors.in_sample), abs=WITHIN)
-    assert abs(rms(known_fit(problem).errors.in_sample) - rms(wanted.errors.in_sample)) > 10 * WITHIN
+    fixed = known_fit(problem, (SHEAR,))
+    assert abs(rms(known_fit(problem).errors.in_sample) - rms(fixed.errors.in_sample)) > 10 * WITHIN
     monkeypatch.setattr(known, "known_fit", lambda _, combination: combination)
     assert known_fits(problem) == (None, (), (SHEAR,), (AIR,), (SHEAR, AIR))
 
@@ -242,17 +211,12 @@ def planted(tmp_path, design, effects, noise, seed=1, **fixed):
 
 
 MEDIANS = {name: mean / np.sqrt(1.0 + (sd / mean) ** 2) for name, (mean, sd) in SHEAR_MEANS.items()}
-PLANTED = {
-    SHEAR: ("cantilever-9", MEDIANS, 2.0),
-    AIR: ("cantilever-9", {"density": 1.2, "baffle": 0.5}, 0.5),
-}
 
 
-@pytest.mark.parametrize("effect", PLANTED)
-def test_a_planted_effect_of_known_size_lowers_the_error_to_the_noise(tmp_path, effect):
+def test_a_planted_effect_of_known_size_lowers_the_error_to_the_noise(tmp_path):
     """Readings of another discretisation: chi-squared of the misfit below its 99.9 % point with, far above without."""
-    design, sizes, noise = PLANTED[effect]
-    problem, truth = planted(tmp_path, design, [effect], noise, **{effect: sizes})
+    effect, noise = SHEAR, 2.0
+    problem, truth = planted(tmp_path, "cantilever-9", [effect], noise, **{effect: MEDIANS})
     found = {one: known_fit(problem, one) for one in ((), (effect,))}
     n = found[()].errors.in_sample.size
     squares = {effects: n * (rms(one.errors.in_sample) / noise) ** 2 for effects, one in found.items()}
@@ -285,17 +249,6 @@ def test_a_declared_size_that_the_readings_tell_stands_where_they_have_it(tmp_pa
     assert squares[0] < chi2.ppf(0.999, errors[0].size - 4) < squares[1]
 
 
-def test_an_error_that_rises_where_something_opposes_is_told(tmp_path):
-    """A frame that pulls on the board raises its low modes; computed air, which is not there, would lower them."""
-    problem, _ = planted(tmp_path, "clamped-9", ["membrane_tension"], 2.0)
-    as_it_stands, known_air = known_models((known_fit(problem), known_fit(problem, (AIR,))))
-    assert known_air.in_sample_rms_cents > 1.5 * as_it_stands.in_sample_rms_cents
-    assert known_air.leave_one_out_rms_cents > 1.5 * as_it_stands.leave_one_out_rms_cents
-    told = known_sentence((as_it_stands, known_air))
-    assert "fluid loading raises the left-out error from" in told
-    assert "Where the error rises, something that acts the other way is lacking" in told
-
-
 MOVED = np.array([0.06, -0.02, 0.05])
 """Change of ln D that the air makes on the board below."""
 
@@ -311,12 +264,3 @@ def test_modes_that_lie_close_keep_their_names_from_one_model_to_the_next():
     constants = dict(zip(RIGIDITIES, problem.estimate.rigidities * np.exp(MOVED), strict=True))
     anew = setup_model(solved.system, {**board.nominal(), **constants}, solved.plate)
     assert [one.rank for one in anew.places] != [one.rank for one in solved.places]
-
-
-def test_of_an_isotropic_plate_a_combination_fits_one_modulus():
-    """The one that full solves of a card with both effects declared give."""
-    found = known_fit(Problem.from_card("steel-air-water").posed, (SHEAR, AIR))
-
-    assert found.baseline.log_rigidities.shape == (1,)
-    assert found.baseline.slopes.shape == (10, 1)
-    assert are_alike(found, *by_hand("steel-air-water", (SHEAR, AIR)))

@@ -109,7 +109,7 @@ def test_the_evidence_is_summed_over_all_assignments(spoilt):
     assert abs(by_labels - enumerated(base)) > 4.0  # control
 
 
-@pytest.mark.parametrize("spoilt", [0.05, 0.13, 0.2])
+@pytest.mark.parametrize("spoilt", [0.05, 0.2])
 def test_a_peak_between_two_modes_is_hardly_undervalued(spoilt):
     """Ways to take it that no draw comes near are not in the sum: it is a lower bound, off by a nat or so."""
     base = noisy(np.random.default_rng(5), peaked, spoilt)

@@ -19,7 +19,6 @@ N_SIMULATED = {"bare": 20_000, "with an effect": 6000}
 """By `predictive_p_value`, for all sets together."""
 CERTAIN = 1e-3
 """Probability at which a test of uniformity may fail a p-value that is right."""
-SETUPS = [(NOISE,), (NOISE, NOISE), (0.4 * NOISE, 3.0 * NOISE, NOISE)]
 
 
 def uniformity(p_values, n_simulated=N_SIMULATED["bare"]):
@@ -43,9 +42,8 @@ def noisy(base, rng, factor=1.0):
     return level * rng.standard_normal((N_SETS, base.n_modes)) + rounding + inputs + constants
 
 
-@pytest.mark.parametrize("noise", SETUPS)
-@pytest.mark.parametrize("n_inputs", [0, 1])
-def test_the_p_value_is_uniform_under_noise_of_the_prior_and_not_under_three_times_it(n_inputs, noise):
+@pytest.mark.parametrize(("noise", "n_inputs"), [((NOISE,), 1), ((0.4 * NOISE, 3.0 * NOISE, NOISE), 0)])
+def test_the_p_value_is_uniform_under_noise_of_the_prior_and_not_under_three_times_it(noise, n_inputs):
     rng = np.random.default_rng(1)
     base = baseline(rng, 3 + 3 * len(noise), n_inputs=n_inputs, noise=noise, resolution=0.2)
     nothing_lacks = bare(base, noise_grid(base.board))
@@ -54,19 +52,6 @@ def test_the_p_value_is_uniform_under_noise_of_the_prior_and_not_under_three_tim
     too_large = predictive_p_value(nothing_lacks, base, noisy(base, rng, 3.0))
     assert uniformity(too_large) < CERTAIN
     assert np.mean(too_large < PASSES) > 0.3
-
-
-def test_a_noise_that_is_fitted_to_each_set_of_readings_would_not_be_uniform():
-    """What the test above has to catch: of two setups the misfit at each level of the noise, averaged over them."""
-    rng = np.random.default_rng(2)
-    base = baseline(rng, 12, noise=(NOISE, NOISE))
-    levels, blind = noise_grid(base.board), base.blind
-    seen = noisy(base, rng) @ blind.T
-    variances = levels.sd[:, base.setup_index] ** 2 + base.own_variance
-    squares = np.stack([np.einsum("nd,de,ne->n", seen, np.linalg.inv(blind * v @ blind.T), seen) for v in variances])
-    averaged = levels.weights @ chi2.sf(squares, seen.shape[1])
-    assert uniformity(averaged) < CERTAIN
-    assert np.mean(averaged < PASSES) > 1.3 * PASSES
 
 
 def test_the_p_value_of_a_known_noise_is_that_of_chi_squared():

@@ -23,7 +23,6 @@ from bayesplate.diagnosis.null_control import (
 )
 from bayesplate.diagnosis.search import Found, noise_of_board, search
 from bayesplate.diagnosis.sensitivity import under_exact_law, variants, varied
-from bayesplate.diagnosis.terms import Terms
 
 
 @pytest.fixture
@@ -35,37 +34,6 @@ def small():
     levels = noise_grid(base.board)
     ground = ground_of(base, bare(base, levels), Hypothesis(("a",), 0.4, one.fine, levels, base), candidates={"a": one})
     return ground, one
-
-
-def test_a_width_of_one_changes_nothing(finnish_few):
-    found = search(finnish_few.ground)
-    same = varied(found, width=1.0)
-    assert same.none == pytest.approx(found.none, rel=1e-9)
-    for name in finnish_few.ground.candidates:
-        assert same.inclusion(name) == pytest.approx(found.inclusion(name), rel=1e-9)
-
-
-def test_twice_the_width_halves_the_density_at_zero(small):
-    """A size that the readings put at zero loses log 2 of evidence; one far out gains what the wider prior gives it."""
-    ground, one = small
-    for z, wanted in ((0.0, -np.log(2.0)), (2.0, -np.log(2.0) + 0.5 * 2.0**2 * (1 - 1 / 4))):
-        sharp = Terms(one.fine, ground.baseline, one_level(ground.baseline, 1e-4))
-        cell = int(np.argmin(np.abs(one.fine.z[:, 0] - z)))
-        residual = one.fine.shift[cell]
-        found = Found(ground, residual, np.zeros(2), np.array([0.5, 0.5]))
-        narrow, wide = (varied(found, width=width) for width in (1.0, 2.0))
-        odds = np.log(wide.inclusion("a") / wide.none) - np.log(narrow.inclusion("a") / narrow.none)
-        assert sharp.log_evidence(residual[None, :]).size == 1
-        at = float(one.fine.z[cell, 0])
-        assert odds == pytest.approx(wanted, abs=0.25 + 0.75 * abs(at - z))
-
-
-@pytest.mark.slow
-def test_poisson_ratio_is_not_named_with_twice_its_width_either(finnish):
-    """Among all candidates."""
-    doubled = varied(search(finnish.ground), width=2.0)
-    assert doubled.none > 0.1
-    assert doubled.inclusion("poisson_ratio") < 0.5
 
 
 def test_constants_are_those_of_a_direct_regression():

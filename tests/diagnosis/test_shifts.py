@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
 import pytest
 from full_refits import full_refit
 from made_searches import baseline
 
-from bayesplate.commands.problem import Problem
-from bayesplate.diagnosis.baseline import baseline_of
-from bayesplate.diagnosis.forms import forms, with_forms
+from bayesplate.diagnosis.forms import with_forms
 from bayesplate.diagnosis.laws import FormLaw, form_law
 from bayesplate.diagnosis.search import prepare_search, search
 from bayesplate.diagnosis.shifts import refitted, tabulate
-from bayesplate.diagnosis.signatures import Signature, signature, signatures
+from bayesplate.diagnosis.signatures import Signature, signatures
 from bayesplate.frequencies.laws import cents
 
 CENT = 1.0
@@ -61,13 +58,13 @@ def compared(ground, rng, n_forms):
             yield name, float(np.abs(cents(found - exact)).max()), float(np.abs(moved).max()), exact
 
 
-def test_every_effect_on_the_cantilever_is_as_full_solves_have_it(finnish_most):
+def test_every_effect_on_the_cantilever_is_as_full_solves_have_it(finnish_few):
     shown = 0
-    for name, error, moved, exact in compared(finnish_most.ground, np.random.default_rng(1), 1):
+    for name, error, moved, exact in compared(finnish_few.ground, np.random.default_rng(1), 1):
         assert moved < FAR, name
         assert error < CENT, name
         shown += np.abs(cents(exact)).max() > 5.0 * CENT
-    assert shown >= 4  # else the comparison would say nothing
+    assert shown >= 3  # else the comparison would say nothing
 
 
 class NoPlate(FormLaw):
@@ -89,39 +86,19 @@ def test_an_effect_that_leaves_no_plate_is_not_tried(finnish_few):
         assert found.probability.sum() == pytest.approx(1.0)
 
 
-@pytest.mark.slow
-def test_every_effect_on_the_clamped_board_is_as_full_solves_have_it(fiemme):
-    """An effect that needs the constants to change by a factor of two leaves the region for which its law is made."""
-    near = [
-        (name, error) for name, error, moved, _ in compared(fiemme.ground, np.random.default_rng(2), 2) if moved < FAR
-    ]
-    assert len(near) >= 8
-    assert all(error < CENT for _, error in near), near
-
-
-def test_another_size_is_not_within_a_cent(finnish_most):
-    """Negative control: the comparison sees a change of the size by a tenth of its prior."""
-    (law,) = finnish_most.ground.candidates["fluid_loading"].laws
-    z = np.zeros((1, 1))
-    base = finnish_most.ground.baseline
-    exact, _ = full_refit(base, law.form.board, values_at(law.form, z + 0.3), 1 / base.scales)
-    shift, _ = refitted(base, law, z)
-    assert np.abs(cents(shift - exact)).max() > CENT
-
-
-def test_the_constants_absorb_nothing_of_what_is_tabulated(finnish_most):
+def test_the_constants_absorb_nothing_of_what_is_tabulated(finnish_few):
     """To a cent, at sizes up to one sd; beyond, the step that serves the bare board may not settle."""
-    base = finnish_most.ground.baseline
-    for one in finnish_most.ground.candidates.values():
+    base = finnish_few.ground.baseline
+    for one in finnish_few.ground.candidates.values():
         kept = np.abs(one.fine.z).max(axis=1, initial=0.0) <= 1.0
         assert np.abs(cents(one.fine.shift[kept] @ base.absorbing.T)).max() < CENT
         assert one.fine.weights.sum() == pytest.approx(1.0)
         assert one.coarse.weights.sum() == pytest.approx(1.0)
 
 
-def test_the_cells_hold_the_prior(finnish_most):
+def test_the_cells_hold_the_prior(finnish_few):
     """Mean of the size over cells is the prior's, at the accuracy of the middle rule and of a reach of three sd."""
-    one = finnish_most.ground.candidates["clamp_translation"]
+    one = finnish_few.ground.candidates["clamp_translation"]
     (free,) = one.laws[0].form.free
     mean = float(one.fine.weights @ free.prior.value(one.fine.z[:, 0]))
     assert mean == pytest.approx(free.prior.sd * np.sqrt(2 / np.pi), rel=0.01)
@@ -129,10 +106,10 @@ def test_the_cells_hold_the_prior(finnish_most):
     assert coarse == pytest.approx(free.prior.sd * np.sqrt(2 / np.pi), rel=0.02)
 
 
-def test_two_effects_add_on_the_cantilever(finnish_most):
+def test_two_effects_add_on_the_cantilever(finnish_few):
     """At nominal sizes, against the joint full solve: to a tenth of the noise there."""
-    ground, base = finnish_most.ground, finnish_most.ground.baseline
-    for names in combinations(("transverse_shear", "fluid_loading", "thickness_profile"), 2):  # those best seen
+    ground, base = finnish_few.ground, finnish_few.ground.baseline
+    for names in [("fluid_loading", "thickness_profile")]:
         laws = [ground.candidates[name].laws[0] for name in names]
         total, at = np.zeros(base.n_modes), {}
         for law in laws:
@@ -145,22 +122,21 @@ def test_two_effects_add_on_the_cantilever(finnish_most):
         assert np.abs((alone - exact) / base.scales).max() > 0.1, names
 
 
-@pytest.mark.parametrize("name", ["fluid_loading", "thickness_profile", "grain_angle"])
-def test_a_law_made_for_another_board_serves_once_its_modes_are_placed(finnish_most, name):
+def test_a_law_made_for_another_board_serves_once_its_modes_are_placed(finnish_few):
     """The same sizes, constants half as large again: made there with a wide region, placed here."""
-    base = finnish_most.ground.baseline
+    base, name = finnish_few.ground.baseline, "fluid_loading"
     elsewhere = base.log_rigidities + np.array([0.3, -0.2, 0.1])
     values = {**base.values, **dict(zip(("D_x", "D_y", "D_s"), np.exp(elsewhere), strict=True))}
     far = replace(base, log_rigidities=elsewhere, values=values)
-    form = finnish_most.ground.candidates[name].laws[0].form
+    form = finnish_few.ground.candidates[name].laws[0].form
     placed = form_law(far, form, half_width=0.8).placed(base)
-    own = finnish_most.ground.candidates[name].laws[0]
+    own = finnish_few.ground.candidates[name].laws[0]
     assert tabulate(base, [placed]).shift == pytest.approx(tabulate(base, [own]).shift, abs=CENT * np.log(2) / 1200)
 
 
-def test_signatures_and_tables_tell_the_same_of_every_effect(finnish_most):
+def test_signatures_and_tables_tell_the_same_of_every_effect(finnish_few):
     """`check` and `diagnose` show the same numbers, from full solves and from reduced models."""
-    ground, problem = finnish_most.ground, finnish_most.problem
+    ground, problem = finnish_few.ground, finnish_few.problem
     for name, one in ground.candidates.items():
         (here,) = signatures(problem, [name])
         assert one.signature.raw == pytest.approx(here.raw, abs=0.3), name
@@ -184,29 +160,3 @@ def test_a_visible_part_is_never_larger_than_the_whole_shift(weights):
     assert any(plain) is (len(set(weights)) > 1)
     two = Signature("", {}, np.array([3.0, 1.0]), np.zeros(2), {}, np.array([1.0, 2.0]))
     assert two.raw_rms == pytest.approx(np.sqrt((9 + 0.25) / 1.25))
-
-
-@pytest.fixture(scope="module")
-def uneven():
-    """A measured board of uneven thickness."""
-    return Problem.from_card("spruce-free-3L", effects=("thickness_profile", "outline_profile")).posed
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["grain_angle", "support_stiffness"])
-def test_on_a_measured_board_of_uneven_thickness_an_effect_shows_less_than_it_shifts(uneven, name):
-    """Near a veering, where a few steps of a linear refit leave more than the shift; and on a bed that lifts the board.
-
-    The bed resists the rigid motions, which an uneven board mixes into its modes: no rigid motion is taken for a mode.
-    """
-    base = baseline_of(uneven)
-    law = form_law(base, forms(base.board)[name][0]).placed(base)
-    nominal = {one.name: np.array([one.nominal]) for one in law.form.free}
-    there = law.log_frequencies(base, base.log_rigidities[None, :], nominal)[0]
-    found = signature(base, name, law.form.free, there)
-    (told,) = signatures(uneven, [name])
-
-    assert 0.5 < found.visible_rms / found.raw_rms < 1.0
-    assert told.visible_rms < told.raw_rms
-    assert found.raw == pytest.approx(told.raw, abs=0.3)
-    assert found.visible == pytest.approx(told.visible, abs=0.3)

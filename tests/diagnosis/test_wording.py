@@ -202,6 +202,9 @@ def test_the_probabilities_sum_to_one_as_they_are_printed():
     thirds = [replace(NAMED.answers[0], probability=share, words=f"{i}") for i, share in enumerate((1 / 3, 1 / 3))]
     shares = [row[1] for row in answers_table(replace(NAMED, probability_of_none=1 / 3, answers=tuple(thirds))).texts]
     assert sorted(shares) == ["0.333", "0.333", "0.334"]
+    for share, n_rows in ((0.0099, 3), (0.01, 4)):  # worth a row of its own from one per cent on
+        one = (NAMED.answers[0], replace(NAMED.answers[0], words="x", probability=share))
+        assert len(answers_table(replace(NAMED, answers=(*one, *NAMED.answers[1:]))).texts) == n_rows
 
 
 def test_what_looks_like_the_named_effect_is_told():

@@ -1,14 +1,13 @@
-"""Grain angle: a quarter turn, the generator, Mascia and Lahr's numbers, and where a first-order column fails."""
+"""Grain angle: a quarter turn, and where its sign counts."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-import generator.effects
 import numpy as np
 import pytest
-from effect_plates import MADE, SHEAR, hertz, hertz_apart, modes_of, setup_of, shifts, values_of
-from generator.known_boards import BEAMS, FINNISH, FREE
+from effect_plates import MADE, SHEAR, hertz, setup_of, values_of
+from generator.known_boards import FINNISH, FREE
 from made_boards import board_of
 
 from bayesplate.board.attached import AttachedItem
@@ -19,24 +18,8 @@ from bayesplate.effects.attached_mass import AttachedMass
 from bayesplate.effects.grain_angle import GrainAngle
 from bayesplate.effects.transverse_shear import TransverseShear
 from bayesplate.frequencies.system import System
-from bayesplate.plate.naming import find
 
 ANGLE = "grain_angle.angle"
-EXACT = [-17.6, 4.9, -8.9, -7.2, 4.5, -6.5]
-FIRST_ORDER = [-4.7, 23.0, -4.6, 12.0, 10.0, 20.0]
-"""physics.md 4, at 3 degrees on the cantilever."""
-
-
-@pytest.mark.parametrize(
-    ("plate", "is_sheared"),
-    [(FINNISH, True), (FREE, False)],
-    ids=["cantilever, shear-flexible", "free"],
-)
-def test_against_the_generator(plate, is_sheared):
-    angle = np.radians(12.0)
-    independent = generator.effects.GrainAngle(angle)
-    apart = hertz_apart(plate, [GrainAngle()], {ANGLE: angle}, [independent], 6, is_sheared)
-    assert apart == pytest.approx(0.0, abs=0.5)
 
 
 @pytest.mark.parametrize("is_sheared", [False, True], ids=["thin", "shear-flexible"])
@@ -53,53 +36,13 @@ def test_a_quarter_turn_swaps_the_axes(is_sheared):
     np.testing.assert_allclose(turned[expected.size :] / expected.max(), 0.0, atol=1e-14)
 
 
-def test_sizes_on_the_papers_cantilever():
-    moved = shifts(FINNISH, [GrainAngle()], {ANGLE: np.radians(3.0)}, BEAMS["cantilever"])
-    assert moved == pytest.approx(EXACT, abs=0.06)
-
-
-def test_first_order_use_fails():
-    """The energies of the unturned modes under the turned weights: another answer, with wrong signs."""
-    system, values = System(setup_of(FINNISH), (GrainAngle(),)), values_of(FINNISH, {ANGLE: 0.0})
-    turned = {**values, ANGLE: np.asarray(np.radians(3.0))}
-    found = find(system.plate(values), system.weights(values).at(0), BEAMS["cantilever"])
-    weights = system.weights(turned).stiffness[0]
-    column = np.array([600 * np.log2(found[b].stiffness @ weights / found[b].eigenvalue) for b in BEAMS["cantilever"]])
-
-    assert column == pytest.approx(FIRST_ORDER, abs=0.6)
-    assert np.abs(column - EXACT).max() > 20.0
-
-
-def test_the_sign_of_the_angle_is_not_seen():
-    up, down = (modes_of(FREE, [GrainAngle()], {ANGLE: a}, 6).eigenvalues for a in (0.08, -0.08))
-    np.testing.assert_allclose(up, down, rtol=1e-8)
-    assert GrainAngle().parameters()[0].prior.lower == 0.0
-
-
-def test_a_material_alike_both_ways_has_no_grain():
-    isotropic = replace(FINNISH, E_y=FINNISH.E_x, nu_xy=0.3, G_xy=FINNISH.E_x / 2.6)
-    assert shifts(isotropic, [GrainAngle()], {ANGLE: 0.5}, BEAMS["cantilever"]) == pytest.approx(0.0, abs=1e-3)
-
-
 CORNER, MIRRORED, MIDDLE = (0.97, 0.91), (0.97, 0.09), (0.97, 0.5)
 
 
-def test_a_thing_at_a_corner_tells_the_sign():
-    """The other sign is the same board with the thing at the mirrored corner."""
-    at = {place: AttachedMass(MADE, (Item(Quantity.exact(3e-3), "", (place,)),)) for place in (CORNER, MIRRORED)}
-    turned, other, mirrored = (
-        hertz(FREE, [GrainAngle(), at[place]], {ANGLE: np.radians(degrees), "attached_mass.mass": 3e-3}, 8)
-        for place, degrees in ((CORNER, 3.0), (CORNER, -3.0), (MIRRORED, 3.0))
-    )
-    assert np.abs(1200 * np.log2(turned / other)).max() > 30.0
-    assert other == pytest.approx(mirrored, rel=1e-6)
-
-
-@pytest.mark.parametrize("degrees", [1.0, 5.0])
-def test_an_angle_away_from_y_is_the_other_sign(degrees):
+def test_an_angle_away_from_y_is_the_other_sign():
     corner = AttachedMass(MADE, (Item(Quantity.exact(3e-3), "", (CORNER,)),))
     (away,) = (one.name for one in GrainAngle(sign=-1).parameters())
-    angle, mass = np.radians(degrees), {"attached_mass.mass": 3e-3}
+    angle, mass = np.radians(5.0), {"attached_mass.mass": 3e-3}
     found = hertz(FREE, [GrainAngle(sign=-1), corner], {away: angle} | mass, 8)
     assert found == pytest.approx(hertz(FREE, [GrainAngle(), corner], {ANGLE: -angle} | mass, 8), rel=1e-12)
 
@@ -134,7 +77,6 @@ def test_a_thickness_that_was_read_at_places_tells_the_sign(card, details):
     [
         (CORNER, ("grain_angle", "attached_mass"), {}, True),
         (MIDDLE, ("grain_angle", "attached_mass"), {}, False),
-        (CORNER, ("grain_angle",), {}, False),
         (CORNER, ("attached_mass",), {}, False),
         (MIDDLE, ("grain_angle", "attached_mass"), {"x0": "clamped", "y0": "clamped"}, True),
     ],

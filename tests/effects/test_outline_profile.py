@@ -9,9 +9,8 @@ import made_boards
 import numpy as np
 import pytest
 import ritz
-from effect_plates import MADE, hertz, hertz_apart, modes_of, posed, setup_of, values_of
+from effect_plates import MADE, hertz, hertz_apart, modes_of, setup_of, values_of
 from generator.known_boards import FIEMME, FINNISH, FREE
-from generator.plate import FINE_SHEAR
 from generator.plate import solve as solve_generator
 from made_boards import board_of
 
@@ -31,7 +30,6 @@ from bayesplate.effects.support_mass import SupportMass
 from bayesplate.effects.support_stiffness import SupportStiffness
 from bayesplate.effects.thickness_profile import ThicknessProfile
 from bayesplate.frequencies.residues import residues_of
-from bayesplate.posterior.laplace import worst_cents
 
 BENT = ((0.0, 0.3, 0.6, 1.0), (0.97, 1.02, 1.01, 1.0))
 CUT = ((0.0, 0.25, 0.5, 0.75, 1.0), (1.0, 1.0, 1.0, 0.972, 0.899))
@@ -58,36 +56,14 @@ def independent(plate, stations, widths, steps=()):
     return generator.effects.OutlineProfile(tuple(FINELY * plate.L_x), tuple(relative * plate.L_y))
 
 
-PROFILES = {"taper": ((0.0, 1.0), (1.01, 0.99)), "bent": BENT, "cut": CUT}
-PLATES = {"cantilever": FINNISH, "free": FREE}
-CASES = [
-    pytest.param(
-        PLATES[plate],
-        PROFILES[profile],
-        is_sheared,
-        id=f"{plate}-{profile}-{'shear-flexible' if is_sheared else 'thin'}",
-        marks=pytest.mark.slow if is_sheared else (),
-    )
-    for plate in PLATES
-    for profile in PROFILES
-    for is_sheared in (False, True)
-]
+SHEARED = pytest.param(FREE, CUT, True, id="free-cut-shear-flexible", marks=pytest.mark.slow)
 
 
-@pytest.mark.parametrize(("plate", "profile", "is_sheared"), CASES)
+@pytest.mark.parametrize(("plate", "profile", "is_sheared"), [(FINNISH, CUT, False), (FREE, BENT, False), SHEARED])
 def test_against_the_generator(plate, profile, is_sheared):
     effect = outline(plate, *profile)
     apart = hertz_apart(plate, [effect], {}, [independent(plate, *profile)], 6, is_sheared)
     assert apart == pytest.approx(0.0, abs=0.5)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("plate", [FINNISH, FREE], ids=["cantilever", "free"])
-def test_twelve_modes_of_a_shear_flexible_board_that_narrows(plate):
-    """By 5 percent over its second half; twist at free edges asks for the generator's fine polynomials."""
-    profile = ((0.0, 0.5, 1.0), (1.0, 1.0, 0.95))
-    effects, planted = [outline(plate, *profile)], [independent(plate, *profile)]
-    assert hertz_apart(plate, effects, {}, planted, 12, is_sheared=True, n=FINE_SHEAR) == pytest.approx(0.0, abs=0.5)
 
 
 @dataclass(frozen=True)
@@ -106,8 +82,7 @@ class InAWiderRectangle(OutlineProfile):
         return lambda x: (np.zeros_like(x), np.full_like(x, 1.0 / self.factor))
 
 
-@pytest.mark.parametrize("plate", [FINNISH, FREE], ids=["cantilever", "free"])
-@pytest.mark.parametrize("factor", [1.003, 1.3])
+@pytest.mark.parametrize(("plate", "factor"), [(FINNISH, 1.003), (FREE, 1.3)], ids=["cantilever", "free"])
 def test_a_narrower_board_is_the_smaller_rectangle(plate, factor):
     """No rest of the ghost outside, and no mode of it."""
     cents = 1200 * np.log2(hertz(plate, [InAWiderRectangle(factor=factor)], {}, 8) / hertz(plate, [], {}, 8))
@@ -148,13 +123,6 @@ def test_air_of_a_board_that_narrows():
         assert 1200 * np.log2(wet / dry) == pytest.approx(np.array(expected), abs=1.0)
 
 
-def test_the_free_edge_recedes_where_the_other_is_held():
-    """A board hinged along y0 is the mirror image of the one hinged along y1."""
-    hinged = [replace(FREE, edges=FREE.edges | {edge: "supported"}) for edge in ("y0", "y1")]
-    low, high = (hertz(plate, [outline(plate, *CUT)], {}, 6) for plate in hinged)
-    np.testing.assert_allclose(low, high, rtol=1e-6)
-
-
 def test_thickness_and_outline_together():
     thick = generator.effects.ThicknessProfile(0.1, 0.06)
     surface = Surface(((1, 0), (0, 1)), (0.1 / np.sqrt(12.0), 0.06 / np.sqrt(12.0)))
@@ -171,12 +139,12 @@ STEP = Surface(DEGREES, (1e-3, -2e-3, 1.5e-3, -1e-3))
 
 @pytest.mark.parametrize(
     ("plate", "is_sheared"),
-    [(FINNISH, False), (FREE, False), pytest.param(FREE, True, marks=pytest.mark.slow)],
-    ids=["cantilever", "free", "free and shear-flexible"],
+    [(FINNISH, False), pytest.param(FREE, True, marks=pytest.mark.slow)],
+    ids=["cantilever", "free and shear-flexible"],
 )
-@pytest.mark.parametrize("steps", [2.0])
-def test_what_is_open_to_first_order_against_the_generator(plate, is_sheared, steps):
+def test_what_is_open_to_first_order_against_the_generator(plate, is_sheared):
     """At two standard deviations an eighth of the shift is missed at most, a cent."""
+    steps = 2.0
     effect = outline(plate, *CUT, components=(STEP,))
     moved = [independent(plate, *CUT, steps=[scaled(STEP, steps)])]
     found, ignored = (
@@ -195,15 +163,6 @@ def test_no_step_leaves_the_edge_weighing_less_than_nothing():
     assert far[20.0] == pytest.approx(far[2.94], rel=1e-9)
     cents = 1200 * np.log2(far[-20.0] / hertz(FREE, [outline(FREE, *CUT)], {}, 6))
     assert 1.0 < np.abs(cents).max() < 20.0
-
-
-def test_two_components_at_their_ends_leave_a_plate():
-    """Their strips lie one in the other: where both narrow the board they must not weigh less than nothing."""
-    effect = outline(FREE, *CUT, components=(STEP, scaled(STEP, 0.8)))
-    parts = [f"outline_profile.field_{k}" for k in (1, 2)]
-    away = [hertz(FREE, [effect], dict.fromkeys(parts, at), 6) for at in (-2.94, 2.94)]
-    cents = 1200 * np.log2(np.array(away) / hertz(FREE, [outline(FREE, *CUT)], {}, 6))
-    assert 1.0 < np.abs(cents).max() < 40.0
 
 
 def scaled(surface, factor):
@@ -247,17 +206,9 @@ def test_refuses_what_it_cannot_do():
     assert (OutlineProfile.is_implied(plain), OutlineProfile.is_implied(read)) == (False, True)
 
 
-THREE = pytest.param(["outline_profile", "thickness_profile", "grain_angle"], marks=pytest.mark.slow)
-
-
-@pytest.mark.parametrize("effects", [["outline_profile"], THREE])
-def test_reduced_order_model_is_exact(effects):
-    assert worst_cents(posed("spruce-free-1R", effects).posterior.models) < 0.5
-
-
-@pytest.mark.parametrize("steps", [-2.0, 2.0])
-def test_components_of_the_thickness_leave_nothing_negative_outside_the_outline(steps):
+def test_components_of_the_thickness_leave_nothing_negative_outside_the_outline():
     """What is left of the plate there has the weight of what is expected: a negative mass has modes of its own."""
+    steps = -2.0
     surfaces = [Surface(((i, j),), (0.01,)) for i, j in ((1, 0), (0, 1), (1, 1))]
     open_field = ThicknessProfile(profile=FieldProfile(Surface(((1, 0),), (0.0,)), None, tuple(surfaces), FREE.h, 0.0))
     effects = [outline(FREE, (0.0, 0.5, 1.0), (0.6, 1.0, 0.6)), open_field]  # whole elements lie outside
@@ -282,23 +233,21 @@ def test_a_clamp_along_the_straight_edge_covers_as_much_everywhere():
 
 
 LEVEL = ((0.0, 0.5, 1.0), (1.02, 1.0, 0.84))
-PLACES = [(0.97, 0.93), (0.97, 0.02)]
-"""As fractions of the nominal sides; the second is off the board, where it narrows."""
 
 
-@pytest.mark.parametrize("place", PLACES)
-def test_a_thing_stands_where_it_was_measured_from_the_corner(place):
-    """And never beside the board, on what is left of the rectangle: there it would have a mode of its own."""
+def test_a_thing_stands_where_it_was_measured_from_the_corner():
+    """At its rim where the board narrows: on what is left of the rectangle there it would have a mode of its own."""
+    place = 0.97, 0.02  # as fractions of the nominal sides
     mass, item = 3e-3, Item(Quantity.exact(3e-3), "", (place,))
     effect, planted = outline(FREE, *LEVEL), independent(FREE, *LEVEL)
     widths = np.array(planted.widths)
     widest, at = widths.max(), np.interp(place[0] * FREE.L_x, planted.stations, widths)
     y = np.clip(0.5 * (widest - widths[0]) + place[1] * FREE.L_y, 0.5 * (widest - at), 0.5 * (widest + at))
     heavy = generator.effects.AttachedMass(mass, ((place[0] * FREE.L_x, y),))
-    few, many = (solve_generator(FREE, (planted, heavy), 9, (n, n)).frequencies[3:] for n in (16, 22))
+    few, many = (solve_generator(FREE, (planted, heavy), 9, (n, n)).frequencies[3:] for n in (12, 18))
 
     found = hertz(FREE, [effect, AttachedMass(MADE, (item,))], {"attached_mass.mass": mass}, 6)
-    assert 1200 * np.log2(found / (many + (many - few) / ((22 / 16) ** 2 - 1))) == pytest.approx(0.0, abs=0.5)
+    assert 1200 * np.log2(found / (many + (many - few) / ((18 / 12) ** 2 - 1))) == pytest.approx(0.0, abs=0.5)
 
 
 def test_a_thing_beside_the_board_tilts_with_its_rim():

@@ -129,14 +129,12 @@ def test_mass_of_a_thing_that_the_card_does_not_weigh(kind):
     assert [(one.unit, one.prior) for one in found] == [("kg", item.mass)]
 
 
-def test_an_exciter_is_no_mass_that_moves_with_the_board():
-    assert EFFECTS["attached_mass"].of(DRIVEN, DRIVEN.setups[0]).parameters() == ()
-
-
 def test_mass_of_a_thing_that_nobody_mentioned():
     board = BOARDS[1]
     sd = FORGOTTEN_SHARE * FREE.rho * FREE.h * FREE.L_x * FREE.L_y
-    for effect in EFFECTS["attached_mass"].candidates(board, board.setups[0]):
+    tried = EFFECTS["attached_mass"].forms(board)
+    assert len(tried) > 1
+    for effect in (one for form in tried for one in form.effects):
         (found,) = effect.parameters()
         assert same(found.prior, "normal", 0.0, sd, HALF), told(found.prior)
 
@@ -161,7 +159,7 @@ def test_resonance_in_place_of_a_suspension():
     assert found["resonance"] == ("Hz", stated)
 
 
-@pytest.mark.parametrize("board", [*BOARDS, DRIVEN], ids=["clamped", "free", "driven"])
+@pytest.mark.parametrize("board", [BOARDS[1], DRIVEN], ids=["free", "driven"])
 def test_a_search_keeps_prior_and_unit(board):
     """What it tries is the effect's own parameter, not one of another width or without a unit."""
     seen = set()

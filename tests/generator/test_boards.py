@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import itertools
 import tomllib
 from pathlib import Path
 
@@ -22,6 +21,8 @@ from generator.plate import solve
 from generator.recipes import OUTSIDE, RECIPES
 
 FOLDER = Path(__file__).parent
+TRIED = ("clamped-9", "cantilever-6-free-6")
+"""Designs that between them have every kind of edge."""
 
 
 @pytest.fixture
@@ -30,7 +31,7 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(20)
 
 
-@pytest.mark.parametrize("design", DESIGNS.values(), ids=DESIGNS)
+@pytest.mark.parametrize("design", [DESIGNS[name] for name in TRIED], ids=TRIED)
 def test_every_effect_of_a_design_moves_its_labelled_modes(design, rng: np.random.Generator) -> None:
     """By 1 to 150 cents rms at nominal size, air on the light clamped board most; the package reads every card."""
     for effect in (*design.drawn, *design.drawn_outside):
@@ -74,10 +75,10 @@ def test_noise_is_what_the_truth_says(rng: np.random.Generator) -> None:
 
 
 def test_a_drawn_noise_is_log_normal_about_the_one_stated(rng: np.random.Generator) -> None:
-    """Mean and variance of ln noise over 60 boards of two setups within four standard errors; no card tells it."""
+    """Mean and variance of ln noise over 30 boards of two setups within four standard errors; no card tells it."""
     boards = [
         plant(rng, "cantilever-6-free-6", [], noise_cents=5.0, noise_factor=1.65, noise_is_drawn=True)
-        for _ in range(60)
+        for _ in range(30)
     ]
     levels = np.array([[board.truth.drawn_noise[name] for name in ("cantilever", "free")] for board in boards])
     z = np.log(levels / 5.0) / np.log(1.65)
@@ -137,18 +138,6 @@ def test_same_seed_same_board() -> None:
     assert first.card_text() != other.card_text()
 
 
-def test_random_boards_have_random_effects_sizes_and_noise(rng: np.random.Generator) -> None:
-    truths = [plant(rng, "cantilever-6", size=None, noise_cents=None).truth for _ in range(60)]
-    numbers = {len(truth.effects) for truth in truths}
-    sizes = list(itertools.chain.from_iterable(truth.size.values() for truth in truths))
-
-    assert numbers == {0, 1, 2}
-    assert any(not truth.is_in_library for truth in truths)
-    assert all(0.5 <= size <= 2.0 for size in sizes)
-    assert np.ptp(sizes) > 0.5
-    assert all(2.0 <= truth.noise_cents <= 17.0 for truth in truths)
-
-
 def test_air_and_shear_keep_their_physical_size_unless_told(rng: np.random.Generator) -> None:
     physical, doubled = (
         plant(rng, "free-12", ["fluid_loading"], 2.0, scale_known=scale).truth.effects["fluid_loading"]["density"]
@@ -198,10 +187,10 @@ def test_every_recipe_has_a_design() -> None:
 
 
 @pytest.mark.parametrize("effect", ["warp", "exciter"])
-@pytest.mark.parametrize("design", DESIGNS.values(), ids=DESIGNS)
+@pytest.mark.parametrize("design", [DESIGNS[name] for name in TRIED], ids=TRIED)
 def test_warp_and_exciter_of_every_design(design, effect: str) -> None:
-    """Rms over three boards of 1 to 150 cents at nominal size: both are drawn from wide priors; the card is silent."""
-    boards = [plant(np.random.default_rng(seed), design, [effect]) for seed in (1, 2, 4)]
+    """Rms over two boards of 1 to 150 cents at nominal size: both are drawn from wide priors; the card is silent."""
+    boards = [plant(np.random.default_rng(seed), design, [effect]) for seed in (1, 2)]
     shifts = np.array([c for board in boards for setup in board.shifts().values() for c in setup.values()])
     card = tomllib.loads(boards[0].card_text())
 
@@ -243,17 +232,6 @@ def test_card_states_what_scales_and_a_straightedge_say(rng: np.random.Generator
     assert "at_mm" not in only
     assert only["magnet"] == "free"
     assert "attached" not in tomllib.loads(somewhere.card_text())["setup"][0]
-
-
-def test_warp_is_drawn_about_flat_in_signs_that_can_be_told() -> None:
-    """Mean squares of 200 draws within four standard errors of 0.5 % of the width, 0.4 % of the length, 1 %."""
-    design, rng = DESIGNS["free-12"], np.random.default_rng(3)
-    drawn = np.array([list(RECIPES["warp"].draw(rng, design, 2.0).values()) for _ in range(200)])
-    spread = 2.0 * np.array([0.005 * design.L_y, 0.004 * design.L_x, 0.01 * design.L_x])
-
-    assert np.mean((drawn / spread) ** 2, axis=0) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / 200))
-    assert np.all(drawn[:, [0, 2]] > 0.0)
-    assert 60 < np.sum(drawn[:, 1] > 0.0) < 140
 
 
 @pytest.mark.parametrize("design", STEEL_DESIGNS.values(), ids=STEEL_DESIGNS)

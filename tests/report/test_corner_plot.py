@@ -43,7 +43,7 @@ def test_every_pair_has_a_panel_with_its_draws(columns, drawn, tmp_path):
             assert low < columns[name].mean() < high
 
 
-@pytest.mark.parametrize("n", [1, 3, 6, 9])
+@pytest.mark.parametrize("n", [1, 6, 9])
 def test_a_panel_has_two_ticks_and_none_where_it_would_run_into_the_next_panel(n):
     """As wide as the page up to six columns; every column ten times narrower than the one before, in full numbers."""
     rng = np.random.default_rng(2)

@@ -67,17 +67,6 @@ def test_a_question_mark_is_explained_where_there_is_one(picture):
     assert "question mark" not in picture.caption
 
 
-def test_no_two_names_overlap(picture):
-    (panel,) = picture.figure.axes
-    picture.figure.canvas.draw()
-    boxes = [text.get_window_extent() for text in panel.texts]
-
-    assert len(boxes) == 6
-    for i, one in enumerate(boxes):
-        for other in boxes[:i]:
-            assert not one.overlaps(other)
-
-
 def test_names_that_crowd_at_the_upper_end_stay_within_the_figure():
     crowd = tuple(mode(f"({k},4)", 258.0 + k, 1.0 / (k + 1)) for k in range(14))
     made = replace(SUMMARY, peaks=PEAKS, spectra=(Spectrum("bench", 0.2, 0.02, (MODES[0], *crowd)),))

@@ -71,7 +71,7 @@ def drawn(correlation, n=40_000):
     return SimpleNamespace(moduli={"E_x": np.exp(log_modulus)}, inputs={"thickness": thickness, "support": support})
 
 
-@pytest.mark.parametrize("correlation", [0.0, 0.6, 0.9])
+@pytest.mark.parametrize("correlation", [0.0, 0.9])
 def test_shares_and_what_the_readings_leave_add_up_to_the_variance(correlation):
     """The control is the squared correlation with each input itself: together more than there is, or less."""
     draws = drawn(correlation)
@@ -92,13 +92,3 @@ def test_an_input_that_were_known_would_take_its_share_off():
     share = input_shares(draws)["E_x"]["thickness"]
     assert share == pytest.approx(9.0 / 14.0, abs=error)
     assert 1.0 - without.var() / log_modulus.var() == pytest.approx(share, abs=error)
-
-
-def test_two_inputs_that_say_the_same_share_what_they_say():
-    draws = drawn(0.0)
-    before = input_shares(draws)["E_x"]["thickness"]
-    draws.inputs["again"] = 2.0 * draws.inputs["thickness"]
-    shares = input_shares(draws)["E_x"]
-    assert shares["again"] == pytest.approx(shares["thickness"])
-    # Inputs that are uncorrelated but for chance take as much from each other as chance makes them alike.
-    assert shares["again"] + shares["thickness"] == pytest.approx(before, abs=4.0 / np.sqrt(draws.inputs["again"].size))

@@ -7,7 +7,7 @@ import io
 import re
 
 import pytest
-from payloads import DIRECTION_MARKS, PAYLOADS, shown
+from payloads import DIRECTION_MARKS, EVERY, PAYLOADS, shown
 from read_pages import Read, faults
 
 from bayesplate.results.tables import Table, escape, notebook, render, visible
@@ -22,7 +22,7 @@ def table_of(text):
     return Table(text, (text, "value"), ((text, Value(1.25, 0.5)), (text, None)))
 
 
-@pytest.mark.parametrize("payload", [*PAYLOADS, *FORMULAS, *STEERS], ids=repr)
+@pytest.mark.parametrize("payload", [EVERY, *FORMULAS, *STEERS], ids=repr)
 def test_a_text_stays_a_text_in_every_medium(payload):
     """It is seen as it stands, and nothing else happens."""
     seen = " ".join(visible(payload).split())
