@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -48,8 +48,8 @@ from bayesplate.results.folder import FIGURES
 
 if TYPE_CHECKING:
     from bayesplate.recordings.hits import Hit
-    from bayesplate.recordings.reading import Read
     from bayesplate.recordings.sand import Floats
+    from bayesplate.recordings.signals import Read
 
 FRAGMENT, PAGE, SUMMARY = "setup.toml", "recordings.html", "pick.json"
 _RATE_OFF = 1e-6
@@ -151,7 +151,8 @@ def pick(
     pictures = {hertz: read_picture(path) for hertz, path in (sand or {}).items()}
     read = read_recordings(files, rate, channels, motion)
     read = [
-        [one.at(*places) for one in own] for own, places in zip(read, given_places(hammer, sensor, read), strict=True)
+        [replace(one, hammer=struck, sensor=listened) for one in own]
+        for own, (struck, listened) in zip(read, given_places(hammer, sensor, read), strict=True)
     ]
     heard = take(read, highest) if sweep is None else take_impulses(_impulses(read, sweep), highest)
     picked = pick_modes(heard.spectra, lowest, highest)

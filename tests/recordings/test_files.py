@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from made_recordings import SENSOR, board, hits, write_wav
 from scipy.io import wavfile
 
 from bayesplate.errors import InputError
-from bayesplate.recordings.reading import Read, read_recordings
-from bayesplate.recordings.signals import Recording
+from bayesplate.recordings.reading import read_recordings
+from bayesplate.recordings.signals import Read, Recording
 from bayesplate.recordings.sweeps import Sweep, impulse_response
 from bayesplate.recordings.taking import take
 
@@ -277,7 +275,7 @@ def swept(signal: np.ndarray) -> Recording:
 
 @pytest.mark.parametrize(
     "other",
-    [replace(SWEPT, last=1400.0), replace(SWEPT, duration=3.2), replace(SWEPT, first=40.0), Sweep(25.0, 900.0, 6.0)],
+    [SWEPT._replace(last=1400.0), SWEPT._replace(duration=3.2), SWEPT._replace(first=40.0), Sweep(25.0, 900.0, 6.0)],
 )
 def test_a_sweep_that_was_not_played_is_refused_as_parameters_and_as_a_file(other):
     heard = swept(SWEPT.signal(3000.0))

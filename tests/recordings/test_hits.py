@@ -118,7 +118,7 @@ def test_what_can_be_used_is_used_and_the_rest_is_told():
     [(HAMMER, (0.5, 0.2), 1), (HAMMER, None, 2), (None, (0.5, 0.2), 2), (None, None, 2)],
 )
 def test_files_are_repeats_only_where_both_places_are_known_and_the_same(hammer, sensor, n_pairs):
-    files = [[recording(TIMES, name=name).at(hammer, sensor)] for name in ("a.wav", "b.wav")]
+    files = [[replace(recording(TIMES, name=name), hammer=hammer, sensor=sensor)] for name in ("a.wav", "b.wav")]
 
     spectra = take(files, 500.0).spectra
 
