@@ -234,7 +234,7 @@ def _settled(board: Board, guess: Guess, tried: list[tuple[Setup, ...]]) -> tupl
         estimate = weighted_least_squares(_of_labelled(labelled), _STEPS, guess.rigidities)
         if identifiability(estimate.sensitivities, estimate.scales, board.symmetry).blind():
             return labelled, guess.rigidities
-        guess = _guess_of(board, estimate)
+        guess = guess_of(board, estimate)
 
 
 def _guesses(board: Board, prior: PriorCard) -> list[Guess]:
@@ -242,14 +242,14 @@ def _guesses(board: Board, prior: PriorCard) -> list[Guess]:
     if sum(len(setup.readings) for setup in board.setups) >= board.symmetry.n:
         estimate = weighted_least_squares(_of_labelled(board), accepted=_NEAR)
         if not identifiability(estimate.sensitivities, estimate.scales, board.symmetry).blind():
-            return [_guess_of(board, estimate)]
+            return [guess_of(board, estimate)]
     n_peaks = sum(len(setup.readings) + len(setup.peaks) for setup in board.setups)
     if board.isotropic or n_peaks < len(RIGIDITIES):  # one label fixes all of an isotropic plate
         return []
     return search_widely(board, prior, np.random.default_rng(0))
 
 
-def _guess_of(board: Board, estimate: Estimate) -> Guess:
+def guess_of(board: Board, estimate: Estimate) -> Guess:
     """An estimate with its uncertainty; residuals beyond the expected noise widen both."""
     symmetry = board.symmetry
     spare = max(estimate.residuals.size - symmetry.n, 1)

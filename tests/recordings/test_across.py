@@ -59,7 +59,7 @@ def truth_of(board: Ringing = BOARD) -> np.ndarray:
 
 def likely_of(found: Picked) -> np.ndarray:
     """What was found in the band of `truth_of`."""
-    return np.array([mode.frequency for mode in found.likely if mode.frequency < 0.98 * HIGHEST])
+    return np.array([mode.hz for mode in found.likely if mode.hz < 0.98 * HIGHEST])
 
 
 @pytest.mark.parametrize(("shift", "damping"), [(1.0012, 1.0), (0.991, 1.0), (1.0, 1.15)])
@@ -72,7 +72,7 @@ def test_two_recordings_that_differ_give_each_mode_once(shift, damping):
     truth = np.sqrt(truth_of() * other.damped[: truth_of().size])
     np.testing.assert_allclose(likely_of(found), truth, rtol=4e-4)
     for mode in found.likely[: truth.size]:
-        assert mode.sd == pytest.approx(abs(shift - 1.0) / 2.0 * mode.frequency, rel=0.25, abs=0.02)
+        assert mode.sd_hz == pytest.approx(abs(shift - 1.0) / 2.0 * mode.hz, rel=0.25, abs=0.02)
     (remark,) = found.remarks
     assert ("b.wav" in remark) == (abs(shift - 1.0) > 1e-3)
     assert remark.startswith("the recordings differ in " + ("damping, or by" if shift == 1.0 else "frequency ("))
@@ -118,7 +118,7 @@ def test_scatter_within_files_and_among_them_is_kept_apart():
     found = picked(*files)
 
     np.testing.assert_allclose(likely_of(found), truth_of() * 1.003, rtol=1e-3)
-    assert np.median([mode.sd / mode.frequency for mode in found.likely]) == pytest.approx(0.003, rel=0.25)
+    assert np.median([mode.sd_hz / mode.hz for mode in found.likely]) == pytest.approx(0.003, rel=0.25)
 
 
 def test_a_recording_of_another_board_is_named_and_left_out_where_most_agree():
@@ -128,7 +128,7 @@ def test_a_recording_of_another_board_is_named_and_left_out_where_most_agree():
     found = picked(*files, tapped(rng, strange, "strange.wav", HAMMERS[3]))
 
     np.testing.assert_allclose(likely_of(found), truth_of() * 1.003, rtol=3e-3)
-    errors = np.array([mode.sd for mode in found.likely])[: truth_of().size]
+    errors = np.array([mode.sd_hz for mode in found.likely])[: truth_of().size]
     assert (np.abs(likely_of(found) - truth_of() * 1.003) < 2.0 * errors).all()
     assert found.remarks[0].startswith("strange.wav left out: ")
     assert "strange.wav" not in {name.rpartition(" hit ")[0] for name in found.spectra.names}

@@ -55,10 +55,10 @@ def test_a_steady_tone_takes_no_mode_with_it_and_is_named(name, decibels):
     found = picked(added, decibels)
 
     truth = board().damped[board().damped < 0.98 * HIGHEST]
-    likely = [mode for mode in found.likely if mode.frequency < 0.98 * HIGHEST]
-    np.testing.assert_allclose([mode.frequency for mode in likely], truth, rtol=5e-4)
+    likely = [mode for mode in found.likely if mode.hz < 0.98 * HIGHEST]
+    np.testing.assert_allclose([mode.hz for mode in likely], truth, rtol=5e-4)
     assert max(mode.amplitude for mode in likely) == 1.0
-    assert kind in {mode.kind for mode in found.modes if not mode.is_likely}
+    assert kind in {mode.kind for mode in found.peaks if not mode.is_likely}
 
 
 BEYOND = {
@@ -75,7 +75,7 @@ def test_what_lies_beyond_the_band_refuses_no_tap_and_makes_no_mode(name):
     found = picked(BEYOND[name])
 
     truth = board().damped[board().damped < 0.98 * HIGHEST]
-    np.testing.assert_allclose([m.frequency for m in found.likely if m.frequency < 0.98 * HIGHEST], truth, rtol=5e-4)
+    np.testing.assert_allclose([m.hz for m in found.likely if m.hz < 0.98 * HIGHEST], truth, rtol=5e-4)
 
 
 def test_a_tone_alone_is_no_hit():
@@ -97,7 +97,7 @@ def test_what_a_noise_gate_cuts_off_is_not_used_and_it_is_named(threshold, fade)
     found = pick_modes(taken.spectra, 20.0, HIGHEST)
 
     truth = board().damped[board().damped < 0.98 * HIGHEST]
-    np.testing.assert_allclose([m.frequency for m in found.likely if m.frequency < 0.98 * HIGHEST], truth, rtol=2e-3)
+    np.testing.assert_allclose([m.hz for m in found.likely if m.hz < 0.98 * HIGHEST], truth, rtol=2e-3)
     (told,) = taken.remarks
     assert told.startswith("gate.wav: the sound breaks off ")
     assert "a noise gate" in told

@@ -60,7 +60,7 @@ def test_a_padded_response_gives_the_modes_of_its_record_and_says_what_was_left_
     found = []
     for padded in (1, 4):
         heard = take([[response(padded)]], HIGHEST)
-        found.append([(mode.frequency, mode.sd) for mode in pick_modes(heard.spectra, 20.0, HIGHEST).likely])
+        found.append([(mode.hz, mode.sd_hz) for mode in pick_modes(heard.spectra, 20.0, HIGHEST).likely])
         told = "frf.csv: of every 4 lines one was measured and is used, the others are interpolated"
         assert heard.remarks == ((told,) if padded == 4 else ())
 
@@ -73,5 +73,5 @@ def test_control_by_all_lines_of_a_padded_record_low_modes_are_known_worse(monke
     monkeypatch.setattr("bayesplate.recordings.taking.common_padding", lambda responses: 1)
     every = pick_modes(take([[response(2)]], HIGHEST).spectra, 20.0, HIGHEST).likely
 
-    assert [round(one.frequency) for one in own[:2]] == [round(one.frequency) for one in every[:2]]
-    assert min(b.sd / a.sd for a, b in zip(own[:2], every[:2], strict=True)) > 3.0
+    assert [round(one.hz) for one in own[:2]] == [round(one.hz) for one in every[:2]]
+    assert min(b.sd_hz / a.sd_hz for a, b in zip(own[:2], every[:2], strict=True)) > 3.0
