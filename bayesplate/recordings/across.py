@@ -154,7 +154,6 @@ def _averaged(spectra: Spectra, groups: Sequence[Group], sizes: Sequence[int]) -
                 window=pole * np.sqrt(window),
                 residues=residues,
                 residue_sd=residue_sd,
-                gain=sum(one.mode.gain for one in group.values()),
                 expected=len(sizes) * min(one.mode.expected for one in group.values()),
                 seen=sum(one.mode.seen for one in group.values()) / len(sizes),
             )

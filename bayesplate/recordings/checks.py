@@ -41,8 +41,6 @@ _RINGS, _ABOVE_QUIET = 0.003, 10.0
 """Power there over that of the loudest block, and over the quiet of the channel, from which on it rings."""
 _PULSE, _NEAR_QUIET = 1e4, 3.0
 """Power of the loudest block over that after it, and of that over the quiet, of a channel that does not ring."""
-_GATE_BLOCK, _GATED = 0.01, 0.1
-"""s of a block, and share of blocks without any sound that a noise gate leaves."""
 
 
 def signal_faults(one: Read, *, was_played: bool = False) -> Iterator[Fault]:
@@ -109,12 +107,6 @@ def is_pulse(signal: Floats, rate: float) -> bool:
     """Whether a channel is silent as soon as its loudest moment is over: a hammer's force, not a board."""
     loudest, after, quiet = _powers(signal, rate)
     return loudest > _PULSE * after and after <= _NEAR_QUIET * quiet
-
-
-def is_cut_to_silence(signal: Floats, rate: float) -> bool:
-    """Whether a noise gate shows: much of a recording holds one and the same number."""
-    blocks = _blocks(signal, max(round(_GATE_BLOCK * rate), 2))
-    return bool(len(blocks) and np.mean(np.ptp(blocks, axis=1) == 0.0) > _GATED)
 
 
 def clipped_samples(signal: Floats, full_scale: float) -> int:
@@ -197,16 +189,11 @@ def _correlation(one: Floats, other: Floats) -> float:
 
 def _powers(signal: Floats, rate: float) -> tuple[float, float, float]:
     """Power of the loudest block, the median after it, and that of the quiet; all 0 where nothing comes after."""
-    blocks = _blocks(signal - np.median(signal) if signal.size else signal, max(round(_BLOCK * rate), 1))
-    if len(blocks) <= _AFTER[1]:
+    block = max(round(_BLOCK * rate), 1)
+    n = signal.size // block
+    if n <= _AFTER[1]:
         return 0.0, 0.0, 0.0
-    power = np.mean(blocks**2, axis=1)
+    power = np.mean((signal[: n * block] - np.median(signal)).reshape(n, block) ** 2, axis=1)
     loudest = int(np.argmax(power[: -_AFTER[1]]))
     after = power[loudest + _AFTER[0] : loudest + _AFTER[1]]
     return float(power[loudest]), float(np.median(after)), float(np.quantile(power, 0.1))
-
-
-def _blocks(signal: Floats, length: int) -> Floats:
-    """A signal in blocks of so many samples, without what is left over: (n_blocks, length) array."""
-    n = signal.size // length
-    return signal[: n * length].reshape(n, length)

@@ -55,10 +55,8 @@ class Mode:
     residues : (n_records,) complex array
         In units of the spectra.
     residue_sd : (n_records,) array
-    gain : float
-        Twice the ln of how much likelier the spectra are with this mode.
     expected : float
-        Of how many modes noise alone would give so much, in all the band.
+        How many modes noise alone would show as clearly, in all the band.
     seen : float
         Share of the widths of windows in which it was found.
     """
@@ -70,7 +68,6 @@ class Mode:
     window: Floats
     residues: Complex
     residue_sd: Floats
-    gain: float
     expected: float
     seen: float
 
@@ -210,7 +207,6 @@ def _modes_of(spectra: Spectra, part: _Part, start: Floats, n_lines: int, by_wid
             window=_shift(narrow, fit.poles[m], own_variance) / np.sqrt(2.0),
             residues=fit.residues[m] * level,
             residue_sd=_residue_sd(fit, m) * level,
-            gain=gains[m],
             expected=_expected(gains[m], few.rest.shape[1], n_lines),
             seen=float(np.mean([_has(poles, fit.poles[m], window.spacing) for poles in by_width])),
         )

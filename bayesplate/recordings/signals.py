@@ -40,7 +40,6 @@ class FrequencyResponse:
     name: str
     frequency: Floats
     values: Complex
-    coherence: Floats | None = None
     motion: Motion = "acceleration"
     hammer: Place | None = None
     sensor: Place | None = None

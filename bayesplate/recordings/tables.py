@@ -100,4 +100,4 @@ def _response(columns: dict[str, Floats], shown: str, motion: Motion) -> Frequen
     require_lines(columns["f_hz"], shown)
     parts = np.stack([columns["re"], columns["im"]], axis=1)
     values = parts.view(complex)[:, 0]  # without arithmetic: they may be no numbers
-    return FrequencyResponse(shown, columns["f_hz"], values, columns.get("coherence"), motion)
+    return FrequencyResponse(shown, columns["f_hz"], values, motion)

@@ -25,7 +25,7 @@ MODE = Verdict(0.02, "")
 def mode(frequency: float, damping: float = 0.007) -> Mode:
     noise, none = np.full(2, 0.01), np.zeros(2)
     one = np.ones(1, dtype=complex)
-    return Mode(frequency, damping * frequency, noise, none, none, one, np.ones(1), 1e4, 0.0, 1.0)
+    return Mode(frequency, damping * frequency, noise, none, none, one, np.ones(1), 0.0, 1.0)
 
 
 def answer(strength: float = 1.0) -> Answer:
