@@ -21,7 +21,7 @@ from bayesplate.commands.fragment import spurious_share
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.posterior.first_labels import FEWEST_PEAKS, probable_ways
 from bayesplate.recordings.patterns import residue_evidence, sign_odds
-from bayesplate.recordings.sand import sand_evidence
+from bayesplate.recordings.sand import sand_evidence, straightened
 
 if TYPE_CHECKING:
     from bayesplate.board.board import Board
@@ -97,7 +97,7 @@ def label_peaks(
     flips : bool or None
         Whether force and response have opposite polarity; None if that is to be found.
     pictures : mapping
-        Number of a likely peak to pictures of sand at its frequency.
+        Number of a likely peak to straightened pictures of sand at its frequency.
 
     Raises
     ------
@@ -225,7 +225,7 @@ def _alone(evidence: Floats, known: MostlyKnown, likely: Sequence[PickedRow]) ->
 def pictures_of(
     board: Board, likely: Sequence[PickedRow], pictures: Mapping[float, Floats]
 ) -> tuple[dict[int, list[Floats]], list[str]]:
-    """Pictures by the number of the likely peak nearest to their frequency; and what is told of those left out.
+    """Straightened pictures by the number of the likely peak nearest to them; and what is told of those left out.
 
     They are left out where no peak is near, and where they are oblong the other way than their board.
     """
@@ -244,5 +244,5 @@ def pictures_of(
         elif min(off, default=1.0) > _OFF:
             told.append(f"no peak within {100.0 * _OFF:g} % of the sand at {hertz:g} Hz")
         else:
-            found.setdefault(off.index(min(off)), []).append(picture)
+            found.setdefault(off.index(min(off)), []).append(straightened(picture))
     return found, told

@@ -41,6 +41,8 @@ _RINGS, _ABOVE_QUIET = 0.003, 10.0
 """Power there over that of the loudest block, and over the quiet of the channel, from which on it rings."""
 _PULSE, _NEAR_QUIET = 1e4, 3.0
 """Power of the loudest block over that after it, and of that over the quiet, of a channel that does not ring."""
+_GATE_BLOCK, _GATED = 0.01, 0.1
+"""s of a block, and share of blocks without any sound that a noise gate leaves."""
 
 
 def signal_faults(one: Read, *, was_played: bool = False) -> Iterator[Fault]:
@@ -107,6 +109,13 @@ def is_pulse(signal: Floats, rate: float) -> bool:
     """Whether a channel is silent as soon as its loudest moment is over: a hammer's force, not a board."""
     loudest, after, quiet = _powers(signal, rate)
     return loudest > _PULSE * after and after <= _NEAR_QUIET * quiet
+
+
+def is_cut_to_silence(signal: Floats, rate: float) -> bool:
+    """Whether a noise gate shows: much of a recording holds one and the same number."""
+    block = max(round(_GATE_BLOCK * rate), 2)
+    n = signal.size // block
+    return bool(n and np.mean(np.ptp(signal[: n * block].reshape(n, block), axis=1) == 0.0) > _GATED)
 
 
 def clipped_samples(signal: Floats, full_scale: float) -> int:

@@ -64,30 +64,34 @@ def read_picture(path: str | os.PathLike[str]) -> Floats:
     return values
 
 
-def sand_evidence(picture: Floats, shapes: Floats) -> Floats:
+def straightened(picture: Floats) -> Floats:
+    """The forms in which a picture is compared, (n_rows, n_columns) as it is seen: (n_forms, n_points) array."""
+    from_below = picture[::-1].T  # rows of a picture run downward
+    return np.stack([_normal(_flat(one)) for one in _turned(from_below)])
+
+
+def sand_evidence(forms: Floats, shapes: Floats) -> Floats:
     """ln of how much a picture speaks for each shape, zero for the average of all: (n_modes,) array.
 
     Parameters
     ----------
-    picture : (n_rows, n_columns) array
-        The board from above, x from left to right and y from bottom to top; sand lighter or darker than the board.
+    forms : (n_forms, n_points) array
+        As of `straightened`, of the board from above, x from left to right and y from bottom to top; sand lighter or
+        darker than the board.
     shapes : (n_modes, n_x, n_y) array
         Deflections at evenly spaced points of the whole board, edges included.
     """
-    scores = agreement(picture, shapes)
+    scores = agreement(forms, shapes)
     log_likelihood = -0.5 * _N_CELLS * np.log(1.0 - np.clip(scores, 0.0, 0.999) ** 2)
     top = log_likelihood.max()
     relative = log_likelihood - top - np.log(np.mean(np.exp(log_likelihood - top)))
     return np.asarray(np.logaddexp(relative + np.log(1.0 - _NEVER), np.log(_NEVER)))
 
 
-def agreement(picture: Floats, shapes: Floats) -> Floats:
-    """Correlation of a picture, straightened at its best, with the still lines of each shape: (n_modes,) array."""
+def agreement(forms: Floats, shapes: Floats) -> Floats:
+    """Correlation of a picture in its best form with the still lines of each shape: (n_modes,) array."""
     lines = np.stack([_normal(_flat(_still(shape))) for shape in shapes])
-    from_below = picture[::-1].T  # rows of a picture run downward
-    straightened = np.stack([_normal(_flat(one)) for one in _straightened(from_below)])
-    correlation = np.abs(straightened @ lines.T)  # sand may be lighter or darker than the board
-    return np.asarray(correlation.max(axis=0))
+    return np.asarray(np.abs(forms @ lines.T).max(axis=0))  # sand may be lighter or darker than the board
 
 
 def _still(shape: Floats) -> Floats:
@@ -110,7 +114,7 @@ def _sampled(values: Floats, x: Floats, y: Floats) -> Floats:
     return np.asarray(map_coordinates(values, [x * (n_x - 1), y * (n_y - 1)], order=1, mode="nearest"))
 
 
-def _straightened(picture: Floats) -> list[Floats]:
+def _turned(picture: Floats) -> list[Floats]:
     """The picture turned, seen from the side and scaled in all ways that are tried."""
     from scipy.ndimage import gaussian_filter
 

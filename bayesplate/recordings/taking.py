@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bayesplate.errors import Fault, InputError
-from bayesplate.recordings.checks import force_fault, is_pulse, phase_fault
+from bayesplate.recordings.checks import force_fault, is_cut_to_silence, is_pulse, phase_fault
 from bayesplate.recordings.hits import LEAST_DURATION, Hit, find_hits, rising_again, usable
 from bayesplate.recordings.padding import common_padding
 from bayesplate.recordings.signals import FrequencyResponse, Read, Recording
@@ -99,8 +99,8 @@ def _hit_faults(one: Recording, hits: Sequence[Hit]) -> list[Fault]:
     if 2 * len(usable(hits)) >= len(hits):
         return []
     remedy = "hit again, and wait until it is silent"
-    if any(hit.is_gated for hit in hits):
-        remedy = "switch off the noise gate, or noise suppression, and hit again"
+    if is_cut_to_silence(one.response, one.rate):
+        remedy = "digital silence between: switch off the noise gate, or noise suppression, and hit again"
     wanted = "one hit, and time to ring down"
     return [Fault(f"{one.name} {which}", wanted, fault, remedy) for which, fault in _unusable(one, hits)]
 

@@ -62,7 +62,7 @@ TIMES = np.arange(HEARD.size) / RATE
 TIME = {"kind": 1, "y": HEARD, "even": False}
 
 
-@pytest.mark.parametrize("begin", [0.0, 1.0, -0.4, 12.0])
+@pytest.mark.parametrize("begin", [-0.4, 12.0])
 def test_times_of_six_digits_give_the_rate_of_the_whole_span(tmp_path, begin):
     """From 10 s on a step of the digits is not shorter than one of the samples."""
     (one,) = read(tmp_path / "a.uff", uff([TIME | {"x": TIMES / 3.0 + begin}]))
@@ -70,7 +70,7 @@ def test_times_of_six_digits_give_the_rate_of_the_whole_span(tmp_path, begin):
     assert one.rate == pytest.approx(3.0 * RATE, rel=2e-4)
 
 
-@pytest.mark.parametrize("n_lost", [1, 5, 400])
+@pytest.mark.parametrize("n_lost", [1, 400])
 def test_times_with_a_gap_are_refused(tmp_path, n_lost):
     kept = np.r_[0:3000, 3000 + n_lost : HEARD.size]
 
@@ -78,7 +78,7 @@ def test_times_with_a_gap_are_refused(tmp_path, n_lost):
         read(tmp_path / "a.uff", uff([TIME | {"x": TIMES[kept], "y": HEARD[kept]}]))
 
 
-@pytest.mark.parametrize(("unit", "factor"), [("Hz", 1.0), ("", 1.0), ("kHz", 1e-3), ("rad/s", 2.0 * np.pi)])
+@pytest.mark.parametrize(("unit", "factor"), [("", 1.0), ("rad/s", 2.0 * np.pi)])
 def test_frequencies_are_in_the_unit_of_the_header(tmp_path, unit, factor):
     (one,) = read(tmp_path / "a.uff", uff([{"kind": 4, "x": HERTZ * factor, "y": accelerance(), "unit": unit}]))
 
@@ -87,7 +87,6 @@ def test_frequencies_are_in_the_unit_of_the_header(tmp_path, unit, factor):
 
 REFUSED = {
     "revolutions": ({"unit": "rpm"}, 'wanted an abscissa in hz, khz, rad/s, rad/sec, got "rpm"'),
-    "an abscissa of time": ({"axis": 17, "unit": "s"}, 'got "s" (kind of data 17)'),
     "a strain": ({"top": 3}, "wanted a force or displacement, velocity, acceleration, pressure, got kind of data 3"),
     "a motion over a motion": ({"under": 12}, "wanted a motion over a force, got acceleration over acceleration"),
     "a force over a force": ({"top": 13}, "wanted a motion over a force, got a force over a force"),
@@ -124,7 +123,6 @@ def test_a_force_is_told_by_its_kind_or_its_unit(tmp_path, top):
 
 NO_PHASE = {
     "magnitude": (np.abs, lambda y: 0.0 * y.real),
-    "magnitude and degrees": (np.abs, lambda y: np.degrees(np.angle(y))),
     "decibels and degrees": (lambda y: 20.0 * np.log10(np.abs(y) + 1e-6), lambda y: np.degrees(np.angle(y))),
     "the other sign": (np.real, lambda y: -y.imag),
 }
@@ -140,7 +138,7 @@ def test_a_response_that_does_not_follow_its_force_is_refused(tmp_path, name):
         take([read(tmp_path / "a.csv")], 400.0)
 
 
-@pytest.mark.parametrize("motion", [1.0, -1.0, 1j, -1j])
+@pytest.mark.parametrize("motion", [-1.0, 1j])
 def test_a_response_of_any_motion_and_polarity_follows_its_force(tmp_path, motion):
     """The negative control, lines from 20 Hz on, with noise."""
     noise = 3e-3 * np.random.default_rng(1).standard_normal((2, HERTZ.size)) * np.abs(accelerance()).max()
@@ -176,10 +174,8 @@ def sized(content: bytes, n_bytes: int) -> bytes:
 
 N_BYTES = 2 * HEARD.size
 LYING = {
-    "none stated": (sized(wav(HEARD), 0), HEARD.size),
     "none stated, sizes of the whole neither": (b"RIFF" + bytes(4) + sized(wav(HEARD), 0)[8:], HEARD.size),
     "twice as many stated": (sized(wav(HEARD), 2 * N_BYTES), HEARD.size),
-    "some stated": (sized(wav(HEARD), 1000), HEARD.size),
     "the most that can be stated": (sized(wav(HEARD), 0xFFFFFFFF), HEARD.size),
     "a byte too many": (sized(wav(HEARD) + b"\1", N_BYTES + 1), HEARD.size),
     "cut within a sample of 24 bits": (wav(HEARD, 24)[: 44 + 3 * 9000 + 2], 9000),
@@ -205,15 +201,13 @@ def test_a_header_that_is_right_is_no_cause_for_a_remark(tmp_path, more):
 
 
 STEREO = {
-    "the same twice": (HEARD, HEARD, "both channels hold the same sound, and one is used"),
-    "softer in one": (HEARD, 0.3 * HEARD, "both channels hold the same sound, and one is used"),
-    "with the other sign": (HEARD, -HEARD, "both channels hold the same sound, and one is used"),
+    "softer in one, with the other sign": (HEARD, -0.3 * HEARD, "both channels hold the same sound, and one is used"),
     "left alone": (HEARD, 0.0 * HEARD, "channel 2 is silent and left out"),
     "right alone": (0.0 * HEARD, HEARD, "channel 1 is silent and left out"),
 }
 
 
-@pytest.mark.parametrize("channels", ["force,response", "response,response", "response,force"])
+@pytest.mark.parametrize("channels", ["force,response", "response,response"])
 @pytest.mark.parametrize("name", STEREO)
 def test_of_a_stereo_file_with_one_sound_that_is_taken(tmp_path, name, channels):
     first, second, said = STEREO[name]
@@ -275,7 +269,7 @@ def swept(signal: np.ndarray) -> Recording:
 
 @pytest.mark.parametrize(
     "other",
-    [SWEPT._replace(last=1400.0), SWEPT._replace(duration=3.2), SWEPT._replace(first=40.0), Sweep(25.0, 900.0, 6.0)],
+    [SWEPT._replace(last=1400.0), SWEPT._replace(first=40.0), SWEPT._replace(duration=6.0)],
 )
 def test_a_sweep_that_was_not_played_is_refused_as_parameters_and_as_a_file(other):
     heard = swept(SWEPT.signal(3000.0))

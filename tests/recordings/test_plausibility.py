@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -51,12 +49,6 @@ def test_what_is_four_times_as_broad_as_all_others_is_rather_no_mode():
 
     assert odds[-1] > 1.0
     assert odds[:-1].max() < 0.01
-
-
-def test_where_damping_differs_from_mode_to_mode_a_broad_one_may_be_a_mode():
-    damping = np.exp(np.linspace(np.log(0.003), np.log(0.03), 12))
-
-    assert broad_odds(damping, np.ones(12))[-1] < 0.5
 
 
 def test_broad_things_do_not_tell_how_the_board_damps_where_they_are_weak():
@@ -132,15 +124,6 @@ def test_damping_is_averaged_as_the_frequency_is_and_its_error_holds_both_fits()
     assert one.hz == pytest.approx(400.2)
     assert one.damping_percent == pytest.approx(100.0 * (0.8 * decay + 0.2 * other) / 400.2)
     assert one.damping_sd_percent == pytest.approx(100.0 * np.hypot(0.01, 0.4 * (other - decay)) / 400.2)
-
-
-def test_damping_carries_by_how_much_it_moves_with_the_choice_of_lines():
-    moved = replace(mode(400.0), window=np.array([0.0, 0.2]))
-
-    one = picking._row(Peak(moved, answer(), MODE, moved), 1.0)
-
-    assert one.window_hz == 0.0
-    assert one.damping_sd_percent == pytest.approx(100.0 * np.hypot(0.01, 0.2) / 400.0)
 
 
 def test_beside_loud_lines_that_do_not_decay_no_mode_is_faint_and_they_are_named():

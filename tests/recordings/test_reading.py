@@ -46,18 +46,6 @@ def test_every_kind_of_sample_gives_the_same_numbers(tmp_path, kind, step):
     np.testing.assert_allclose(one.response, values, atol=0.51 * step + 1e-15)
 
 
-def test_a_file_of_24_bits_is_read(tmp_path):
-    """By hand: RIFF, 24 bits, three bytes a sample, the lowest first."""
-    samples = np.round(0.5 * RING * 2.0**23).astype("<i4")
-    data = samples.view(np.uint8).reshape(-1, 4)[:, :3].tobytes()
-    header = b"RIFF" + (36 + len(data)).to_bytes(4, "little") + b"WAVEfmt " + (16).to_bytes(4, "little")
-    header += (1).to_bytes(2, "little") + (1).to_bytes(2, "little") + RATE.to_bytes(4, "little")
-    header += (3 * RATE).to_bytes(4, "little") + (3).to_bytes(2, "little") + (24).to_bytes(2, "little")
-    (tmp_path / "a.wav").write_bytes(header + b"data" + len(data).to_bytes(4, "little") + data)
-
-    np.testing.assert_allclose(only(tmp_path / "a.wav").response, 0.5 * RING, atol=2.0**-23)
-
-
 def test_two_channels_are_force_and_response_or_what_is_said(tmp_path):
     path = write_wav(tmp_path / "a.wav", RATE, RING, np.cos(TIMES))
 

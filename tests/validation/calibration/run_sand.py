@@ -57,7 +57,7 @@ def simulate_one(name: str, mode: int, number: int) -> Record:
     truth, hertz, shapes = _solved(name)
     plate = BOARDS[name]
     rng = np.random.default_rng([BASE_SEED, [*BOARDS].index(name), mode, number])
-    evidence = sand_evidence(photograph(rng, truth.shape(mode), (plate.L_x, plate.L_y)), shapes)
+    evidence = sand_evidence(straightened(photograph(rng, truth.shape(mode), (plate.L_x, plate.L_y))), shapes)
     right = int(np.argmin(np.abs(hertz / truth.frequencies[mode] - 1.0)))
     near = np.abs(np.log(hertz / truth.frequencies[mode])) < NEAR
     above = evidence > evidence[right]
