@@ -27,7 +27,7 @@ from validation.calibration.records import Record, add_to, publish, read_done
 from bayesplate.commands.prepare import prepare
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
-from bayesplate.recordings.sand import sand_evidence
+from bayesplate.recordings.sand import sand_evidence, straightened
 
 BASE_SEED, N_MODES, NEAR = 7, 10, 0.15
 TOP_1, TOP_2 = 0.95, 0.99
