@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made_recordings import SENSOR, board, hits, write_wav
+from made_recordings import SENSOR, accelerance, board, hits, uff, wav_bytes, write_wav
 from scipy.io import wavfile
 
 from bayesplate.errors import InputError
@@ -16,38 +16,7 @@ from bayesplate.recordings.taking import take
 RATE = 6000
 FORCE, HEARD = hits(np.random.default_rng(31), [0.2], (0.03, 0.02), rate=float(RATE), seconds=1.8, decibels=60.0)
 HERTZ = np.arange(0.0, 400.0, 0.5)
-
-
-def accelerance(hertz: np.ndarray = HERTZ) -> np.ndarray:
-    """Of the planted board."""
-    omega, own = 2.0 * np.pi * hertz[:, None], 2.0 * np.pi * board().hertz
-    terms = -(omega**2) * board().residues((0.03, 0.02), SENSOR)
-    return np.sum(terms / (own**2 - omega**2 + 2j * board().damping * own * omega), axis=1)
-
-
-def uff(sets: list[dict]) -> bytes:
-    """A UFF file, as text; keys: kind, x, y, even, axis, unit, top, top_unit, under."""
-    lines = []
-    for one in sets:
-        x, y, even = one["x"], np.asarray(one["y"]), one.get("even", True)
-        is_complex = np.iscomplexobj(y)
-        axis = "{:>10}    0    0    0 {:<20} {:<20}"
-        lines += ["    -1", "    58".ljust(80), *[" " * 80] * 5]
-        lines.append(f"{one['kind']:5d}         0    0         0 NONE               1   3 NONE               1   3")
-        step = x[1] - x[0] if even else 0.0
-        lines.append(f"{6 if is_complex else 4:10d}{y.size:10d}{int(even):10d}{x[0]:13.5e}{step:13.5e}{0.0:13.5e}")
-        lines.append(axis.format(one.get("axis", {1: 17, 4: 18}[one["kind"]]), "NONE", one.get("unit", "NONE")))
-        lines.append(axis.format(one.get("top", 12), "NONE", one.get("top_unit", "NONE")))
-        lines.append(axis.format(one.get("under", 13 if one["kind"] == 4 else 0), "NONE", "NONE"))
-        lines.append(axis.format(0, "NONE", "NONE"))
-        numbers = y.view(float) if is_complex else y
-        if even:
-            lines += ["".join(f"{v:20.11e}" for v in numbers[k : k + 4]) for k in range(0, numbers.size, 4)]
-        else:
-            pairs = [f"{t:13.5e}{v:20.11e}" for t, v in zip(x, y, strict=True)]
-            lines += ["".join(pairs[k : k + 2]) for k in range(0, y.size, 2)]
-        lines.append("    -1")
-    return "\n".join([*lines, ""]).encode()
+ACCELERANCE = accelerance(HERTZ, (0.03, 0.02))
 
 
 def read(path, content: bytes | None = None, **options) -> list[Read]:
@@ -80,7 +49,7 @@ def test_times_with_a_gap_are_refused(tmp_path, n_lost):
 
 @pytest.mark.parametrize(("unit", "factor"), [("", 1.0), ("rad/s", 2.0 * np.pi)])
 def test_frequencies_are_in_the_unit_of_the_header(tmp_path, unit, factor):
-    (one,) = read(tmp_path / "a.uff", uff([{"kind": 4, "x": HERTZ * factor, "y": accelerance(), "unit": unit}]))
+    (one,) = read(tmp_path / "a.uff", uff([{"kind": 4, "x": HERTZ * factor, "y": ACCELERANCE, "unit": unit}]))
 
     np.testing.assert_allclose(one.frequency, HERTZ, rtol=1e-5)
 
@@ -90,7 +59,7 @@ REFUSED = {
     "a strain": ({"top": 3}, "wanted a force or displacement, velocity, acceleration, pressure, got kind of data 3"),
     "a motion over a motion": ({"under": 12}, "wanted a motion over a force, got acceleration over acceleration"),
     "a force over a force": ({"top": 13}, "wanted a motion over a force, got a force over a force"),
-    "magnitudes": ({"y": np.abs(accelerance())}, "wanted a response with its phase, got one"),
+    "magnitudes": ({"y": np.abs(ACCELERANCE)}, "wanted a response with its phase, got one"),
 }
 
 
@@ -99,16 +68,16 @@ def test_a_header_that_cannot_be_honoured_is_refused(tmp_path, name):
     changed, said = REFUSED[name]
 
     with pytest.raises(InputError) as refused:
-        take([read(tmp_path / "a.uff", uff([{"kind": 4, "x": HERTZ, "y": accelerance()} | changed]))], 400.0)
+        take([read(tmp_path / "a.uff", uff([{"kind": 4, "x": HERTZ, "y": ACCELERANCE} | changed]))], 400.0)
 
     assert said in str(refused.value)
 
 
 def test_a_force_over_a_motion_is_turned_over(tmp_path):
-    mass = {"kind": 4, "x": HERTZ[1:], "y": 1.0 / accelerance()[1:], "top": 13, "under": 12}
+    mass = {"kind": 4, "x": HERTZ[1:], "y": 1.0 / ACCELERANCE[1:], "top": 13, "under": 12}
     (one,) = read(tmp_path / "a.uff", uff([mass]))
 
-    np.testing.assert_allclose(one.values, accelerance()[1:], rtol=1e-6)
+    np.testing.assert_allclose(one.values, ACCELERANCE[1:], rtol=1e-6)
     assert (one.motion, one.remarks) == ("acceleration", ("a.uff set 1: a force over acceleration, turned over",))
 
 
@@ -131,7 +100,7 @@ NO_PHASE = {
 @pytest.mark.parametrize("name", NO_PHASE)
 def test_a_response_that_does_not_follow_its_force_is_refused(tmp_path, name):
     real, imaginary = NO_PHASE[name]
-    rows = np.column_stack([HERTZ, real(accelerance()), imaginary(accelerance())])
+    rows = np.column_stack([HERTZ, real(ACCELERANCE), imaginary(ACCELERANCE)])
     np.savetxt(tmp_path / "a.csv", rows, "%.9g", ",", header="f_hz,re,im", comments="")
 
     with pytest.raises(InputError, match=r"a\.csv: wanted a response with its phase, got one that answers before"):
@@ -141,8 +110,8 @@ def test_a_response_that_does_not_follow_its_force_is_refused(tmp_path, name):
 @pytest.mark.parametrize("motion", [-1.0, 1j])
 def test_a_response_of_any_motion_and_polarity_follows_its_force(tmp_path, motion):
     """The negative control, lines from 20 Hz on, with noise."""
-    noise = 3e-3 * np.random.default_rng(1).standard_normal((2, HERTZ.size)) * np.abs(accelerance()).max()
-    values = motion * accelerance() + noise[0] + 1j * noise[1]
+    noise = 3e-3 * np.random.default_rng(1).standard_normal((2, HERTZ.size)) * np.abs(ACCELERANCE).max()
+    values = motion * ACCELERANCE + noise[0] + 1j * noise[1]
     rows = np.column_stack([HERTZ, values.real, values.imag])[40:]
     np.savetxt(tmp_path / "a.csv", rows, "%.9g", ",", header="f_hz,re,im", comments="")
 
@@ -153,18 +122,7 @@ def wav(signal: np.ndarray, bits: int = 16) -> bytes:
     """A WAV file of one channel by hand: 44 bytes, then the samples."""
     samples = np.round(0.8 * signal / np.abs(signal).max() * 2.0 ** (bits - 1)).astype("<i4").view(np.uint8)
     data = samples.reshape(-1, 4)[:, : bits // 8].tobytes()
-    numbers = (
-        (36 + len(data), 4),
-        (16, 4),
-        (1, 2),
-        (1, 2),
-        (RATE, 4),
-        (RATE * bits // 8, 4),
-        (bits // 8, 2),
-        (bits, 2),
-    )
-    whole, fmt, *rest = [number.to_bytes(size, "little") for number, size in numbers]
-    return b"RIFF" + whole + b"WAVEfmt " + fmt + b"".join(rest) + b"data" + len(data).to_bytes(4, "little") + data
+    return wav_bytes(1, 1, RATE, bits // 8, bits, data, len(data))
 
 
 def sized(content: bytes, n_bytes: int) -> bytes:
@@ -311,7 +269,7 @@ def test_crosstalk_into_a_channel_to_which_nothing_is_connected_is_silence(tmp_p
 
 
 def test_of_the_sets_of_a_file_silent_ones_and_copies_are_left_out(tmp_path):
-    sets = [{"kind": 4, "x": HERTZ, "y": y} for y in (accelerance(), 0.0 * accelerance(), accelerance())]
+    sets = [{"kind": 4, "x": HERTZ, "y": y} for y in (ACCELERANCE, 0.0 * ACCELERANCE, ACCELERANCE)]
     (one,) = read(tmp_path / "a.uff", uff(sets))
 
     assert one.name == "a.uff set 1"

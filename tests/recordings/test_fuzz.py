@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from fuzzing import accepted_or_refused, fuzzed, memory_below, stopped_if_it_hangs
 from hypothesis import strategies as st
+from made_recordings import uff, wav_bytes
 
 import bayesplate
 from bayesplate.errors import InputError
 from bayesplate.recordings.reading import read_recordings
 from bayesplate.recordings.signals import FrequencyResponse, Recording
-from bayesplate.recordings.strength import _answer
 
 RATE = 4000
 TIMES = np.arange(1400) / RATE
@@ -32,15 +30,8 @@ OPTIONS = st.fixed_dictionaries(
 )
 
 
-def wav(format_tag: int, channels: int, rate: int, align: int, bits: int, data: bytes, claimed: int) -> bytes:
-    """A WAV file by hand, with whatever its header says."""
-    header = struct.pack("<HHIIHH", format_tag, channels, rate, rate * align & 0xFFFFFFFF, align, bits)
-    chunks = b"fmt " + struct.pack("<I", len(header)) + header + b"data" + struct.pack("<I", claimed) + data
-    return b"RIFF" + struct.pack("<I", (4 + len(chunks)) & 0xFFFFFFFF) + b"WAVE" + chunks
-
-
 SOUND = np.round(16000.0 * np.stack([RING, np.cos(300.0 * TIMES) * RING], axis=1)).astype("<i2").tobytes()
-SOUND_WAV = wav(1, 2, RATE, 4, 16, SOUND, len(SOUND))
+SOUND_WAV = wav_bytes(1, 2, RATE, 4, 16, SOUND, len(SOUND))
 SIZES = st.sampled_from([0, 1, 2, 3, 4, 8, 16, 24, 32, 64, 255, 0x7FFFFFFF, 0xFFFFFFFF, len(SOUND)])
 WORDS = [b"RIFF", b"RIFX", b"RF64", b"WAVE", b"fmt ", b"data", b"LIST", b"ds64", b"fact", b"\xff" * 8, b"\0" * 8]
 
@@ -53,7 +44,7 @@ def headers(draw: st.DrawFn) -> bytes:
     bits = draw(st.sampled_from([0, 1, 7, 8, 12, 16, 24, 32, 64, 80, 65535]))
     rate = draw(st.sampled_from([0, 1, RATE, 48000, 0x7FFFFFFF, 0xFFFFFFFF]))
     data = draw(st.sampled_from([b"", SOUND[:1], SOUND[:777], SOUND]))
-    return wav(tag, draw(small), rate, draw(small), bits, data, draw(st.one_of(st.just(len(data)), SIZES)))
+    return wav_bytes(tag, draw(small), rate, draw(small), bits, data, draw(st.one_of(st.just(len(data)), SIZES)))
 
 
 @st.composite
@@ -156,24 +147,12 @@ def flac() -> bytes:
     return stream.getvalue()
 
 
-def uff() -> bytes:
-    """A short UFF file, as text."""
-    axis = "{kind:>10}    0    0    0 NONE                                     "
-    head = [
-        "    -1",
-        "    58".ljust(80),
-        *[" " * 80] * 5,
-        "    1         0    0         0                    1   3                    1   3",
-        f"         4{RING.size:10d}         1  0.00000e+00  {1.0 / RATE:.5e}  0.00000e+00",
-        *(axis.format(kind=kind) for kind in (17, 12, 13, 0)),
-    ]
-    rows = ["".join(f"{x:20.11e}" for x in row) for row in RING.reshape(-1, 4)]
-    return "\n".join([*head, *rows, "    -1", ""]).encode()
+UFF = uff([{"kind": 1, "x": TIMES, "y": RING}])
 
 
 def read_other_file(ending: str, cut: int, put: list[tuple[int, bytes]], options: dict[str, Any]) -> None:
     """Bytes that may be a file that a library of the extra reads."""
-    found = flac() if ending == ".flac" else uff()
+    found = flac() if ending == ".flac" else UFF
     for at, piece in put:
         found = found[:at] + piece + found[at + len(piece) :]
     read(f"a{ending}", found[: len(found) * cut // 100], options)
@@ -194,7 +173,7 @@ test_extras, test_extras_at_length = fuzzed(
 def test_what_is_spoilt_here_was_sound(data):
     """The negative control: without a change each file is read."""
     ending = ".flac" if data is None else ".uff" if data == b"uff" else ".wav" if data == SOUND_WAV else ".csv"
-    content = flac() if data is None else uff() if data == b"uff" else data
+    content = flac() if data is None else UFF if data == b"uff" else data
     assert len(read(f"a{ending}", content, {"rate": float(RATE) if ending == ".csv" else None})) == 1
 
 
@@ -205,7 +184,7 @@ FOUND = {
     "no end.csv": (f"f_hz,re,im\n{LINES}inf,1,1\n".encode(), "a hundred evenly spaced lines or more"),
     "infinite.csv": (f"f_hz,re,im\n{LINES}200,inf,1\n".encode(), "wanted finite numbers, got line 201 is none"),
     "huge.csv": (b"acceleration\n" + b"1e300\n-1e300\n" * 999, "wanted numbers up to 1e+100, got larger ones"),
-    "two times.uff": (uff().replace(b"  2.50000e-04", b"  0.00000e+00"), "wanted times in s that rise"),
+    "two times.uff": (UFF.replace(b"  2.50000e-04", b"  0.00000e+00"), "wanted times in s that rise"),
 }
 """What was once another error, or a warning of a library, or was taken for something else."""
 
@@ -254,16 +233,6 @@ def test_a_response_with_next_to_no_lines_in_the_band_is_refused(tmp_path, step,
     found = accepted_or_refused(lambda: bayesplate.pick([tmp_path / "a.csv"], lowest=20.0, highest=310.0), tmp_path)
 
     assert f"a.csv between 20 and 310 Hz: wanted 5 lines or more, {said}" in str(found)
-
-
-def test_a_hit_without_force_at_a_mode_says_nothing_of_it():
-    """Neither a number that is none nor a warning: the mobility is not known there."""
-    spectra = SimpleNamespace(motion="velocity", between=((None, None),), places=np.zeros(2, dtype=int))
-    mode = SimpleNamespace(frequency=100.0, residues=np.zeros(2, complex), residue_sd=np.ones(2))
-    answer = _answer(spectra, mode, np.zeros(2, complex))
-
-    assert np.isfinite(answer.mobility).all()
-    assert answer.sd[0] > 1e100
 
 
 def test_a_line_that_only_python_ends_is_no_line(tmp_path):
