@@ -67,6 +67,7 @@ def fragment_text(
         lines += ["", f"[[setup.peaks]]{_remark(peak)}", f"hz = {_hertz(peak)}"]
         lines += [f"sign = {toml_value(peak.sign)}"] if peak.sign else []
         lines += [f"amplitude = {peak.amplitude:.3g}", f"damping_percent = {peak.damping_percent:.3g}"]
+        lines.append(f"spurious_probability = {round(spurious_share([peak]), 4)}")
     return "\n".join([*lines, *_places(spectra, sensor_mass)]) + "\n"
 
 

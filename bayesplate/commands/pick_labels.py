@@ -133,8 +133,10 @@ def _bare(board: Board, peaks: Sequence[PickedRow], signs: Sequence[str] | None 
     """A board with peaks in place of all that was read before."""
     (setup,) = board.setups
     every = zip(peaks, signs or [""] * len(peaks), strict=True)
-    read = tuple(Peak(Quantity.from_mean(peak.hz, peak.sd_hz), sign) for peak, sign in every)
-    return replace(board, setups=(replace(setup, readings=(), peaks=read, spurious=spurious_share(peaks)),))
+    read = tuple(
+        Peak(Quantity.from_mean(peak.hz, peak.sd_hz), sign, spurious=spurious_share([peak])) for peak, sign in every
+    )
+    return replace(board, setups=(replace(setup, readings=(), peaks=read),))
 
 
 def _by_name(every: Sequence[tuple[Sequence[str], Floats]]) -> tuple[dict[str, float], ...]:

@@ -23,7 +23,7 @@ from bayesplate.estimates.identifiability import identifiability
 from bayesplate.estimates.labelling import LIKELY, with_labels
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.unusual import MOST_ORTHOTROPIC
-from bayesplate.estimates.wide_search import Guess, search_widely
+from bayesplate.estimates.wide_search import FAR, Guess, search_widely
 from bayesplate.frequencies.model import setup_model, with_others
 from bayesplate.frequencies.peaks import PeakLikelihood, takes_part
 from bayesplate.frequencies.system import system_of
@@ -40,8 +40,6 @@ FEWEST_PEAKS = 4
 """Three fix the constants whatever they are called."""
 _UNUSUAL = 0.02
 """Probability that a plate is stiffer along y than along x, or that no wood is as orthotropic."""
-FAR = 0.5
-"""Of ln D: walks lead from one answer to another that is nearer, and do not find one that is farther off."""
 POSSIBLE = 0.02
 """Probability from which on another answer is one that has to be told."""
 UNLIKE = 0.01
