@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import struct
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import ritz
@@ -59,6 +61,45 @@ def hits(
     blows = [Blow(one + rng.uniform(0.0, 1e-3), rng.uniform(0.4e-3, 1e-3), rng.uniform(3.0, 6.0)) for one in times]
     force, heard = recorded(board(), hammer, sensor, blows, rate, seconds)
     return with_noise(rng, force, 40.0, rate), with_noise(rng, heard, decibels, rate, hum)
+
+
+def accelerance(hertz: Floats, hammer: tuple[float, float]) -> NDArray[np.complex128]:
+    """Of the board between a hammer and the sensor."""
+    omega, own = 2.0 * np.pi * hertz[:, None], 2.0 * np.pi * board().hertz
+    terms = -(omega**2) * board().residues(hammer, SENSOR)
+    return np.sum(terms / (own**2 - omega**2 + 2j * board().damping * own * omega), axis=1)
+
+
+def wav_bytes(format_tag: int, channels: int, rate: int, align: int, bits: int, data: bytes, claimed: int) -> bytes:
+    """A WAV file by hand, with whatever its header says."""
+    header = struct.pack("<HHIIHH", format_tag, channels, rate, rate * align & 0xFFFFFFFF, align, bits)
+    chunks = b"fmt " + struct.pack("<I", len(header)) + header + b"data" + struct.pack("<I", claimed) + data
+    return b"RIFF" + struct.pack("<I", (4 + len(chunks)) & 0xFFFFFFFF) + b"WAVE" + chunks
+
+
+def uff(sets: list[dict[str, Any]]) -> bytes:
+    """A UFF file, as text; keys: kind, x, y, even, axis, unit, top, top_unit, under."""
+    lines = []
+    for one in sets:
+        x, y, even = one["x"], np.asarray(one["y"]), one.get("even", True)
+        is_complex = np.iscomplexobj(y)
+        axis = "{:>10}    0    0    0 {:<20} {:<20}"
+        lines += ["    -1", "    58".ljust(80), *[" " * 80] * 5]
+        lines.append(f"{one['kind']:5d}         0    0         0 NONE               1   3 NONE               1   3")
+        step = x[1] - x[0] if even else 0.0
+        lines.append(f"{6 if is_complex else 4:10d}{y.size:10d}{int(even):10d}{x[0]:13.5e}{step:13.5e}{0.0:13.5e}")
+        lines.append(axis.format(one.get("axis", {1: 17, 4: 18}[one["kind"]]), "NONE", one.get("unit", "NONE")))
+        lines.append(axis.format(one.get("top", 12), "NONE", one.get("top_unit", "NONE")))
+        lines.append(axis.format(one.get("under", 13 if one["kind"] == 4 else 0), "NONE", "NONE"))
+        lines.append(axis.format(0, "NONE", "NONE"))
+        numbers = y.view(float) if is_complex else y
+        if even:
+            lines += ["".join(f"{v:20.11e}" for v in numbers[k : k + 4]) for k in range(0, numbers.size, 4)]
+        else:
+            pairs = [f"{t:13.5e}{v:20.11e}" for t, v in zip(x, y, strict=True)]
+            lines += ["".join(pairs[k : k + 2]) for k in range(0, y.size, 2)]
+        lines.append("    -1")
+    return "\n".join([*lines, ""]).encode()
 
 
 def write_wav(path: Path, rate: float, *channels: Floats, level: float = 0.5) -> Path:

@@ -21,6 +21,8 @@ _HERTZ = Number(
 )
 FREQUENCY = QuantityReader(_HERTZ, furthest=FURTHEST_FREQUENCIES).key
 SIGN = Key(Choice(("+", "-")))
+OPEN, PROBABILITY = 1e-9, "a probability: 98 % is 0.98"
+CHANCE = Number(OPEN, 1 - OPEN, hint=PROBABILITY).key
 _DAMPING = Number(1e-6, 100, "%", "the damping ratio in percent: half the loss factor").key
 
 
@@ -41,7 +43,7 @@ class Reading:
         Probability, before the fit, that the label is right; 0 for a label that the program proposes for a bare peak.
     stated : Label or None
         The label on the card, where another is proposed.
-    amplitude, damping : float or None
+    amplitude, damping, spurious : float or None
         Of the peak: see `Peak`.
     """
 
@@ -53,6 +55,7 @@ class Reading:
     stated: Label | None = None
     amplitude: float | None = None
     damping: float | None = None
+    spurious: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frequency", quantity_of(self.frequency, f"frequency of {self.label}", "in Hz"))
@@ -109,6 +112,8 @@ class Peak:
         Height relative to other peaks of the same setup; None if not known.
     damping : float or None
         Damping ratio, 1; None if not known.
+    spurious : float or None
+        Probability that it is no mode; None for that of its setup.
     """
 
     __pydantic_config__ = ConfigDict(extra="forbid")
@@ -117,6 +122,7 @@ class Peak:
     sign: Annotated[str, SIGN] = ""
     amplitude: Annotated[float | None, Number(1e-12, 1e12).key] = None
     damping: Annotated[float | None, Field(alias="damping_percent"), _DAMPING] = None
+    spurious: Annotated[float | None, Field(alias="spurious_probability"), CHANCE] = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frequency", quantity_of(self.frequency, "frequency of a peak", "in Hz"))
@@ -124,7 +130,7 @@ class Peak:
     @property
     def is_bare(self) -> bool:
         """Whether nothing but its frequency is known."""
-        return not self.sign and self.amplitude is None and self.damping is None
+        return not self.sign and self.amplitude is self.damping is self.spurious is None
 
 
 def label_text(label: str | tuple[int, int]) -> str:

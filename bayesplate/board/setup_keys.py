@@ -19,7 +19,7 @@ from bayesplate.board.measures import (
     by_label,
 )
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.reading import FREQUENCY, NO_OFFSET, SIGN, Peak
+from bayesplate.board.reading import CHANCE, FREQUENCY, NO_OFFSET, OPEN, PROBABILITY, SIGN, Peak
 from bayesplate.board.repeated import FURTHEST_SIZES, RULE, peak_comma_complaint
 from bayesplate.board.schema import Section
 from bayesplate.board.values import (
@@ -44,10 +44,8 @@ DEFAULT_SETUP_NAME = "setup"
 MISSED, SPURIOUS = 0.2, 0.02
 """Probabilities where a card states none: that a mode below the highest peak left no peak, that a peak is no mode."""
 
-_OPEN, _PROBABILITY = 1e-9, "a probability: 98 % is 0.98"
-_CONFIDENCE = Number(_OPEN, 1, hint=_PROBABILITY).key
+_CONFIDENCE = Number(OPEN, 1, hint=PROBABILITY).key
 _CONFIDENCES = by_label(_CONFIDENCE)
-_CHANCE = Number(_OPEN, 1 - _OPEN, hint=_PROBABILITY).key
 _CLAMPED = Number(0.01, 100_000, "mm", "leave the edge out if the clamp covers nothing")
 _CLAMPED_LENGTH = QuantityReader(_CLAMPED, furthest=FURTHEST_SIZES, resolution=RULE).key
 _BOUNCE = QuantityReader(Number(0.01, 1000, "Hz"), furthest=FURTHEST_SIZES).key
@@ -156,8 +154,8 @@ class SetupKeys(Section):
     noise: Annotated[Quantity | None, NOISE] = Field(default=None, alias="noise_percent")
     unlabelled: Annotated[tuple[Quantity, ...], _UNLABELLED] = Field(default=(), alias="unlabelled_hz")
     peaks: tuple[Peak, ...] = Field(default=(), max_length=MOST_MODES)
-    missed: Annotated[float, _CHANCE] = Field(default=MISSED, alias="missed_probability")
-    spurious: Annotated[float, _CHANCE] = Field(default=SPURIOUS, alias="spurious_probability")
+    missed: Annotated[float, CHANCE] = Field(default=MISSED, alias="missed_probability")
+    spurious: Annotated[float, CHANCE] = Field(default=SPURIOUS, alias="spurious_probability")
     frequencies: Annotated[Mapping[Label, Quantity], by_label(FREQUENCY)] = Field(default={}, alias="frequencies_hz")
     signs: Annotated[Mapping[Label, str], by_label(SIGN)] = {}
     label_confidence: Annotated[float | Mapping[Label, float], _ALL_OR_EACH] = 1.0

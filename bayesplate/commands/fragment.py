@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from bayesplate.board.units import SI, in_unit
 from bayesplate.board.writing import toml_value
-from bayesplate.recordings.contract import PickedRow, spurious_share
+from bayesplate.recordings.contract import PickedRow
 
 if TYPE_CHECKING:
     from bayesplate.recordings.signals import Place
@@ -16,6 +16,14 @@ if TYPE_CHECKING:
 _LEAST_SD = 1e-5
 """Of a frequency, relative: no laboratory's clock is better."""
 _MOST_SURE = 0.999
+_LEAST_SPURIOUS, _MOST_SPURIOUS = 0.002, 0.5
+_MOST_FILES = 3
+
+
+def spurious_share(peaks: Sequence[PickedRow]) -> float:
+    """Probability that any of some peaks is no mode, as a card states it, from that of each."""
+    share = sum(peak.spurious_probability for peak in peaks) / max(len(peaks), 1)
+    return min(max(share, _LEAST_SPURIOUS), _MOST_SPURIOUS)
 
 
 def fragment_text(
@@ -27,33 +35,26 @@ def fragment_text(
     name: str = "",
     sensor_mass: tuple[float, float] | None = None,
 ) -> str:
-    """A [setup] with the likely peaks.
+    """A [setup] with the likely ones of all peaks.
 
     Parameters
     ----------
-    peaks : sequence of PickedRow
-        All that were picked.
     labelled : mapping
         Number of a peak to the label that is stated, and the confidence in it.
-    spectra : Spectra
-        With the places of hammer and sensor.
     name : str
         Of the card's setup; empty if it has none.
     sensor_mass : (float, float), optional, kg
         Of the accelerometer, and its standard deviation.
     """
-    likely = [(i, peak) for i, peak in enumerate(peaks) if peak.is_likely]
-    told = ", ".join("".join(c for c in one if c.isprintable()) for one in files[:3]) + (
-        ", ..." if len(files) > 3 else ""
-    )
+    told = ", ".join([*files[:_MOST_FILES], *(["..."] if len(files) > _MOST_FILES else [])])
     lines = [f"# Picked from {told}. Use it with: bayesplate fit CARD --setup THIS_FILE", "[setup]"]
     if name:
         lines.append(f"name = {toml_value(name)}")
-    bare = [(i, peak) for i, peak in likely if i not in labelled]
-    doubt = spurious_share([peak.spurious_probability for _, peak in likely])
-    if bare:
-        lines.append(f"spurious_probability = {round(doubt, 4)}")
+    likely = [(i, peak) for i, peak in enumerate(peaks) if peak.is_likely]
+    bare = [peak for i, peak in likely if i not in labelled]
     named = [(peak, *labelled[i]) for i, peak in likely if i in labelled]
+    if bare:
+        lines.append(f"spurious_probability = {round(spurious_share([peak for _, peak in likely]), 4)}")
     if named:
         lines += ["", "[setup.frequencies_hz]"]
         lines += [f"{toml_value(label)} = {_hertz(peak)}" for peak, label, _ in named]
@@ -62,10 +63,11 @@ def fragment_text(
         signed = [(label, peak.sign) for peak, label, _ in named if peak.sign]
         if signed:
             lines += ["", "[setup.signs]", *(f"{toml_value(label)} = {toml_value(sign)}" for label, sign in signed)]
-    for _, peak in bare:
+    for peak in bare:
         lines += ["", f"[[setup.peaks]]{_remark(peak)}", f"hz = {_hertz(peak)}"]
         lines += [f"sign = {toml_value(peak.sign)}"] if peak.sign else []
         lines += [f"amplitude = {peak.amplitude:.3g}", f"damping_percent = {peak.damping_percent:.3g}"]
+        lines.append(f"spurious_probability = {round(spurious_share([peak]), 4)}")
     return "\n".join([*lines, *_places(spectra, sensor_mass)]) + "\n"
 
 

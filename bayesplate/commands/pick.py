@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bayesplate.commands.arguments import checked
 from bayesplate.commands.fragment import fragment_text
 from bayesplate.commands.options import FilePath, Force
-from bayesplate.commands.pick_labels import Labels, label_peaks, pictures_of, upright
+from bayesplate.commands.pick_labels import label_peaks, pictures_of
 from bayesplate.commands.pick_options import (
     CardOrNone,
     Channels,
@@ -36,7 +36,7 @@ from bayesplate.commands.pick_words import moved_between_hits, show_pick
 from bayesplate.commands.prepare import Prepared, prepare
 from bayesplate.errors import Fault, InputError, NotIdentifiableError, plain
 from bayesplate.files import make_folder, require_new, write_text
-from bayesplate.recordings.contract import PickReport, rows
+from bayesplate.recordings.contract import LabelChance, PickedRow, PickReport
 from bayesplate.recordings.picking import HIGHEST, LOWEST, Picked, pick_modes
 from bayesplate.recordings.reading import read_recordings
 from bayesplate.recordings.sand import read_picture
@@ -48,11 +48,13 @@ from bayesplate.results.folder import FIGURES
 
 if TYPE_CHECKING:
     from bayesplate.recordings.hits import Hit
-    from bayesplate.recordings.reading import Read
     from bayesplate.recordings.sand import Floats
+    from bayesplate.recordings.signals import Read
 
 FRAGMENT, PAGE, SUMMARY = "setup.toml", "recordings.html", "pick.json"
 _RATE_OFF = 1e-6
+_LEAST_LABEL, _MOST_LABELS = 0.005, 4
+"""Probability below which a label is not listed."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -151,7 +153,8 @@ def pick(
     pictures = {hertz: read_picture(path) for hertz, path in (sand or {}).items()}
     read = read_recordings(files, rate, channels, motion)
     read = [
-        [one.at(*places) for one in own] for own, places in zip(read, given_places(hammer, sensor, read), strict=True)
+        [replace(one, hammer=struck, sensor=listened) for one in own]
+        for own, (struck, listened) in zip(read, given_places(hammer, sensor, read), strict=True)
     ]
     heard = take(read, highest) if sweep is None else take_impulses(_impulses(read, sweep), highest)
     picked = pick_modes(heard.spectra, lowest, highest)
@@ -171,29 +174,27 @@ def _one_setup(prepared: Prepared) -> Prepared:
 
 def _impulses(read: Sequence[Sequence[Read]], sweep: str) -> list[tuple[Recording, Hit]]:
     """Impulse responses in place of recordings of a sweep, each as if the board had been hit once."""
-    recordings = [one for own in read for one in own if isinstance(one, Recording)]
-    wrong = [one.name for own in read for one in own if not isinstance(one, Recording) or one.force is not None]
+    recordings = [one for own in read for one in own if isinstance(one, Recording) and one.force is None]
+    wrong = [one.name for own in read for one in own if one not in recordings]
     if wrong:
         wanted = "one channel with the response to the sweep"
         raise InputError([Fault(name, wanted, "another kind of file", "leave --sweep out for hits") for name in wrong])
+    played: Sweep | Floats
     if not os.path.exists(sweep):
-        return _turned_back(recordings, read_sweep(sweep))
-    ((itself, *_),) = read_recordings([sweep], was_played=True)
-    if not isinstance(itself, Recording):
-        raise InputError(Fault(plain(sweep), "a recording of the sweep", "a frequency response"))
-    off = [one for one in recordings if abs(one.rate / itself.rate - 1.0) > _RATE_OFF]
-    if off:
-        raise InputError(
-            [Fault(f"{one.name} rate", f"{itself.rate:g} Hz, as the sweep", f"{one.rate:g} Hz") for one in off]
-        )
-    return _turned_back(recordings, itself.response)
-
-
-def _turned_back(recordings: Sequence[Recording], sweep: Sweep | Floats) -> list[tuple[Recording, Hit]]:
+        played = read_sweep(sweep)
+    else:
+        ((itself, *_),) = read_recordings([sweep], was_played=True)
+        if not isinstance(itself, Recording):
+            raise InputError(Fault(plain(sweep), "a recording of the sweep", "a frequency response"))
+        off = [one for one in recordings if abs(one.rate / itself.rate - 1.0) > _RATE_OFF]
+        if off:
+            wanted = f"{itself.rate:g} Hz, as the sweep"
+            raise InputError([Fault(f"{one.name} rate", wanted, f"{one.rate:g} Hz") for one in off])
+        played = itself.response
     found, faults = [], list[Fault]()
     for one in recordings:
         try:
-            found.append(impulse_response(one, sweep))
+            found.append(impulse_response(one, played))
         except InputError as error:
             faults += error.faults
     if faults:
@@ -211,24 +212,30 @@ def _summary(
     sensor_mass: tuple[float, float] | None,
 ) -> PickReport:
     names = tuple(plain(Path(one).name) for one in files)
-    numbers = [number for number, mode in enumerate(picked.modes) if mode.is_likely]
     flips = None if polarity is None else polarity == "opposite"
     remarks = [*heard.remarks, *picked.remarks]
     labels = None
     if prepared is not None:
-        kept, turned = upright(prepared.board, pictures)
-        shown, beside = pictures_of(picked, kept)
-        remarks += [*turned, *beside]
-        labels, told = _labelled(prepared, picked, flips, shown)
+        shown, told = pictures_of(prepared.board, picked.likely, pictures)
         remarks += told
+        try:
+            labels = label_peaks(prepared.board, prepared.prior, picked, flips, shown)
+            flips, remarks = labels.flips, [*remarks, *labels.doubts]
+        except NotIdentifiableError as error:
+            remarks.append(f"no labels: {error}")
     elif pictures:
         remarks.append("pictures of sand need a card: they are compared with the modes of its board")
-    flips = flips if labels is None else labels.flips
-    by_mode = {} if labels is None else {number: labels.of(i) for i, number in enumerate(numbers)}
-    peaks = rows(picked, flips, by_mode)
+    numbers = [number for number, peak in enumerate(picked.peaks) if peak.is_likely]
+    peaks = [
+        replace(peak, sign=picked.sign(answer, flips))
+        for peak, answer in zip(picked.peaks, picked.answers, strict=True)
+    ]
+    named: dict[int, tuple[str, float]] = {}
+    if labels is not None:
+        for number, chances in zip(numbers, labels.probabilities, strict=True):
+            peaks[number] = _labelled(peaks[number], chances)
+        named = _each_once({number: labels.stated(i) for i, number in enumerate(numbers)})
     remarks += moved_between_hits(peaks, picked.spectra.duration)
-    sure = {} if labels is None else {number: labels.stated(i) for i, number in enumerate(numbers)}
-    named = _each_once({number: one for number, one in sure.items() if one is not None})
     text = fragment_text(
         peaks,
         named,
@@ -245,7 +252,7 @@ def _summary(
         seconds=picked.spectra.duration,
         lowest_hz=picked.lowest,
         highest_hz=picked.highest,
-        peaks=peaks,
+        peaks=tuple(peaks),
         polarity="" if flips is None else "opposite" if flips else "same",
         board="" if prepared is None else prepared.board.name,
         fragment=text,
@@ -253,23 +260,17 @@ def _summary(
     )
 
 
-def _labelled(
-    prepared: Prepared, picked: Picked, flips: bool | None, shown: Mapping[int, Sequence[Floats]]
-) -> tuple[Labels | None, list[str]]:
-    try:
-        labels = label_peaks(prepared.board, prepared.prior, picked, flips, shown)
-        return labels, [*labels.doubts]
-    except NotIdentifiableError as error:
-        return None, [f"no labels: {error}"]
+def _labelled(peak: PickedRow, chances: Mapping[str, float]) -> PickedRow:
+    """A peak with its most probable labels."""
+    listed = [LabelChance(*one) for one in chances.items() if one[1] >= _LEAST_LABEL][:_MOST_LABELS]
+    return replace(peak, labels=tuple(listed), unlabelled_probability=max(1.0 - sum(chances.values()), 0.0))
 
 
-def _each_once(named: Mapping[int, tuple[str, float]]) -> dict[int, tuple[str, float]]:
+def _each_once(stated: Mapping[int, tuple[str, float] | None]) -> dict[int, tuple[str, float]]:
     """Each label for the peak that it is surest of."""
-    best: dict[str, int] = {}
-    for number, (label, sure) in named.items():
-        if label not in best or sure > named[best[label]][1]:
-            best[label] = number
-    return {number: one for number, one in named.items() if best[one[0]] == number}
+    named = {number: one for number, one in stated.items() if one is not None}
+    surest = {label: number for number, (label, _) in sorted(named.items(), key=lambda one: (one[1][1], -one[0]))}
+    return {number: one for number, one in named.items() if surest[one[0]] == number}
 
 
 def _write(folder: Path, targets: Sequence[Path], summary: PickReport, picked: Picked) -> None:

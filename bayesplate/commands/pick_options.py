@@ -135,33 +135,15 @@ def band(given: Mapping[str, Any], lowest: float, highest: float) -> Iterator[Fa
 def given_places(
     hammer: Sequence[Place], sensor: Sequence[Place], files: Sequence[object]
 ) -> list[tuple[Place | None, Place | None]]:
-    """Hammer and sensor of each file, m; None where nothing is known.
-
-    Parameters
-    ----------
-    hammer, sensor : sequence of (float, float), m
-        None, one, or as many as there are files.
-    """
-    columns = []
-    for given in (hammer, sensor):
-        spread = [None] * len(files) if not given else [*given] * len(files) if len(given) == 1 else [*given]
-        columns.append(spread)
-    return list(zip(*columns, strict=True))
+    """Hammer and sensor of each file, from none, one, or as many as there are files; None where nothing is known."""
+    every = [[*given] if len(given) > 1 else [given[0] if given else None] * len(files) for given in (hammer, sensor)]
+    return list(zip(*every, strict=True))
 
 
 def require_on_board(
-    board: Board,
-    hammer: Sequence[Place],
-    sensor: Sequence[Place],
-    sensor_mass: tuple[float, float] | None,
+    board: Board, hammer: Sequence[Place], sensor: Sequence[Place], sensor_mass: tuple[float, float] | None
 ) -> None:
-    """Hold places, m, and the mass of the sensor, kg, against a board with one setup.
-
-    Raises
-    ------
-    InputError
-        With everything that the card would be refused for if it stated it.
-    """
+    """Refuse places, m, and a mass of the sensor, kg, that a card of a board with one setup could not state."""
     (setup,) = board.setups
     places = {
         which if len(given) == 1 else f"{which} {number}": place

@@ -43,7 +43,7 @@ def with_labels(setup: Setup, peaks: PeakLikelihood, probabilities: NDArray[np.f
     used = _without_doubles(given, {at: label for at in given if (label := of_reading.get(at)) is not None})
     readings, bare, rest = [], [], []
     for at, reading in enumerate(setup.readings):
-        peak = Peak(reading.frequency, reading.sign, reading.amplitude, reading.damping)
+        peak = Peak(reading.frequency, reading.sign, reading.amplitude, reading.damping, reading.spurious)
         bare += [] if at in stated else [(peak, of_reading[at])]
     bare += [(peak, of_bare[i]) for i, peak in enumerate(setup.peaks)]
     for at, reading in stated.items():
@@ -53,8 +53,8 @@ def with_labels(setup: Setup, peaks: PeakLikelihood, probabilities: NDArray[np.f
         if found is None or found in used.values():
             rest.append(peak)
         else:
-            reading = Reading(found, (0, 0), peak.frequency, peak.sign, 0.0, None, peak.amplitude, peak.damping)
-            readings.append(_at(setup, reading, found))
+            told = peak.amplitude, peak.damping, peak.spurious
+            readings.append(_at(setup, Reading(found, (0, 0), peak.frequency, peak.sign, 0.0, None, *told), found))
     return replace(setup, readings=tuple(readings), peaks=tuple(rest))
 
 

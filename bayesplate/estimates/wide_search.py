@@ -13,7 +13,6 @@ Neal, Annealed importance sampling, Statistics and Computing, 2001.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -25,7 +24,7 @@ from numpy.typing import NDArray
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import RIGIDITIES, moduli
 from bayesplate.board.prior import PriorCard
-from bayesplate.board.reading import Peak
+from bayesplate.board.reading import Peak, Reading
 from bayesplate.board.setup import DEFAULT_NOISE, Setup
 from bayesplate.frequencies.laws import log_frequency
 from bayesplate.frequencies.model import OtherMode, SetupModel, setup_model
@@ -44,10 +43,13 @@ Floats = NDArray[np.float64]
 
 NOISES = (0.08, 0.04, 0.02, 0.01)
 """Relative, one after the other; the last is what the tables err by, with a usual noise."""
-LOUD = 0.02
-"""Noise from which on guesses are taken: a plate that lacks an effect misses its peaks by more than the last one."""
-MOST_FOUND = 4
-"""Ways to take the peaks that are looked at under one noise."""
+LOUD, LOUDEST = 0.02, 0.04
+"""Noise from which on the most frequent ways are looked at, and regions: a plate that lacks an effect misses its peaks
+by more than the last one."""
+MOST_FOUND, MOST_REGIONS = 4, 6
+"""Ways to take the peaks that are looked at under one noise, and regions of the constants of which one way is."""
+FAR = 0.5
+"""Of ln D: walks lead from one answer to another that is nearer, and do not find one that is farther off."""
 _N_FIRST, _N_DRAWS, _N_STEPS, _N_LOOKED_AT = 30_000, 3000, 3, 1000
 _N_NODES = (21, 15, 11, 11)
 """Of the tables under each noise, per axis: between them frequencies are off by less than the noise."""
@@ -86,6 +88,10 @@ class Guess:
         """Those at its middle, N m: (3,) array."""
         return np.array([self.values[name] for name in RIGIDITIES])
 
+    def is_far_from(self, other: Guess) -> bool:
+        """Whether the constants are others altogether."""
+        return bool(np.abs(np.log(self.rigidities / other.rigidities)).max() > FAR)
+
 
 def search_widely(board: Board, prior: PriorCard, rng: np.random.Generator) -> list[Guess]:
     """Regions of the prior in which the peaks of a board are likely, the likeliest first.
@@ -110,33 +116,49 @@ def search_widely(board: Board, prior: PriorCard, rng: np.random.Generator) -> l
     used = [setup for setup in board.setups if setup.readings or setup.peaks]
     every: list[_Modes] = []
     weighted, trained = np.zeros(len(population)), np.full(2, np.inf)
-    guesses: list[Guess] = []
+    by_noise: list[list[Guess]] = []
     for noise, n_nodes in zip(NOISES, _N_NODES, strict=True):
         extent = np.ptp(_range(population), axis=0)
         if (extent < _NARROWER * trained).any():
             every, trained = [_Modes.of(board, setups, population) for setups in _alike(used)], extent
         tabled = _Tabled(tuple((modes.table(population, n_nodes), modes.peaks) for modes in every))
-        found = tabled.log_likelihood(population, noise)
-        log_weights = found - weighted
+        there = tabled.log_likelihood(population, noise)
+        log_weights = there - weighted
         if not np.isfinite(log_weights).any():
             break
         shares = np.exp(log_weights - np.nanmax(log_weights))
         chosen = rng.choice(len(population), size=_N_DRAWS, p=shares / shares.sum())
-        population, weighted = population[chosen], found[chosen]
+        population, weighted = population[chosen], there[chosen]
         for _ in range(_N_STEPS):
             population, weighted = _walked(population, weighted, log_prior, tabled, noise, rng)
-        if noise <= LOUD:
-            guesses = [*_guesses(nominal, population, tabled, noise), *guesses]
-    return guesses
+        if noise <= LOUDEST:
+            by_noise.insert(0, _ways(nominal, population, tabled, noise))
+    return _guesses(by_noise)
 
 
-def _guesses(nominal: Values, population: Floats, tabled: _Tabled, noise: float) -> list[Guess]:
+def _ways(nominal: Values, population: Floats, tabled: _Tabled, noise: float) -> list[Guess]:
     """Members that take the peaks alike, the most frequent ways first."""
     some = population[:: max(1, len(population) // _N_LOOKED_AT)]
-    ways = tabled.assignments(some, noise)
-    order = Counter(map(tuple, ways.tolist())).most_common(MOST_FOUND)
-    members = (some[(ways == np.array(way)).all(axis=1)] for way, _ in order)
-    return [_guess(nominal, each, noise) for each in members]
+    ways, own = np.unique(tabled.assignments(some, noise), axis=0, return_inverse=True)
+    order = np.argsort(-np.bincount(own.ravel(), minlength=len(ways)), kind="stable")
+    return [_guess(nominal, some[own.ravel() == way], noise) for way in order]
+
+
+def _guesses(by_noise: Sequence[Sequence[Guess]]) -> list[Guess]:
+    """The most frequent ways under each small noise, and the most frequent one of each region that none of them is in.
+
+    A board that lacks what a real one has fits its peaks worse than another may by chance: the right plate is then
+    among the members while the noise is large, but not among the most frequent ways.
+    """
+    guesses: list[Guess] = []
+    for ways in by_noise:
+        n_regions = 0
+        for at, way in enumerate(ways):
+            is_elsewhere = n_regions < MOST_REGIONS and all(way.is_far_from(other) for other in guesses)
+            n_regions += is_elsewhere
+            if is_elsewhere or (at < MOST_FOUND and way.noise <= LOUD):
+                guesses.append(way)
+    return guesses
 
 
 def _density(prior: PriorCard, nominal: Values) -> Callable[[Floats], Floats]:
@@ -316,7 +338,8 @@ def _alike(setups: Iterable[Setup]) -> list[list[Setup]]:
 
 
 def _as_peaks(setup: Setup) -> tuple[Peak, ...]:
-    return (*(Peak(reading.frequency) for reading in setup.readings), *(Peak(peak.frequency) for peak in setup.peaks))
+    every: tuple[Reading | Peak, ...] = (*setup.readings, *setup.peaks)
+    return tuple(Peak(one.frequency, spurious=one.spurious) for one in every)
 
 
 def _places(model: SetupModel, n_peaks: int) -> tuple[Place, ...]:

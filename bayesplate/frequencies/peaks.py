@@ -49,9 +49,10 @@ class Order:
 class PeakLikelihood:
     """The probability of a setup's peaks, summed over all assignments to its modes (`Assignments`).
 
-    A peak is no mode with a prior probability s, and then lies anywhere up to the highest one; otherwise it is one of
-    the modes that no certain label has taken, about which it scatters as a reading does. Of n peaks n s are expected to
-    be none: each that is weighs n s, for it may stand anywhere among the others, while a mode has one place. A mode
+    A peak is no mode with a prior probability s, its own or that of its setup, and then lies anywhere up to the highest
+    one; otherwise it is one of the modes that no certain label has taken, about which it scatters as a reading does. Of
+    n peaks n s are expected to be none: each that is weighs n s, for it may stand anywhere among the others, while a
+    mode has one place. A mode
     leaves no peak with a prior probability, which is higher the nearer hammer or sensor stand to its nodal lines, or if
     it lies above the highest peak. Where the signs of residues are known, on the card and from the shapes, a peak of
     the other sign is not that mode, and peaks and modes keep their order within a sign only; a mode with so small a
@@ -117,7 +118,9 @@ class PeakLikelihood:
         seen = np.full(columns.size, 1.0 - setup.missed)
         if residues is not None:
             seen = seen * np.where(np.isnan(residues), 1.0, share_seen(np.nan_to_num(residues)))
-        log_pair = np.log(seen) + np.log1p(-setup.spurious)
+        own = [*(peak.spurious for peak in setup.peaks), *(setup.readings[i].spurious for i in doubtful)]
+        spurious = np.array([setup.spurious if one is None else one for one in own])[order]
+        log_pair = np.log(seen) + np.log1p(-spurious)[:, None]
         every = every_label(setup, model.others)
         labels = tuple(every[column] for column in columns)
         log_label = _log_labels(setup, readings, labels)
@@ -126,7 +129,7 @@ class PeakLikelihood:
         orders = tuple(_orders(signs, columns.size, residues))
         is_split = len(orders) > 1
         log_sign = np.where(((signs != 0) & (residues is not None)) | is_split, -np.log(2.0), 0.0)
-        log_alone = np.log(setup.spurious * len(errors.frequency) * wide) + log_label[:, -1] + log_sign
+        log_alone = np.log(spurious * spurious.size * wide) + log_label[:, -1] + log_sign
         return cls(
             errors=errors,
             readings=readings,

@@ -51,7 +51,7 @@ def deflections(
     setup: Setup, modes: Modes, values: Values, place: tuple[float, float], shaped: Effect | None = None
 ) -> NDArray[np.float64]:
     """Deflection of each mode at a place (m from the board's corner) over its largest: (n_modes,) array, -1 to 1."""
-    x, y = _fraction(setup, place, values)
+    x, y = fractions_of(setup, place, values)
     if shaped is not None:
         x, y = shaped.placed(x, y)
     at = modes.displacement(np.array([x]), np.array([y]))[:, 0, 0]
@@ -95,7 +95,7 @@ def sign_probabilities(residues: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([positive, 1.0 - positive])
 
 
-def _fraction(setup: Setup, place: tuple[float, float], values: Values) -> tuple[float, float]:
+def fractions_of(setup: Setup, place: tuple[float, float], values: Values) -> tuple[float, float]:
     """A place on the board (m from its corner) as fractions of the vibrating sides."""
     fractions = []
     for axis, position, side in zip("xy", place, vibrating_lengths(values, setup), strict=True):

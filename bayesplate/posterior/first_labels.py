@@ -23,7 +23,7 @@ from bayesplate.estimates.identifiability import identifiability
 from bayesplate.estimates.labelling import LIKELY, with_labels
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.unusual import MOST_ORTHOTROPIC
-from bayesplate.estimates.wide_search import Guess, search_widely
+from bayesplate.estimates.wide_search import FAR, Guess, search_widely
 from bayesplate.frequencies.model import setup_model, with_others
 from bayesplate.frequencies.peaks import PeakLikelihood, takes_part
 from bayesplate.frequencies.system import system_of
@@ -40,8 +40,6 @@ FEWEST_PEAKS = 4
 """Three fix the constants whatever they are called."""
 _UNUSUAL = 0.02
 """Probability that a plate is stiffer along y than along x, or that no wood is as orthotropic."""
-FAR = 0.5
-"""Of ln D: walks lead from one answer to another that is nearer, and do not find one that is farther off."""
 POSSIBLE = 0.02
 """Probability from which on another answer is one that has to be told."""
 UNLIKE = 0.01
@@ -234,7 +232,7 @@ def _settled(board: Board, guess: Guess, tried: list[tuple[Setup, ...]]) -> tupl
         estimate = weighted_least_squares(_of_labelled(labelled), _STEPS, guess.rigidities)
         if identifiability(estimate.sensitivities, estimate.scales, board.symmetry).blind():
             return labelled, guess.rigidities
-        guess = _guess_of(board, estimate)
+        guess = guess_of(board, estimate)
 
 
 def _guesses(board: Board, prior: PriorCard) -> list[Guess]:
@@ -242,14 +240,14 @@ def _guesses(board: Board, prior: PriorCard) -> list[Guess]:
     if sum(len(setup.readings) for setup in board.setups) >= board.symmetry.n:
         estimate = weighted_least_squares(_of_labelled(board), accepted=_NEAR)
         if not identifiability(estimate.sensitivities, estimate.scales, board.symmetry).blind():
-            return [_guess_of(board, estimate)]
+            return [guess_of(board, estimate)]
     n_peaks = sum(len(setup.readings) + len(setup.peaks) for setup in board.setups)
     if board.isotropic or n_peaks < len(RIGIDITIES):  # one label fixes all of an isotropic plate
         return []
     return search_widely(board, prior, np.random.default_rng(0))
 
 
-def _guess_of(board: Board, estimate: Estimate) -> Guess:
+def guess_of(board: Board, estimate: Estimate) -> Guess:
     """An estimate with its uncertainty; residuals beyond the expected noise widen both."""
     symmetry = board.symmetry
     spare = max(estimate.residuals.size - symmetry.n, 1)

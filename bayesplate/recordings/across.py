@@ -13,7 +13,6 @@ DerSimonian and Laird, Meta-analysis in clinical trials, Controlled Clinical Tri
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,9 +20,12 @@ from numpy.typing import NDArray
 
 from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.modes_found import Mode
+from bayesplate.recordings.plausibility import Peak
 from bayesplate.recordings.spectra import Rows, Spectra
 
 Floats = NDArray[np.float64]
+Group = dict[int, Peak]
+"""One mode: from the number of a set of records to the peak that it shows of it."""
 
 _OFFSETS = np.arange(-0.05, 0.0501, 5e-4)
 """Relative differences of two recordings as a whole that are tried."""
@@ -33,9 +35,9 @@ and which may always be."""
 _MOSTLY, _REACH, _OF_DAMPING = 0.8, 4.0, 0.7
 """Share of the modes of which the differences are usual, how many times those, and how much of the damping ratio two
 modes may differ by that are matched."""
-_LIKELY, _FEWEST, _CANDIDATES = 0.5, 3, 5
-"""Probability of being no mode below which a mode tells of its recording, how many must, and how many of the fullest
-recordings are tried as the one over which the others are laid."""
+_FEWEST, _CANDIDATES = 3, 5
+"""How many likely modes tell of a recording, and how many of the fullest recordings are tried as the one over which the
+others are laid."""
 _NOTED = 1e-3
 """Relative difference of a recording from the others from which on it is told."""
 _MOST_NAMED = 4
@@ -43,69 +45,36 @@ _OTHERS = 2.0
 """Modes of its own as which the scatter of all others counts for that of one mode."""
 
 
-class Seen(NamedTuple):
-    """A mode in one set of records: its frequency and decay rate with what parts of its peak leave open, (2,), Hz."""
-
-    mode: Mode
-    pole: Floats
-    split: Floats
-    spurious: float
-
-
-class Shown(NamedTuple):
-    """A set of records, by their numbers, and the modes that it shows."""
-
-    records: Rows
-    seen: Sequence[Seen]
-
-
-@dataclass(frozen=True, eq=False)
-class Across:
-    """Modes of several sets of records.
-
-    Attributes
-    ----------
-    modes : list of Mode
-        Of all records of `spectra`.
-    spurious : list of float
-        Probability that it is no mode in the set that shows it best.
-    spectra : Spectra
-        Without recordings that have other modes than all others.
-    """
+class Across(NamedTuple):
+    """Modes of several sets of records, and the spectra without recordings that have other modes than all others."""
 
     modes: list[Mode]
     spurious: list[float]
+    """Probability that it is no mode in the set that shows it best."""
     spectra: Spectra
     remarks: tuple[str, ...]
 
 
-def modes_across(spectra: Spectra, shown: Sequence[Shown]) -> Across:
-    """Modes of all records from those of each set.
+def modes_across(spectra: Spectra, sets: Sequence[Rows], shown: Sequence[Sequence[Peak]]) -> Across:
+    """Modes of all records from the peaks that each set of records shows by itself.
 
-    Parameters
-    ----------
-    shown : sequence of Shown
-        Sets that do not show quite the same modes.
-
-    Raises
-    ------
-    InputError
-        If half of the recordings or more have other modes than the rest.
+    Refused where half of the recordings or more have other modes than the rest.
     """
-    names = [_name(spectra, one.records) for one in shown]
-    hertz = [np.array([seen.pole[0] for seen in one.seen if seen.spurious < _LIKELY]) for one in shown]
+    names = [_name(spectra, records) for records in sets]
+    hertz = [np.array([peak.pole[0] for peak in own if peak.is_likely]) for own in shown]
     first, offsets, shares = _laid_over(hertz)
     strange = [k for k, own in enumerate(hertz) if own.size >= _FEWEST and 2 * shares[k] < own.size]
     told = {k: f"{shares[k]} of {hertz[k].size} modes are those of {names[first]}" for k in strange}
-    if 2 * len(strange) >= len(shown):
+    if 2 * len(strange) >= len(sets):
         raise InputError([Fault(names[k], "a recording of the same board", told[k], "pick it apart") for k in strange])
-    kept = [k for k in range(len(shown)) if k not in strange]
-    groups = _matched([shown[k] for k in kept], np.array([offsets[k] for k in kept]), kept.index(first))
-    own = spectra.only(np.concatenate([shown[k].records for k in kept]))
-    modes = _averaged(own, groups, [shown[k].records.size for k in kept])
+    kept = [k for k in range(len(sets)) if k not in strange]
+    groups = _matched([shown[k] for k in kept], [offsets[k] for k in kept], kept.index(first))
+    own = spectra.only(np.concatenate([sets[k] for k in kept]))
+    modes = _averaged(own, groups, [sets[k].size for k in kept])
     remarks = [f"{names[k]} left out: {told[k]} (is it of the same board?)" for k in strange]
     remarks.append(_differences([names[k] for k in kept], groups, spectra.files.size))
-    return Across(modes, [min(one.spurious for one in group.values()) for group in groups], own, tuple(remarks))
+    least = [min(peak.verdict.spurious for peak in group.values()) for group in groups]
+    return Across(modes, least, own, tuple(remarks))
 
 
 def _name(spectra: Spectra, records: Rows) -> str:
@@ -133,34 +102,32 @@ def _offset(own: Floats, other: Floats) -> tuple[float, int]:
     return float(_OFFSETS[best]), int(np.sum(off[best] < 2.0 * _NEAR))
 
 
-def _matched(shown: Sequence[Shown], offsets: Floats, first: int) -> list[dict[int, Seen]]:
-    """Groups of one mode each: from the number of a set to what it shows of it, in the order of frequency."""
+def _matched(shown: Sequence[Sequence[Peak]], offsets: Sequence[float], first: int) -> list[Group]:
+    """Groups of one mode each, in the order of frequency."""
     from scipy.optimize import linear_sum_assignment
 
-    groups: list[dict[int, Seen]] = [{first: one} for one in shown[first].seen]
-    for k in (k for k in range(len(shown)) if k != first):
-        own = shown[k].seen
-        if not own:
+    groups: list[Group] = [{first: one} for one in shown[first]]
+    for k, own in enumerate(shown):
+        if k == first or not own:
             continue
         logs = np.log([one.pole[0] for one in own]) - offsets[k]
         there = np.array([np.mean([np.log(one.pole[0]) - offsets[i] for i, one in g.items()]) for g in groups])
         off = np.abs(logs[:, None] - there)
-        nearest = off.min(axis=1)[[one.spurious < _LIKELY for one in own]]
+        nearest = off.min(axis=1)[[one.is_likely for one in own]]
         known = nearest[nearest < _SAME]
         usual = max(float(np.quantile(known, _MOSTLY)) if known.size else 0.0, _LEAST)
-        damping = np.array([one.pole[1] / one.pole[0] for one in own])
-        reach = _REACH * usual + _OF_DAMPING * damping
-        rows, columns = linear_sum_assignment(np.minimum(off / reach[:, None], 1.0))
-        pairs = {row: column for row, column in zip(rows, columns, strict=True) if off[row, column] < reach[row]}
+        reach = _REACH * usual + _OF_DAMPING * np.array([one.pole[1] / one.pole[0] for one in own])
+        pairs = zip(*linear_sum_assignment(np.minimum(off / reach[:, None], 1.0)), strict=True)
+        of_row = {row: column for row, column in pairs if off[row, column] < reach[row]}
         for row, one in enumerate(own):
-            if row in pairs:
-                groups[pairs[row]][k] = one
+            if row in of_row:
+                groups[of_row[row]][k] = one
             else:
                 groups.append({k: one})
     return sorted(groups, key=lambda group: float(np.mean([one.pole[0] for one in group.values()])))
 
 
-def _averaged(spectra: Spectra, groups: Sequence[dict[int, Seen]], sizes: Sequence[int]) -> list[Mode]:
+def _averaged(spectra: Spectra, groups: Sequence[Group], sizes: Sequence[int]) -> list[Mode]:
     """Each group as a mode of all records: hits are averaged within each file, then files."""
     ends = np.cumsum(sizes)
     files = spectra.files[ends - 1]
@@ -187,7 +154,6 @@ def _averaged(spectra: Spectra, groups: Sequence[dict[int, Seen]], sizes: Sequen
                 window=pole * np.sqrt(window),
                 residues=residues,
                 residue_sd=residue_sd,
-                gain=sum(one.mode.gain for one in group.values()),
                 expected=len(sizes) * min(one.mode.expected for one in group.values()),
                 seen=sum(one.mode.seen for one in group.values()) / len(sizes),
             )
@@ -195,7 +161,7 @@ def _averaged(spectra: Spectra, groups: Sequence[dict[int, Seen]], sizes: Sequen
     return found
 
 
-def _part(one: Seen) -> Floats:
+def _part(one: Peak) -> Floats:
     """Logarithms of frequency and decay rate, and variances: by noise, by the choice of lines, whole. (4, 2) array."""
     noise, window = one.mode.noise**2, one.mode.window**2 + one.split**2
     scale = one.pole**-2
@@ -226,23 +192,22 @@ def _mean(parts: Sequence[Floats], common: Floats) -> Floats:
     return np.stack([*sums, 1.0 / total])
 
 
-def _differences(names: Sequence[str], groups: Sequence[dict[int, Seen]], n_records: int) -> str:
+def _differences(names: Sequence[str], groups: Sequence[Group], n_records: int) -> str:
     """What is told of recordings that differ."""
     told = []
     for k, name in enumerate(names):
         beside = [
             np.log(group[k].pole[0]) - np.mean([np.log(one.pole[0]) for i, one in group.items() if i != k])
             for group in groups
-            if k in group and len(group) > 1 and group[k].spurious < _LIKELY
+            if k in group and len(group) > 1 and group[k].is_likely
         ]
         if beside and abs(off := float(np.median(beside))) > _NOTED:
             told.append((abs(off), f"{name} {100.0 * abs(off):.2g} % {'higher' if off > 0.0 else 'lower'}"))
-    others = "the other" if len(names) == 2 else "the others"
     most = [words for _, words in sorted(told, reverse=True)[: 1 if len(names) == 2 else _MOST_NAMED]]
+    others = "the other" if len(names) == 2 else "the others"
     little = "in damping, or by less than 0.1 % in frequency"
     how = f"in frequency ({', '.join(most)} than {others})" if most else little
     are_hits = any(" hit " in name for name in names)
-    what, which = ("hits" if are_hits else "recordings"), "each"
-    if are_hits and len(names) < n_records:
-        which = f"each of the {len(names)} clearest"
+    which = f"each of the {len(names)} clearest" if are_hits and len(names) < n_records else "each"
+    what = "hits" if are_hits else "recordings"
     return f"the {what} differ {how}: {which} was searched by itself, and the errors hold by what a mode scatters"

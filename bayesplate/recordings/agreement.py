@@ -29,16 +29,9 @@ _ALIKE = 0.025
 
 
 def agreeing(spectra: Spectra, lowest: float, highest: float) -> list[Rows]:
-    """Sets of records that show the same modes: all records, those of each file, or the clearest, each by itself.
+    """Sets of records that show the same modes, by their peaks between two frequencies.
 
-    Parameters
-    ----------
-    lowest, highest : float, Hz
-        Between which peaks are compared.
-
-    Returns
-    -------
-    list of (n,) array of int
+    They are all records, those of each file, or the clearest, each by itself.
     """
     every = np.arange(spectra.files.size)
     squares = np.array([_squares(*one) for one in _poles(spectra, lowest, highest)]).reshape(-1, 2)
@@ -79,7 +72,7 @@ def _poles(spectra: Spectra, lowest: float, highest: float) -> Iterator[tuple[Fl
     decibels = 10.0 * np.log10(np.mean(level / level.mean(axis=0), axis=1))
     peaks, _ = find_peaks(decibels, prominence=_PROMINENCE)
     peaks = peaks[np.argsort(decibels[peaks])[::-1][:_MOST_PEAKS]]
-    spacing = float(spectra.frequency[1] - spectra.frequency[0])
+    spacing = spectra.spacing
     power = 10.0 ** (decibels / 10.0)
     for peak, width in zip(peaks, peak_widths(power, peaks, 0.5)[0], strict=True):
         hertz, half = float(spectra.frequency[inside[peak]]), 0.5 * float(width) * spacing

@@ -10,7 +10,7 @@ from bayesplate.errors import Fault, InputError
 Floats = NDArray[np.float64]
 
 _JITTER = 1e-3
-"""Share of a step by which the times of samples, or the lines of a spectrum, may be unevenly spaced."""
+"""Share of a step by which the times of samples may be unevenly spaced."""
 _GAP = 1.75
 """Steps between two times at which a sample is missing; times are rounded, so two steps may look like less."""
 _COARSEST = 6.0
@@ -23,22 +23,7 @@ _UNEVEN = 2e-2
 
 
 def rate_of(times: Floats, shown: str, rate: float | None = None) -> float:
-    """Samples a second of evenly spaced times.
-
-    Parameters
-    ----------
-    times : (n,) array, s
-        Rounded to some digits, so that neighbours may be the same.
-    shown : str
-        Of the file, as messages show it.
-    rate : float, optional, Hz
-        As it was given; it must be that of the times.
-
-    Raises
-    ------
-    InputError
-        If times do not rise, or leave gaps.
-    """
+    """Samples a second of evenly spaced times in s, rounded to some digits; `rate` must agree where it was given."""
     steps = np.diff(np.where(np.abs(times) < _LATEST, times, np.nan))
     if times.size < 2 or not (steps >= 0.0).all() or times[-1] <= times[0]:
         raise InputError(Fault(f"{shown} time", "times in s that rise", "times that do not"))

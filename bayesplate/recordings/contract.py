@@ -2,16 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from bayesplate.recordings.picking import Picked, PickedMode
-from bayesplate.recordings.spectra import Spectra
-
-LEAST_LABEL = 0.005
-"""Probability below which a label is not listed."""
-MOST_LABELS = 4
-_LEAST_SPURIOUS, _MOST_SPURIOUS = 0.002, 0.5
 _NOTED = 0.1
 """Probability of having no label from which on it is listed among the labels."""
 
@@ -128,56 +120,3 @@ class PickReport:
     def likely(self) -> tuple[PickedRow, ...]:
         """The peaks that are modes rather than not."""
         return tuple(peak for peak in self.peaks if peak.is_likely)
-
-
-def rows(
-    picked: Picked, flips: bool | None, labels: Mapping[int, Sequence[tuple[str, float]]]
-) -> tuple[PickedRow, ...]:
-    """Rows of picked modes.
-
-    Parameters
-    ----------
-    flips : bool or None
-        Whether force and response have opposite polarity; None if that is not known.
-    labels : mapping
-        Number of a mode to its labels and their probabilities.
-    """
-    return tuple(
-        PickedRow(
-            hz=mode.frequency,
-            sd_hz=mode.sd,
-            noise_hz=mode.noise_sd,
-            scatter_hz=mode.scatter_sd,
-            window_hz=mode.window_sd,
-            damping_percent=100.0 * mode.damping,
-            damping_sd_percent=100.0 * mode.damping_sd,
-            sign=sign_of(picked.spectra, mode, flips),
-            amplitude=mode.amplitude,
-            spurious_probability=mode.spurious,
-            kind=mode.kind,
-            seen=mode.seen,
-            alike=mode.alike,
-            labels=tuple(LabelChance(*one) for one in labels.get(number, ()) if one[1] >= LEAST_LABEL)[:MOST_LABELS],
-            unlabelled_probability=max(1.0 - sum(p for _, p in labels[number]), 0.0) if number in labels else None,
-        )
-        for number, mode in enumerate(picked.modes)
-    )
-
-
-def spurious_share(spurious: Sequence[float]) -> float:
-    """Probability that any of some peaks is no mode, as a card states it, from that of each."""
-    return min(max(sum(spurious) / max(len(spurious), 1), _LEAST_SPURIOUS), _MOST_SPURIOUS)
-
-
-def sign_of(spectra: Spectra, mode: PickedMode, flips: bool | None) -> str:
-    """Sign of a residue between the only two places; empty where the force, the polarity or the sign is not known."""
-    if flips is None or spectra.force is None or len(spectra.between) > 1:
-        return ""
-    value = mode.mobility[0]
-    if abs(value) < 3.0 * mode.mobility_sd[0] or mode.complexity > _MOST_COMPLEX:
-        return ""
-    return "+" if (value > 0.0) != flips else "-"
-
-
-_MOST_COMPLEX = 60.0
-"""Degrees by which a residue may be complex that still has a sign."""

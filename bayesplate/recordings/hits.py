@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.recordings.onsets import heard_as, onsets, soft_onsets
 from bayesplate.recordings.signals import Recording
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 Floats = NDArray[np.float64]
 
@@ -38,52 +35,56 @@ _AFTER_FORCE = 0.0005
 
 @dataclass(frozen=True)
 class Hit:
-    """One hit in a recording, in samples.
-
-    Attributes
-    ----------
-    onset : int
-        Where it begins.
-    start : int
-        From where on the board rings by itself.
-    stop : int
-        Where the next hit, or the end, cuts it off.
-    fault : str
-        Why it cannot be used; empty if it can.
-    is_gated : bool
-        Whether a noise gate cuts it off, before the next hit.
-    """
+    """One hit in a recording: samples where it begins, from where on the board rings by itself, and where that ends."""
 
     onset: int
     start: int
     stop: int
     fault: str = ""
+    """Why it cannot be used."""
     is_gated: bool = False
+    """Whether a noise gate cuts it off, before the next hit."""
 
 
 def find_hits(recording: Recording) -> list[Hit]:
     """Every hit of a recording, in order; empty where there is none."""
+    response, rate = recording.response, recording.rate
     if recording.force is not None:
-        pulses = _pulses(recording.force, recording.rate)
-        lag = round(_AFTER_FORCE * recording.rate)
+        pulses, lag = _pulses(recording.force, rate), round(_AFTER_FORCE * rate)
     else:
-        lag = round(_AFTER_SOUND * recording.rate)
-        pulses = [(onset, onset) for onset in onsets(recording.response, recording.rate)]
-    ends = [*(begin for begin, _ in pulses[1:]), recording.response.size][: len(pulses)]
+        pulses, lag = [(onset, onset) for onset in onsets(response, rate)], round(_AFTER_SOUND * rate)
+    ends = [*(begin for begin, _ in pulses[1:]), response.size][: len(pulses)]
     hits = []
     after_bounce = False
     for i, ((begin, end), stop) in enumerate(zip(pulses, ends, strict=True)):
         start = end + lag
-        gated = _gated(recording.response[start:stop], recording.rate)
-        is_gated, stop = gated is not None, stop if gated is None else start + gated
+        gated = _gated(response[start:stop], rate)
+        stop = stop if gated is None else start + gated
         is_last = i == len(pulses) - 1
-        is_bounced = not is_last and stop - begin < BOUNCE * recording.rate
-        fault = "" if not (is_bounced or after_bounce) else "a double hit: the hammer bounced"
-        if not fault:
-            fault = _fault(recording, begin, start, stop, "a noise gate" if is_gated else "the end" * is_last)
-        hits.append(Hit(begin, start, stop, fault, is_gated))
+        is_bounced = not is_last and stop - begin < BOUNCE * rate
+        if is_bounced or after_bounce:
+            fault = "a double hit: the hammer bounced"
+        else:
+            fault = _fault(recording, begin, start, stop, "the end" * is_last if gated is None else "a noise gate")
+        hits.append(Hit(begin, start, stop, fault, gated is not None))
         after_bounce = is_bounced
     return hits
+
+
+def usable(hits: Sequence[Hit]) -> list[Hit]:
+    """Those without a fault."""
+    return [hit for hit in hits if not hit.fault]
+
+
+def rising_again(recording: Recording, hits: Sequence[Hit], duration: float) -> list[float]:
+    """Times at which a board is heard anew within some seconds after a hit, s from the beginning of the recording."""
+    again = np.array(soft_onsets(recording.response, recording.rate)) / recording.rate
+    found = []
+    for hit in hits:
+        first = hit.start / recording.rate + _SETTLED
+        last = min(hit.start / recording.rate + duration, hit.stop / recording.rate - _SETTLED)
+        found += [float(time) for time in again[(again > first) & (again < last)]]
+    return found
 
 
 def _fault(recording: Recording, onset: int, start: int, stop: int, end: str) -> str:
@@ -142,23 +143,5 @@ def _pulses(force: Floats, rate: float) -> list[tuple[int, int]]:
     if top <= 0.0 or top < 8.0 * float(np.median(level)) + 1e-300:
         return []
     on = np.flatnonzero(level > _OF_PULSE * top)
-    gaps = np.flatnonzero(np.diff(on) > 0.002 * rate)
-    begins, ends = on[np.r_[0, gaps + 1]], on[np.r_[gaps, on.size - 1]]
-    strong = [level[b : e + 1].max() > _OF_BOUNCE * top for b, e in zip(begins, ends, strict=True)]
-    return [(int(b), int(e)) for b, e, is_hit in zip(begins, ends, strong, strict=True) if is_hit]
-
-
-def usable(hits: Sequence[Hit]) -> list[Hit]:
-    """Those without a fault."""
-    return [hit for hit in hits if not hit.fault]
-
-
-def rising_again(recording: Recording, hits: Sequence[Hit], duration: float) -> list[float]:
-    """Times at which a board is heard anew within some seconds after a hit, s from the beginning of the recording."""
-    again = np.array(soft_onsets(recording.response, recording.rate)) / recording.rate
-    found = []
-    for hit in hits:
-        first = hit.start / recording.rate + _SETTLED
-        last = min(hit.start / recording.rate + duration, hit.stop / recording.rate - _SETTLED)
-        found += [float(time) for time in again[(again > first) & (again < last)]]
-    return found
+    pulses = np.split(on, np.flatnonzero(np.diff(on) > 0.002 * rate) + 1)
+    return [(int(one[0]), int(one[-1])) for one in pulses if level[one].max() > _OF_BOUNCE * top]

@@ -3,7 +3,8 @@
 The spectrum of a free decay that was cut out without a taper is, line by line, a sum of one simple rational term for
 each mode, whatever the decay has lost when it is cut off; modes beyond the window are a low polynomial. With the
 frequencies f_m and the decay rates d_m of the modes given, the residues of every record are linear: they are projected
-out (variable projection), and Gauss's steps are taken in f_m and d_m alone.
+out (variable projection), and Gauss's steps are taken in f_m and d_m alone. Modes that are not known are found one by
+one: where what a fit leaves looks most like a mode, one is added and all are refitted.
 
 References
 ----------
@@ -25,7 +26,7 @@ Complex = NDArray[np.complex128]
 
 DEGREE = 2
 """Of the polynomial that stands for what lies beyond the window."""
-_MOST_STEPS, _FEW_STEPS = 30, 4
+_MOST_STEPS, _FEW_STEPS, _SEARCH_STEPS = 30, 4, 10
 _SHRUNK, _GROWN, _FIRST_DAMPING = 0.2, 6.0, 1e-3
 _SETTLED = 1e-7
 """Of the sum of squares, relative."""
@@ -33,6 +34,14 @@ _LEAST_DECAY = 1e-4
 """Decay rate over the spacing of the lines, at least: a steady line must not need another beside it."""
 STEADY = 0.11
 """Decay rate times duration below which a line has not fallen by half: it may be steady."""
+MOST_MODES = 14
+"""In one window."""
+_BEYOND = 0.15
+"""Share of the window's width beyond its ends up to which a mode may lie whose tail is seen."""
+_DAMPINGS, _STEP = (0.001, 0.004, 0.012, 0.035), 0.7
+"""Damping ratios that are tried in a search, and the step of frequencies, in lines."""
+_LEAST_OWN = 1e-4
+"""Share of a mode's shape that those before it must leave."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +50,6 @@ class Window:
 
     Attributes
     ----------
-    frequency : (n_lines,) array, Hz
     values : (n_lines, n_records) complex array
         Spectra, each record over the standard deviation of its noise.
     fixed : (n_fixed, 2) array, Hz
@@ -79,6 +87,13 @@ class Window:
         every = np.concatenate([poles, self.fixed])
         return np.concatenate([shapes(self.frequency, every), at[:, None] ** np.arange(DEGREE + 1)], axis=1)
 
+    def compressed(self, most: int) -> Window:
+        """The strongest combinations of the records: any combination has the same modes."""
+        if self.values.shape[1] <= most:
+            return self
+        _, _, right = np.linalg.svd(self.values, full_matrices=False)
+        return replace(self, values=self.values @ right[:most].conj().T)
+
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
@@ -111,14 +126,10 @@ class Fitted:
         return self.window.frequency.size - len(self.poles) - len(self.window.fixed) - DEGREE - 1
 
     @property
-    def power(self) -> Floats:
-        """Mean square of what is left of each record: (n_records,) array."""
-        return np.asarray(np.sum(np.abs(self.rest) ** 2, axis=0) / self.n_free)
-
-    @property
     def variance(self) -> Floats:
-        """Of the noise of each record, (n_records,) array: what is left, if that is not too little."""
-        return np.maximum(self.power, max(self.window.least_variance, 1e-300))
+        """Of the noise of each record, (n_records,): the mean square of what is left, if that is not too little."""
+        power = np.sum(np.abs(self.rest) ** 2, axis=0) / self.n_free
+        return np.maximum(power, max(self.window.least_variance, 1e-300))
 
     def information(self) -> tuple[Floats, Floats]:
         """What each record says of the parameters: scores (n_records, n) and information (n_records, n, n).
@@ -132,6 +143,23 @@ class Fitted:
         information = 2.0 * np.real(inner * pairs) / power[:, None, None]
         scores = 2.0 * np.real(both.conj().T * (self.jacobian.conj().T @ self.rest).T) / power[:, None]
         return scores, information
+
+    @cached_property
+    def cost(self) -> float:
+        """-2 ln of the likelihood, but for a constant: the noise of each record is at its best."""
+        squares, variance = np.sum(np.abs(self.rest) ** 2, axis=0), self.variance
+        spread = -2.0 * self.rest.shape[1] * float(np.sum(np.log(self.window.weights)))
+        return float(2.0 * np.sum(len(self.rest) * np.log(variance) + squares / variance)) + 2.0 * spread
+
+    def without(self, mode: int) -> Fitted:
+        """The best fit without one of its modes, the others free to move a little."""
+        return refined(self.window, np.delete(self.poles, mode, axis=0), _FEW_STEPS)
+
+    def with_share(self, shares: tuple[float, ...]) -> Fitted:
+        """The fit with the share that no simple mode describes which makes the window likeliest."""
+        tried = [refined(replace(self.window, unlike=share), self.poles, _FEW_STEPS) for share in shares]
+        best = min(tried, key=lambda one: one.cost)
+        return refined(best.window, best.poles)
 
 
 def shapes(frequency: Floats, poles: Floats) -> Complex:
@@ -156,34 +184,24 @@ def fitted(window: Window, poles: Floats) -> Fitted:
 
 
 def refined(window: Window, poles: Floats, most_steps: int = _MOST_STEPS) -> Fitted:
-    """The most likely modes near given ones, by damped Gauss-Newton steps; every record weighs as its noise lets it.
+    """The most likely modes near given ones, (n_modes, 2: Hz), by damped Gauss-Newton steps.
 
-    Parameters
-    ----------
-    poles : (n_modes, 2) array, Hz
-        Where to begin.
-
-    Returns
-    -------
-    Fitted
-        Of the window as it was given.
+    Every record weighs as its noise lets it.
     """
     here = fitted(window, poles)
     if not len(poles):
         return here
     damping = _FIRST_DAMPING
-    cost = _cost(here)
     for _ in range(most_steps):
         scores, information = here.information()
         score, matrix = scores.sum(axis=0), information.sum(axis=0)
-        scale = np.diagonal(matrix).copy()
+        scale = np.diagonal(matrix)
         step = np.linalg.solve(matrix + np.diag(damping * scale + 1e-300), score)
         there = fitted(window, _moved(window, here.poles, step))
-        lower = _cost(there)
-        if lower < cost:
-            gain, here, cost = cost - lower, there, lower
-            damping = max(damping * _SHRUNK, 1e-9)
-            if gain < _SETTLED * abs(cost) + 1e-4:
+        if there.cost < here.cost:
+            is_settled = here.cost - there.cost < _SETTLED * abs(there.cost) + 1e-4
+            here, damping = there, max(damping * _SHRUNK, 1e-9)
+            if is_settled:
                 break
         else:
             damping *= _GROWN
@@ -201,34 +219,33 @@ def _moved(window: Window, poles: Floats, step: Floats) -> Floats:
     return np.stack([frequency, np.maximum(decay, _LEAST_DECAY * window.spacing)], axis=1)
 
 
-def _cost(fit: Fitted) -> float:
-    """-2 ln of the likelihood, but for a constant: the noise of each record is at its best."""
-    n_records = fit.rest.shape[1]
-    squares = np.sum(np.abs(fit.rest) ** 2, axis=0)
-    variance = fit.variance
-    spread = -2.0 * n_records * float(np.sum(np.log(fit.window.weights)))
-    return float(2.0 * np.sum(fit.window.frequency.size * np.log(variance) + squares / variance)) + 2.0 * spread
+def search(window: Window, least_gain: float) -> list[Floats]:
+    """Modes of a window, (n_modes, 2: Hz): with one mode, with two, and so on, while the likelihood gains.
+
+    `least_gain` is twice the ln of the likelihood that a mode must gain.
+    """
+    fit = refined(window, np.zeros((0, 2)))
+    candidates = _candidates(window)
+    tried = shapes(window.frequency, candidates) * window.weights[:, None]
+    own = np.sum(np.abs(tried) ** 2, axis=0)
+    adjoint = np.ascontiguousarray(tried.conj().T)
+    path: list[Floats] = []
+    while len(path) < MOST_MODES and fit.n_free >= 2 * len(path) + 8:
+        free = own - np.sum(np.abs(adjoint @ fit.orthogonal) ** 2, axis=1)
+        gains = np.sum(np.abs(adjoint @ (fit.rest / np.sqrt(fit.variance))) ** 2, axis=1)
+        best = int(np.argmax(gains / np.maximum(free, _LEAST_OWN * own)))
+        better = refined(window, np.concatenate([fit.poles, candidates[best][None]]), _SEARCH_STEPS)
+        if fit.cost - better.cost < least_gain:
+            break
+        fit = better
+        path.append(fit.poles)
+    return path
 
 
-def likelihood_gain(less: Fitted, more: Fitted) -> float:
-    """Twice the ln of how much likelier a window is with more modes."""
-    return _cost(less) - _cost(more)
-
-
-def with_share(fit: Fitted, shares: tuple[float, ...]) -> Fitted:
-    """The fit with the share that no simple mode describes which makes the window likeliest."""
-    tried = [refined(replace(fit.window, unlike=share), fit.poles, _FEW_STEPS) for share in shares]
-    return refined((best := min(tried, key=_cost)).window, best.poles)
-
-
-def without(fit: Fitted, mode: int) -> Fitted:
-    """The best fit without one of its modes, the others free to move a little."""
-    return refined(fit.window, np.delete(fit.poles, mode, axis=0), _FEW_STEPS)
-
-
-def compressed(window: Window, most: int) -> Window:
-    """The strongest combinations of the records: any combination has the same modes."""
-    if window.values.shape[1] <= most:
-        return window
-    _, _, right = np.linalg.svd(window.values, full_matrices=False)
-    return replace(window, values=window.values @ right[:most].conj().T)
+def _candidates(window: Window) -> Floats:
+    """Frequencies and decay rates that are tried: (n, 2) array, Hz."""
+    low, high = window.frequency[0], window.frequency[-1]
+    reach = _BEYOND * (high - low)
+    frequency = np.arange(max(low - reach, window.spacing), high + reach, _STEP * window.spacing)
+    decay = np.maximum(np.outer(frequency, _DAMPINGS), 0.1 * window.spacing)
+    return np.stack([np.repeat(frequency, len(_DAMPINGS)), decay.ravel()], axis=1)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.recordings.greedy import search
-from bayesplate.recordings.local_fit import Fitted, Window, compressed, likelihood_gain, refined, with_share, without
+from bayesplate.recordings.local_fit import Fitted, Window, refined, search
 from bayesplate.recordings.spectra import Spectra
 
 Floats = NDArray[np.float64]
@@ -49,19 +49,14 @@ class Mode:
     ----------
     frequency, decay : float, Hz
         The decay rate is half the width of the peak at half its power: damping ratio times frequency.
-    noise : (2,) array, Hz
-        Standard deviations of both, by what each record leaves after the fit.
-    scatter : (2,) array, Hz
-        By how much more both are uncertain for what hits, places and files scatter beyond it.
-    window : (2,) array, Hz
-        Standard deviations of both for the choice of lines.
+    noise, scatter, window : (2,) array, Hz
+        Standard deviations of both: by what each record leaves after the fit, for what hits, places and files scatter
+        beyond it, and for the choice of lines.
     residues : (n_records,) complex array
         In units of the spectra.
     residue_sd : (n_records,) array
-    gain : float
-        Twice the ln of how much likelier the spectra are with this mode.
     expected : float
-        Of how many modes noise alone would give so much, in all the band.
+        How many modes noise alone would show as clearly, in all the band.
     seen : float
         Share of the widths of windows in which it was found.
     """
@@ -73,7 +68,6 @@ class Mode:
     window: Floats
     residues: Complex
     residue_sd: Floats
-    gain: float
     expected: float
     seen: float
 
@@ -88,51 +82,43 @@ class Mode:
         return self.decay / self.frequency
 
 
-@dataclass(frozen=True, eq=False)
-class Path:
-    """What the search of one window found, mode by mode: the diagram of stability.
-
-    Attributes
-    ----------
-    width : float, Hz
-    orders : tuple of (n_modes,) array, Hz
-        Frequencies of the modes within the window with one mode, with two, and so on.
-    """
+class Path(NamedTuple):
+    """Frequencies in one window of some width in Hz, with one mode, with two, and so on: the diagram of stability."""
 
     width: float
     orders: tuple[Floats, ...]
 
 
+class _Part(NamedTuple):
+    """A window with its margins, and the ends in Hz between which its modes count."""
+
+    window: Window
+    low: float
+    high: float
+
+    def own(self, poles: Floats) -> Floats:
+        """Of modes (n_modes, 2) those that count."""
+        return poles[(poles[:, 0] >= self.low) & (poles[:, 0] < self.high)]
+
+
 def find_modes(spectra: Spectra, lowest: float, highest: float) -> tuple[list[Floats], list[Path]]:
-    """Look for modes between two frequencies in windows of each width.
-
-    Parameters
-    ----------
-    lowest, highest : float, Hz
-
-    Returns
-    -------
-    by_width : list of (n_modes, 2) array, Hz
-        Frequency and decay rate of the modes that windows of each width show.
-    """
-    values = spectra.values / spectra.noise
+    """Modes between two frequencies that windows of each width show, (n_modes, 2: Hz), and the paths of the search."""
     by_width: list[Floats] = []
     paths: list[Path] = []
     for width in WIDTHS:
         found = []
-        for window, low, high in _windows(spectra, values, lowest, highest, width):
-            one = search(_for_search(window), _least_gain(window))
-            poles = one.fit.poles
-            found.append(poles[(poles[:, 0] >= low) & (poles[:, 0] < high)])
-            inside = tuple(np.sort(p[(p[:, 0] >= low) & (p[:, 0] < high), 0]) for p in one.path)
-            paths.append(Path(width, inside))
+        for part in _parts(spectra, lowest, highest, width):
+            strongest = part.window.compressed(_MOST_RECORDS)
+            searched = replace(strongest, unlike=UNLIKE, floor=FLOOR, least_variance=1.0)
+            orders = [part.own(poles) for poles in search(searched, _least_gain(part.window))]
+            found.append(orders[-1] if orders else np.zeros((0, 2)))
+            paths.append(Path(width, tuple(np.sort(poles[:, 0]) for poles in orders)))
         by_width.append(np.concatenate(found))
     return by_width, paths
 
 
-def joined(by_width: list[Floats], spectra: Spectra) -> Floats:
+def joined(by_width: list[Floats], spacing: float) -> Floats:
     """Modes of windows of the first width, and of the others where the first have none: (n_modes, 2) array, Hz."""
-    spacing = float(spectra.frequency[1] - spectra.frequency[0])
     every = by_width[0]
     for poles in by_width[1:]:
         new = [pole for pole in poles if not _has(every, pole, spacing)]
@@ -149,41 +135,27 @@ def fit_modes(spectra: Spectra, start: Floats, by_width: list[Floats], lowest: f
         Frequencies and decay rates to begin with.
     by_width : list of (n_modes, 2) array, Hz
         What windows of each width have shown.
-    lowest, highest : float, Hz
 
     Returns
     -------
     list of Mode
-        In the order of frequency.
+        Between two frequencies, in their order.
     """
-    values = spectra.values / spectra.noise
-    modes: list[Mode] = []
     n_lines = int(np.sum((spectra.frequency >= lowest) & (spectra.frequency < highest)))
-    for window, low, high in _windows(spectra, values, lowest, highest, WIDTHS[0]):
-        modes += _modes_of(spectra, window, low, high, start, n_lines, by_width)
+    parts = _parts(spectra, lowest, highest, WIDTHS[0])
+    modes = [mode for part in parts for mode in _modes_of(spectra, part, start, n_lines, by_width)]
     return sorted(modes, key=lambda mode: mode.frequency)
 
 
-def _windows(
-    spectra: Spectra, values: Complex, lowest: float, highest: float, width: float
-) -> Iterator[tuple[Window, float, float]]:
-    """Windows of about one width, each with its margins, and the ends between which its modes count."""
-    spacing = float(spectra.frequency[1] - spectra.frequency[0])
+def _parts(spectra: Spectra, lowest: float, highest: float, width: float) -> Iterator[_Part]:
+    """Windows of about one width."""
+    spacing, hertz, values = spectra.spacing, spectra.frequency, spectra.values / spectra.noise
     n = max(1, round((highest - lowest) / max(width, _LEAST_LINES * spacing)))
-    ends = np.linspace(lowest, highest, n + 1)
     margin = max(_MARGIN, 0.5 * _LEAST_LINES * spacing)
-    for low, high in pairwise(ends):
-        kept = (spectra.frequency >= max(low - margin, 0.3 * lowest, 3.0 * spacing)) & (
-            spectra.frequency <= high + margin
-        )
-        if not kept.any():
-            continue  # a frequency response that ends below
-        yield Window(spectra.frequency[kept], values[kept], np.zeros((0, 2))), float(low), float(high)
-
-
-def _for_search(window: Window) -> Window:
-    strongest = compressed(window, _MOST_RECORDS)
-    return replace(strongest, unlike=UNLIKE, floor=FLOOR, least_variance=1.0)
+    for low, high in pairwise(np.linspace(lowest, highest, n + 1).tolist()):
+        kept = (hertz >= max(low - margin, 0.3 * lowest, 3.0 * spacing)) & (hertz <= high + margin)
+        if kept.any():  # else a frequency response that ends below
+            yield _Part(Window(hertz[kept], values[kept], np.zeros((0, 2))), low, high)
 
 
 def _least_gain(window: Window) -> float:
@@ -200,47 +172,49 @@ def _has(poles: Floats, one: Floats, spacing: float) -> bool:
     return bool(np.any(np.abs(poles[:, 0] - one[0]) < reach))
 
 
-def _modes_of(
-    spectra: Spectra, window: Window, low: float, high: float, start: Floats, n_lines: int, by_width: list[Floats]
-) -> Iterator[Mode]:
-    """Modes of one window between two frequencies, fitted to all records at once."""
-    ends = window.frequency[0], window.frequency[-1]
-    own = start[(start[:, 0] >= ends[0]) & (start[:, 0] <= ends[1])]
+def _modes_of(spectra: Spectra, part: _Part, start: Floats, n_lines: int, by_width: list[Floats]) -> Iterator[Mode]:
+    """Modes of one window, fitted to all records at once."""
+    window = part.window
+    outside = np.maximum(window.frequency[0] - start[:, 0], start[:, 0] - window.frequency[-1])
+    own = start[outside <= 0.0]
     if not len(own):
         return
-    outside = np.maximum(ends[0] - start[:, 0], start[:, 0] - ends[1])
     window = replace(window, fixed=start[(outside > 0.0) & (outside <= _REACH)])
-    strongest = compressed(window, _MOST_FITTED)
-    few, gains = _pruned(with_share(refined(strongest, own), _SHARES), _least_gain(window))
+    strongest = refined(window.compressed(_MOST_FITTED), own).with_share(_SHARES)
+    few, gains = _pruned(strongest, _least_gain(window))
     if not len(few.poles):
         return
     fit = refined(replace(window, unlike=few.window.unlike), few.poles, _LAST_STEPS)
     scores, information = fit.information()
-    inverse = np.linalg.pinv(information.sum(axis=0), hermitian=True)
+    inverse = _inverse(information)
     steps, level = scores @ inverse, spectra.noise
     widening = _correlation(fit)
-    narrow = _narrower(fit, low, high)
+    narrow = _narrower(fit, part)
     n = len(fit.poles)
     for m, (frequency, decay) in enumerate(fit.poles):
-        if not low <= frequency < high or decay > _BROADEST * frequency:
+        if not part.low <= frequency < part.high or decay > _BROADEST * frequency:
             continue
         at = np.array([m, n + m])
+        own_variance = np.diagonal(inverse)[at]
         each = widening * np.einsum("ij,rjk,ki->ri", inverse[at], information, inverse[:, at])
-        variance = widening * np.diagonal(inverse)[at]
-        counted = [_has(poles, fit.poles[m], window.spacing) for poles in by_width]
+        excess = _excess(spectra.places, steps[:, at], each)
         yield Mode(
             frequency=float(frequency),
             decay=float(decay),
-            noise=np.sqrt(variance),
-            scatter=np.sqrt(variance * (_excess(spectra.places, steps[:, at], each) - 1.0)),
+            noise=np.sqrt(widening * own_variance),
+            scatter=np.sqrt(widening * own_variance * (excess - 1.0)),
+            # two choices of lines are two estimates, each with an error of its own: twice its variance apart
+            window=_shift(narrow, fit.poles[m], own_variance) / np.sqrt(2.0),
             residues=fit.residues[m] * level,
             residue_sd=_residue_sd(fit, m) * level,
-            gain=gains[m],
             expected=_expected(gains[m], few.rest.shape[1], n_lines),
-            # two choices of lines are two estimates, each with an error of its own: twice its variance apart
-            window=_shift(narrow, fit.poles[m], np.diagonal(inverse)[at]) / np.sqrt(2.0),
-            seen=float(np.mean(counted)),
+            seen=float(np.mean([_has(poles, fit.poles[m], window.spacing) for poles in by_width])),
         )
+
+
+def _inverse(information: Floats) -> Floats:
+    """Covariance of all parameters by the information of each record."""
+    return np.asarray(np.linalg.pinv(information.sum(axis=0), hermitian=True))
 
 
 def _excess(places: NDArray[np.intp], steps: Floats, variances: Floats) -> Floats:
@@ -267,10 +241,10 @@ def _ratio(steps: Floats, variances: Floats) -> Floats:
 def _pruned(fit: Fitted, least: float) -> tuple[Fitted, list[float]]:
     """The fit without the modes that noise alone would give, and what each of the others gains."""
     while len(fit.poles):
-        gains = [likelihood_gain(without(fit, m), fit) for m in range(len(fit.poles))]
+        gains = [fit.without(m).cost - fit.cost for m in range(len(fit.poles))]
         if min(gains) >= least:
             return fit, gains
-        fit = without(fit, int(np.argmin(gains)))
+        fit = fit.without(int(np.argmin(gains)))
     return fit, []
 
 
@@ -285,20 +259,19 @@ def _correlation(fit: Fitted) -> float:
     """By how much what is left varies more slowly than from line to line: a factor of variances, 1 to 10."""
     rest = fit.rest / np.sqrt(fit.variance)
     total = float(np.sum(np.abs(rest) ** 2))
-    lags = [float(np.real(np.sum(rest[k:].conj() * rest[:-k]))) / max(total, 1e-300) for k in range(1, 7)]
-    limit = 2.0 / np.sqrt(rest.size)
-    kept = []
-    for lag in lags:
-        if lag < limit:
+    factor = 1.0
+    for k in range(1, 7):
+        lag = float(np.real(np.sum(rest[k:].conj() * rest[:-k]))) / max(total, 1e-300)
+        if lag < 2.0 / np.sqrt(rest.size):
             break
-        kept.append(lag)
-    return float(np.clip(1.0 + 2.0 * sum(kept), 1.0, 10.0))
+        factor += 2.0 * lag
+    return min(factor, 10.0)
 
 
-def _narrower(fit: Fitted, low: float, high: float) -> Fitted:
+def _narrower(fit: Fitted, part: _Part) -> Fitted:
     """The same modes fitted to the lines of the window without most of its margins."""
     window = fit.window
-    kept = (window.frequency >= low - 0.4 * _MARGIN) & (window.frequency <= high + 0.4 * _MARGIN)
+    kept = (window.frequency >= part.low - 0.4 * _MARGIN) & (window.frequency <= part.high + 0.4 * _MARGIN)
     if kept.sum() < 0.6 * kept.size or kept.sum() < 3 * len(fit.poles) + 8:
         return fit
     return refined(replace(window, frequency=window.frequency[kept], values=window.values[kept]), fit.poles)
@@ -307,20 +280,14 @@ def _narrower(fit: Fitted, low: float, high: float) -> Fitted:
 def _shift(narrow: Fitted, pole: Floats, variances: Floats) -> Floats:
     """By how much frequency and decay rate move in the narrower window, if that is more than fewer lines let expect."""
     nearest = int(np.argmin(np.abs(narrow.poles[:, 0] - pole[0])))
-    _, information = narrow.information()
-    inverse = np.linalg.pinv(information.sum(axis=0), hermitian=True)
-    expected = np.maximum(np.diagonal(inverse)[[nearest, len(narrow.poles) + nearest]] - variances, 0.0)
+    own = np.diagonal(_inverse(narrow.information()[1]))[[nearest, len(narrow.poles) + nearest]]
+    expected = np.maximum(own - variances, 0.0)
     squares = (narrow.poles[nearest] - pole) ** 2
     return np.asarray(np.sqrt(np.where(squares > _NOTED**2 * expected, squares - expected, 0.0)))
 
 
 def _residue_sd(fit: Fitted, mode: int) -> Floats:
     """Standard deviation of a mode's residue in each record at given modes: (n_records,) array."""
-    weighted = shapes_of(fit)
+    weighted = fit.window.basis(fit.poles) * fit.window.weights[:, None]
     gram = np.linalg.pinv(weighted.conj().T @ weighted, hermitian=True)
     return np.asarray(np.sqrt(max(float(np.real(gram[mode, mode])), 0.0) * fit.variance))
-
-
-def shapes_of(fit: Fitted) -> Complex:
-    """The weighted basis of a fit: (n_lines, n_basis) array."""
-    return np.asarray(fit.window.basis(fit.poles) * fit.window.weights[:, None])

@@ -24,20 +24,21 @@ _BOARD_RATE = 4000.0
 """Samples a second that hold what a board rings at: hiss above it is louder than a soft tap."""
 _LONG_BLOCK, _SOFT_RISE = 0.01, 6.0
 """s and dB: what rises so over so long is no noise and no beat of two modes, though it may be too soft for a hit."""
+_APART = 0.01
+"""s within which what sets in is the same hit."""
 
 
 def onsets(response: Floats, rate: float) -> list[int]:
     """First samples of every hit that is heard, by its click in all that was recorded or by how the board rings."""
-    changes = [(_unforeseen(heard, own_rate), own_rate) for heard, own_rate in heard_as(response, rate)]
-    found = np.concatenate([_rises(*change, _BLOCK, _RISE, _ABOVE_FLOOR) for change in changes])
-    return _first_of_each(np.sort(np.rint(found * rate).astype(np.intp)), rate)
+    every = heard_as(response, rate)
+    found = [_rises(_unforeseen(heard, own), own, _BLOCK, _RISE, _ABOVE_FLOOR) for heard, own in every]
+    return _first_of_each(np.concatenate(found), rate)
 
 
 def soft_onsets(response: Floats, rate: float) -> list[int]:
     """Samples at which the ringing of a board rises again, hits or not."""
     slow, slow_rate = heard_as(response, rate)[-1]
-    found = _rises(_curved(slow), slow_rate, _LONG_BLOCK, _SOFT_RISE, _SOFT_RISE)
-    return _first_of_each(np.rint(found * rate).astype(np.intp), rate)
+    return _first_of_each(_rises(_curved(slow), slow_rate, _LONG_BLOCK, _SOFT_RISE, _SOFT_RISE), rate)
 
 
 def heard_as(response: Floats, rate: float) -> list[tuple[Floats, float]]:
@@ -58,7 +59,7 @@ def _rises(change: Floats, rate: float, seconds: float, rise: float, above_floor
     power = np.mean(change[: n * block].reshape(n, block) ** 2, axis=1)
     floor = max(float(np.quantile(power, 0.1)), float(power.max()) * 1e-12, 1e-300)
     level = 10.0 * (np.log10(np.maximum(power, 1e-300)) - np.log10(floor))
-    before = np.full(n, 0.0)
+    before = np.zeros(n)
     before[1:] = level[:-1]
     for back in range(2, _LOOK_BACK + 1):
         before[back:] = np.maximum(before[back:], level[:-back])
@@ -92,11 +93,11 @@ def _unforeseen(response: Floats, rate: float) -> Floats:
     return rest
 
 
-def _first_of_each(rises: NDArray[np.intp], rate: float) -> list[int]:
-    """Onsets in samples: what sets in within a few blocks of another is the same hit."""
-    apart = max(round(0.01 * rate), 1)
+def _first_of_each(times: Floats, rate: float) -> list[int]:
+    """Onsets in samples, each once, of times in s in any order."""
+    apart = max(round(_APART * rate), 1)
     found: list[int] = []
-    for rise in rises:
+    for rise in np.sort(np.rint(times * rate).astype(np.intp)):
         if not found or rise - found[-1] > apart:
             found.append(int(rise))
     return found

@@ -6,10 +6,6 @@ on either side of a strong one. So the lines of the record are kept and the othe
 
 Over time such a response gives itself away. A record's noise goes on to its end, however far the modes have decayed;
 there it breaks off, while what merely decays falls ever more slowly.
-
-Reference
----------
-Oppenheim and Schafer, Discrete-Time Signal Processing, 3rd edition, 2010, 8.4: sampling the Fourier transform.
 """
 
 from __future__ import annotations
@@ -31,18 +27,7 @@ _FEWEST_LINES = 640
 
 
 def padding_of(values: NDArray[np.complex128]) -> int:
-    """How many times as many lines a response has as its record.
-
-    Parameters
-    ----------
-    values : (n_lines,) complex array
-        At evenly spaced frequencies.
-
-    Returns
-    -------
-    int
-        1 where nothing tells that it was padded.
-    """
+    """How many times as many lines a response has as its record; 1 where nothing tells that it was padded."""
     if values.size < _FEWEST_LINES:
         return 1
     over_time = np.abs(np.fft.ifft(values * np.hanning(values.size))) ** 2

@@ -11,21 +11,15 @@ Floats = NDArray[np.float64]
 
 SHAPE_ERROR = 0.05
 """By how much a computed residue may be off, over the largest that the shape gives: modes mix, places are read off."""
-_GAIN_SD, _FREE_GAIN_SD = 0.3, 1.5
-"""Of the logarithm of the gain from one mode to the next, with a force and without."""
+_GAIN_SD = 0.3
+"""Of the logarithm of the gain from one mode to the next."""
 _LEAST = -8.0
 """ln of the evidence against a label, at most: places may be written down wrongly."""
 _N_GAINS = 41
 
 
 def residue_evidence(
-    measured: Floats,
-    measured_sd: Floats,
-    predicted: Floats,
-    largest: Floats,
-    likely: Floats,
-    *,
-    has_force: bool,
+    measured: Floats, measured_sd: Floats, predicted: Floats, largest: Floats, likely: Floats
 ) -> tuple[Floats, float]:
     """ln of how much the residues speak for each label of each peak, and for the polarity that was assumed.
 
@@ -39,8 +33,6 @@ def residue_evidence(
         The largest residue that each shape gives between any two places.
     likely : (n_peaks, n_modes) array
         Probability of each label by the frequencies, from which the common gain is taken.
-    has_force : bool
-        Whether the gain is the same for all modes.
 
     Returns
     -------
@@ -50,12 +42,9 @@ def residue_evidence(
         ln of the odds that force and response have the same polarity; zero where there is one pair of places.
     """
     if measured.shape[1] == 1:
-        each = _log_likelihood(np.abs(measured), measured_sd, np.abs(predicted), largest, likely, has_force=has_force)
+        each = _log_likelihood(np.abs(measured), measured_sd, np.abs(predicted), largest, likely)
         return _relative(each, likely), 0.0
-    same, opposite = (
-        _log_likelihood(sign * measured, measured_sd, predicted, largest, likely, has_force=has_force)
-        for sign in (1.0, -1.0)
-    )
+    same, opposite = (_log_likelihood(sign * measured, measured_sd, predicted, largest, likely) for sign in (1.0, -1.0))
     log_polarity = float(np.sum(_summed(same, likely) - _summed(opposite, likely)))
     return _relative(same if log_polarity >= 0.0 else opposite, likely), log_polarity
 
@@ -63,12 +52,7 @@ def residue_evidence(
 def sign_odds(signs: Floats, predicted: Floats, largest: Floats, likely: Floats) -> float:
     """ln of the odds that force and response have the same polarity, from the signs between two places.
 
-    Parameters
-    ----------
-    signs : (n_peaks,) array
-        +1 or -1, 0 if not known.
-    predicted, largest : (n_modes,) array
-    likely : (n_peaks, n_modes) array
+    The signs are +1 or -1, 0 if not known: (n_peaks,) array; the others as of `residue_evidence`.
     """
     from scipy.special import ndtr
 
@@ -80,7 +64,7 @@ def sign_odds(signs: Floats, predicted: Floats, largest: Floats, likely: Floats)
 
 
 def _log_likelihood(
-    measured: Floats, measured_sd: Floats, predicted: Floats, largest: Floats, likely: Floats, *, has_force: bool
+    measured: Floats, measured_sd: Floats, predicted: Floats, largest: Floats, likely: Floats
 ) -> Floats:
     """ln of the density of each peak's residues under each mode, the gain open: (n_peaks, n_modes) array."""
     from scipy.special import logsumexp
@@ -89,9 +73,8 @@ def _log_likelihood(
     ratio = np.log(np.maximum(sizes[:, None], 1e-300) / np.maximum(shapes, SHAPE_ERROR * largest))
     weights = likely * np.minimum(shapes / largest, 1.0)
     centre = weighted_median(ratio.ravel(), weights.ravel() + 1e-9)
-    spread = _GAIN_SD if has_force else _FREE_GAIN_SD
     z = np.linspace(-2.5, 2.5, _N_GAINS)
-    gains = np.exp(centre + spread * z)
+    gains = np.exp(centre + _GAIN_SD * z)
     off = measured[:, None, None, :] - gains[:, None] * predicted[None, :, None, :]
     sd = np.hypot(measured_sd[:, None, None, :], SHAPE_ERROR * gains[:, None] * largest[None, :, None, None])
     each = np.sum(-0.5 * (off / sd) ** 2 - np.log(sd), axis=3) - 0.5 * z**2

@@ -9,7 +9,8 @@ moves as it does.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from bayesplate.recordings.local_fit import STEADY
 from bayesplate.recordings.modes_found import Mode
 from bayesplate.recordings.spectra import Spectra
-from bayesplate.recordings.strength import Answer
+from bayesplate.recordings.strength import Answer, answers
 
 Floats = NDArray[np.float64]
 
@@ -44,66 +45,139 @@ _NEAR_MAINS = 0.5
 _UNLIKE_PRIOR = 1.0 / 9.0
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """Whether a mode is one.
-
-    Attributes
-    ----------
-    spurious : float
-        Probability that it is none.
-    kind : str
-        What it is otherwise: "noise", "hum", "a steady line", "part of NNN Hz", "faint", "something broad", `UNLIKE`;
-        empty where nothing speaks of it.
-    part_of : int
-        Number of the mode of which it is likeliest a part; -1 if of none.
-    """
+class Verdict(NamedTuple):
+    """Whether a mode is one."""
 
     spurious: float
+    """Probability that it is none."""
     kind: str
+    """What it is otherwise: "noise", "hum", "a steady line", "part of NNN Hz", "faint", "something broad", `UNLIKE`."""
     part_of: int = -1
+    """Number of the mode of which it is likeliest a part."""
 
-    def at_least(self, spurious: float) -> Verdict:
-        """The same where something else makes it as doubtful as that."""
-        return replace(self, spurious=max(self.spurious, spurious), kind=self.kind or "faint" * (spurious > 0.5))
+
+@dataclass(frozen=True, eq=False)
+class Peak:
+    """A mode as it was fitted and judged last; `other`, as it was with a part of it as a mode of its own."""
+
+    mode: Mode
+    answer: Answer
+    verdict: Verdict
+    other: Mode
+    doubt: float = 1.0
+    """Probability that the part is none."""
+
+    @property
+    def pole(self) -> Floats:
+        """Frequency and decay rate averaged over both: (2,) array, Hz."""
+        return self.doubt * self.mode.pole + (1.0 - self.doubt) * self.other.pole
+
+    @property
+    def split(self) -> Floats:
+        """Standard deviations of both for not knowing which of the two it is: (2,) array, Hz."""
+        return np.abs(self.mode.pole - self.other.pole) * np.sqrt(self.doubt * (1.0 - self.doubt))
+
+    @property
+    def is_likely(self) -> bool:
+        """Whether it is a mode rather than not."""
+        return self.verdict.spurious < 0.5
+
+
+def judged(spectra: Spectra, modes: Sequence[Mode]) -> list[Peak]:
+    """Fitted modes with how they answer and a verdict on each."""
+    answered = answers(spectra, modes)
+    every = zip(modes, answered, verdicts(spectra, modes, answered), strict=True)
+    return [Peak(mode, answer, verdict, mode) for mode, answer, verdict in every]
 
 
 def verdicts(spectra: Spectra, modes: Sequence[Mode], answered: Sequence[Answer]) -> list[Verdict]:
     """A verdict for each mode; the probabilities of different reasons are taken as independent."""
     if not modes:
         return []
-    strengths = np.array([one.strength for one in answered])
-    hertz = np.array([mode.frequency for mode in modes])
-    steady = np.array([mode.decay * spectra.duration < STEADY for mode in modes])
-    usual = _usual(hertz, strengths, ~steady)
-    strong = hertz[~steady & (strengths > 0.2 * usual)]
-    spacing = float(np.ptp(strong)) / max(strong.size - 1, 1) if strong.size > 1 else 50.0
-    spare = spectra.places.size - len(spectra.between)
-    broad = broad_odds(np.array([mode.damping for mode in modes]), np.where(steady, 0.0, strengths / usual))
-    found = []
-    for m, mode in enumerate(modes):
-        reasons = {"noise": mode.expected / (1.0 + mode.expected)}
-        reasons[UNLIKE] = _unlike(answered[m].alike, len(spectra.between), spare)
-        reasons |= (lines := _of_lines(mode, spectra.duration, reasons[UNLIKE]))
-        faint, split, part_of = _odds(
-            m, modes, answered, usual, broad, spacing, spectra.duration, has_force=spectra.force is not None
-        )
-        unstable = 1.0 if mode.seen == 1.0 else _UNSTABLE
-        reasons["something broad"] = 1.0 - 1.0 / (1.0 + broad[m])
-        reasons["faint"] = 1.0 - 1.0 / (1.0 + faint * unstable)
-        reasons["part"] = 1.0 - 1.0 / (1.0 + split * unstable)
-        spurious = 1.0 - float(np.prod([1.0 - one for one in reasons.values()]))
-        worst = max(lines or reasons, key=lambda name: reasons[name])
-        kind = "" if reasons[worst] < 0.05 else worst
-        is_part = kind == "part"
-        words = part_words(modes[part_of].frequency) if is_part else kind
-        found.append(Verdict(min(spurious, 1.0), words, part_of if is_part else -1))
-    return found
+    judged = _Beside(spectra, modes, answered)
+    return [judged.verdict(m) for m in range(len(modes))]
 
 
 def part_words(hertz: float) -> str:
     """What a part of the peak of another mode is called."""
     return f"part of {hertz:.1f} Hz"
+
+
+class _Beside:
+    """All modes that a verdict on one of them is held against."""
+
+    def __init__(self, spectra: Spectra, modes: Sequence[Mode], answered: Sequence[Answer]) -> None:
+        self.modes, self.answered = modes, answered
+        self.n_places, self.n_records = len(spectra.between), spectra.places.size
+        self.has_force = spectra.force is not None
+        hertz = np.array([mode.frequency for mode in modes])
+        self.strengths = np.array([one.strength for one in answered])
+        self.steady = np.array([mode.decay * spectra.duration < STEADY for mode in modes])
+        self.usual = _usual(hertz, self.strengths, ~self.steady)
+        strong = hertz[~self.steady & (self.strengths > 0.2 * self.usual)]
+        self.spacing = float(np.ptp(strong)) / max(strong.size - 1, 1) if strong.size > 1 else 50.0
+        weights = np.where(self.steady, 0.0, self.strengths / self.usual)
+        self.broad = broad_odds(np.array([mode.damping for mode in modes]), weights)
+
+    def verdict(self, m: int) -> Verdict:
+        """On one mode."""
+        mode, alike = self.modes[m], self.answered[m].alike
+        unlike = _unlike(alike, self.n_places, self.n_records - self.n_places)
+        lines = self._of_lines(m, unlike)
+        split, part_of = self._part(m)
+        unstable = 1.0 if mode.seen == 1.0 else _UNSTABLE
+        odds = {"something broad": self.broad[m], "faint": self._faint(m) * unstable, "part": split * unstable}
+        reasons = {"noise": mode.expected / (1.0 + mode.expected), UNLIKE: unlike, **lines}
+        reasons |= {name: 1.0 - 1.0 / (1.0 + one) for name, one in odds.items()}
+        spurious = min(1.0 - float(np.prod([1.0 - one for one in reasons.values()])), 1.0)
+        worst = max(lines or reasons, key=lambda name: reasons[name])
+        if reasons[worst] < 0.05:
+            return Verdict(spurious, "")
+        if worst == "part":
+            return Verdict(spurious, part_words(self.modes[part_of].frequency), part_of)
+        return Verdict(spurious, worst)
+
+    def _of_lines(self, m: int, unlike: float) -> dict[str, float]:
+        """That it is hum of the mains or another line that does not decay."""
+        mode = self.modes[m]
+        off = min(abs(mode.frequency - base * round(mode.frequency / base)) for base in _MAINS)
+        is_mains = mode.frequency > 40.0 and off < _NEAR_MAINS and mode.decay < _NEAR_MAINS
+        if is_mains and (self.steady[m] or unlike > 0.5):
+            return {"hum": 0.97}
+        return {"a steady line": 0.9} if self.steady[m] else {}
+
+    def _faint(self, m: int) -> float:
+        """Odds that it is a faint line of something else, against its being a mode."""
+        ratio = self.strengths[m] / self.usual[m]
+        return float(_log_normal(ratio, FAINT, FAINT_FACTOR) / self._of_mode(m) * self._off_real(m))
+
+    def _part(self, m: int) -> tuple[float, int]:
+        """Odds that it is a part of a stronger mode, against its being one, and of which mode."""
+        mode, split, part_of = self.modes[m], 0.0, -1
+        for k, other in enumerate(self.modes):
+            width = mode.decay + other.decay
+            is_stronger = self.strengths[k] > self.strengths[m]
+            if abs(mode.frequency - other.frequency) > REACH * width or not is_stronger or self.steady[k]:
+                continue
+            share = self.strengths[m] / self.strengths[k]
+            odds = _log_normal(share, SPLIT, SPLIT_FACTOR) / self._of_mode(m) * self.spacing / (2.0 * REACH * width)
+            odds *= self._off_real(m) * _pattern(self.answered[m], self.answered[k])
+            odds /= 1.0 + self.broad[k]  # the ground has no parts
+            if self.has_force and share > 0.3:
+                reach, angle = float(np.degrees(np.arctan(2.0 * share))), self.answered[k].complexity
+                odds *= (_uniform(reach) if angle <= reach else 0.2 * _uniform(90.0)) / _of_real(angle)
+            if odds > split:
+                split, part_of = odds, k
+        return float(split), part_of
+
+    def _of_mode(self, m: int) -> float:
+        """Density of the strength of modes."""
+        ratio = self.strengths[m] / self.usual[m]
+        return float(max(ratio * np.exp(-ratio), 1e-12) if ratio < 1.0 else np.exp(-1.0))
+
+    def _off_real(self, m: int) -> float:
+        """Odds by the angle of its residues, which those of a mode have not."""
+        return _uniform(90.0) / _of_real(self.answered[m].complexity) if self.has_force else 1.0
 
 
 def _usual(hertz: Floats, strengths: Floats, rings: NDArray[np.bool_]) -> Floats:
@@ -113,21 +187,10 @@ def _usual(hertz: Floats, strengths: Floats, rings: NDArray[np.bool_]) -> Floats
 
 
 def broad_odds(damping: Floats, strengths: Floats) -> Floats:
-    """Odds that modes are something broad on which others stand, from their damping beside the others'.
+    """Odds that modes are something broad on which others stand, from their damping ratios: (n_modes,) array.
 
     Wood damps the modes of one board about alike; what a fit needs besides, as the tail of modes that it did not find,
-    is broader.
-
-    Parameters
-    ----------
-    damping : (n_modes,) array
-        Ratios.
-    strengths : (n_modes,) array
-        Over the usual ones, by which modes tell how a board damps.
-
-    Returns
-    -------
-    (n_modes,) array
+    is broader. Strengths are over the usual ones: by them modes tell how a board damps.
     """
     logs, weights = np.log(damping), np.minimum(strengths, 1.0)
     middle = weighted_median(logs, weights)
@@ -145,16 +208,6 @@ def weighted_median(values: Floats, weights: Floats) -> float:
     return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
 
 
-def _of_lines(mode: Mode, duration: float, unlike: float) -> dict[str, float]:
-    """That it is hum of the mains or another line that does not decay."""
-    is_steady = mode.decay * duration < STEADY
-    off = min(abs(mode.frequency - base * round(mode.frequency / base)) for base in _MAINS)
-    is_mains = mode.frequency > 40.0 and off < _NEAR_MAINS and mode.decay < _NEAR_MAINS
-    if is_mains and (is_steady or unlike > 0.5):
-        return {"hum": 0.97}
-    return {"a steady line": 0.9} if is_steady else {}
-
-
 def _unlike(alike: float, n_places: int, spare: int) -> float:
     """That residues are alike from hit to hit by chance only."""
     from scipy.special import betaln
@@ -168,44 +221,6 @@ def _unlike(alike: float, n_places: int, spare: int) -> float:
     return float(odds / (1.0 + odds)) if np.isfinite(odds) else 1.0
 
 
-def _odds(
-    m: int,
-    modes: Sequence[Mode],
-    answered: Sequence[Answer],
-    usual: Floats,
-    broad: Floats,
-    spacing: float,
-    duration: float,
-    *,
-    has_force: bool,
-) -> tuple[float, float, int]:
-    """Odds that a mode is a faint line of something else, or a part of a stronger one, against its being a mode."""
-    mode, answer = modes[m], answered[m]
-    ratio = answer.strength / usual[m]
-    of_mode = max(ratio * np.exp(-ratio), 1e-12) if ratio < 1.0 else np.exp(-1.0)
-    off_real = _uniform(90.0) / _of_real(complexity(answer)) if has_force else 1.0
-    faint = _log_normal(ratio, FAINT, FAINT_FACTOR) / of_mode * off_real
-    split, part_of = 0.0, -1
-    for k, other in enumerate(modes):
-        width = mode.decay + other.decay
-        apart = abs(mode.frequency - other.frequency)
-        is_weaker = answered[k].strength <= answer.strength
-        if k == m or apart > REACH * width or is_weaker or other.decay * duration < STEADY:
-            continue
-        share = answer.strength / answered[k].strength
-        odds = _log_normal(share, SPLIT, SPLIT_FACTOR) / of_mode * spacing / (2.0 * REACH * width)
-        odds *= off_real * _pattern(answer, answered[k]) / (1.0 + broad[k])  # the ground has no parts
-        if has_force:
-            reach = float(np.degrees(np.arctan(2.0 * share)))
-            angle = complexity(answered[k])
-            odds *= (
-                (_uniform(reach) if angle <= reach else 0.2 * _uniform(90.0)) / _of_real(angle) if share > 0.3 else 1.0
-            )
-        if odds > split:
-            split, part_of = odds, k
-    return float(faint), float(split), part_of
-
-
 def _log_normal(value: float, median: float, factor: float) -> float:
     """Density of the logarithm; above the median as far as it is exceeded only."""
     return float(_normal(np.maximum(np.log(value / median), 0.0), np.log(factor)))
@@ -213,14 +228,6 @@ def _log_normal(value: float, median: float, factor: float) -> float:
 
 def _normal(off: Floats, sd: float) -> Floats:
     return np.asarray(np.exp(-0.5 * (off / sd) ** 2) / (sd * np.sqrt(2.0 * np.pi)))
-
-
-def complexity(answer: Answer) -> float:
-    """By how many degrees the residues of a mode are complex, 0 to 90, the strongest counting most."""
-    squares = np.sum(answer.mobility**2)
-    power = float(np.sum(np.abs(answer.mobility) ** 2))
-    # of residues r_k e^(i a) with one a, the sum of squares is real and positive where a is zero
-    return float(np.degrees(0.5 * np.arccos(np.clip(np.real(squares) / max(power, 1e-300), -1.0, 1.0))))
 
 
 def _uniform(reach: float) -> float:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 
-from bayesplate.errors import Fault, InputError
+from bayesplate.errors import Fault, InputError, plain
 from bayesplate.recordings.checks import signal_faults
-from bayesplate.recordings.signals import FrequencyResponse, Motion, Recording
+from bayesplate.recordings.signals import Motion, Read, Recording
 from bayesplate.recordings.sound import read_sound
 from bayesplate.recordings.tables import read_csv
 from bayesplate.recordings.uff import read_uff
@@ -23,17 +23,9 @@ LARGEST_FILE = 400_000_000
 MOST_FILES = 200
 CHANNELS = ("force,response", "response,force", "response,response")
 
-Read = Recording | FrequencyResponse
-Reader = Callable[[Path, str, float | None, str, Motion], list[Read]]
-
-READERS: dict[str, Reader] = {
-    ".wav": read_sound,
-    ".csv": read_csv,
-    ".flac": read_sound,
-    ".uff": read_uff,
-    ".unv": read_uff,
-    ".ufb": read_uff,
-}
+READERS = {
+    ".wav": read_sound, ".csv": read_csv, ".flac": read_sound, ".uff": read_uff, ".unv": read_uff, ".ufb": read_uff,
+}  # fmt: skip
 """By the ending of the file."""
 COMPRESSED = (".m4a", ".mp3", ".aac", ".ogg", ".opus", ".wma", ".amr", ".3gp", ".mp4", ".mov")
 
@@ -46,7 +38,7 @@ def read_recordings(
     *,
     was_played: bool = False,
 ) -> list[list[Read]]:
-    """What every file holds.
+    """What every file holds, file by file; every fault of every file is told at once.
 
     Parameters
     ----------
@@ -55,19 +47,9 @@ def read_recordings(
     channels : str
         What the two channels of a sound file are, one of `CHANNELS`, or the number of the one that is used.
     motion : str
-        What a response is whose file does not say it: one of `bayesplate.recordings.signals.MOTIONS`.
+        What a response is whose file does not say it.
     was_played : bool
         Whether the files are what a loudspeaker was given: they may reach the largest value, and may be quiet.
-
-    Returns
-    -------
-    list of list of Recording or FrequencyResponse
-        File by file.
-
-    Raises
-    ------
-    InputError
-        With every fault of every file.
     """
     faults: list[Fault] = []
     if not 0 < len(paths) <= MOST_FILES:
@@ -76,11 +58,10 @@ def read_recordings(
     for path, shown in zip(map(Path, paths), _names(paths), strict=True):
         try:
             _require_file(path, shown)
-            read = READERS[path.suffix.lower()](path, shown, rate, channels, motion)
+            read = _set_aside(READERS[path.suffix.lower()](path, shown, rate, channels, motion))
         except InputError as error:
             faults += error.faults
             continue
-        read = _set_aside(read)
         faults += [fault for one in read for fault in signal_faults(one, was_played=was_played)]
         found.append(read)
     faults += _given_twice([one for own in found for one in own])
@@ -122,30 +103,25 @@ def _given_twice(read: Sequence[Read]) -> list[Fault]:
 
 def _names(paths: Sequence[str | os.PathLike[str]]) -> list[str]:
     """Names of files as messages show them: the last part of the path, all of it where two files share that."""
-    names = [_plain(Path(path).name) for path in paths]
-    return [_plain(str(path)) if names.count(name) > 1 else name for path, name in zip(paths, names, strict=True)]
-
-
-def _plain(name: str) -> str:
-    return "".join(c if c.isprintable() else "?" for c in name)[-120:]
+    names = [Path(path).name for path in paths]
+    shown = (str(path) if names.count(name) > 1 else name for path, name in zip(paths, names, strict=True))
+    return [plain(one)[-120:] for one in shown]
 
 
 def _require_file(path: Path, shown: str) -> None:
     """A regular file of a known kind and a size that fits into memory; looked at from outside only."""
+    ending, wanted = path.suffix, f"a recording: {', '.join(READERS)}"
     if os.path.isdir(path):
         raise InputError(Fault(shown, "a recording", "a folder", f"give the files in it: {shown}/*.wav"))
-    if path.suffix.lower() in COMPRESSED:
-        wanted, got = f"a recording: {', '.join(READERS)}", f'compressed sound, "{_plain(path.suffix)}"'
+    if ending.lower() in COMPRESSED:
         remedy = "record as WAV; what there is another program can save as WAV, but compression costs soft modes"
-        raise InputError(Fault(shown, wanted, got, remedy))
-    if path.suffix.lower() not in READERS:
-        got = f'"{_plain(path.suffix)}"' if path.suffix else "no ending"
-        raise InputError(Fault(shown, f"a recording: {', '.join(READERS)}", got, "save it as WAV or CSV"))
+        raise InputError(Fault(shown, wanted, f'compressed sound, "{ending}"', remedy))
+    if ending.lower() not in READERS:
+        raise InputError(Fault(shown, wanted, f'"{ending}"' if ending else "no ending", "save it as WAV or CSV"))
     try:
         status = os.stat(path)
     except FileNotFoundError:
-        where = f"looked in {_plain(str(path.absolute().parent))}"
-        raise InputError(Fault(shown, "a recording", "no such file", where)) from None
+        raise InputError(Fault(shown, "a recording", "no such file", f"looked in {path.absolute().parent}")) from None
     except OSError as error:
         raise InputError(Fault(shown, "a readable file", error.strerror or str(error))) from None
     if not stat.S_ISREG(status.st_mode):
@@ -153,9 +129,7 @@ def _require_file(path: Path, shown: str) -> None:
     if status.st_size == 0:
         raise InputError(Fault(shown, "a recording", "an empty file", "record it again"))
     if status.st_size > LARGEST_FILE:
-        got = f"{status.st_size / 1e6:,.0f} MB"
-        raise InputError(
-            Fault(shown, f"at most {LARGEST_FILE / 1e6:,.0f} MB", got, "cut out the minutes with the hits")
-        )
+        most, got = f"at most {LARGEST_FILE / 1e6:,.0f} MB", f"{status.st_size / 1e6:,.0f} MB"
+        raise InputError(Fault(shown, most, got, "cut out the minutes with the hits"))
     if not os.access(path, os.R_OK):
         raise InputError(Fault(shown, "a readable file", "permission denied"))

@@ -36,21 +36,13 @@ _NEVER = 0.01
 
 
 def read_picture(path: str | os.PathLike[str]) -> Floats:
-    """A PNG or JPEG as shades of grey, 0 to 1: (n_rows, n_columns) array.
-
-    Raises
-    ------
-    InputError
-        If it is missing, too large or no picture.
-    """
+    """A PNG or JPEG as shades of grey, 0 to 1: (n_rows, n_columns) array."""
     from PIL import Image, UnidentifiedImageError
 
     path = Path(path)
-    shown = "".join(c if c.isprintable() else "?" for c in path.name)
+    shown, wanted = path.name, "a PNG or JPEG picture"
     if path.suffix.lower() not in (".png", ".jpg", ".jpeg"):
-        raise InputError(
-            Fault(shown, "a PNG or JPEG picture", f'"{path.suffix}"', "crop it to the board and save it as PNG")
-        )
+        raise InputError(Fault(shown, wanted, f'"{path.suffix}"', "crop it to the board and save it as PNG"))
     try:
         if path.stat().st_size > LARGEST_PICTURE:
             got = f"{path.stat().st_size / 1e6:,.0f} MB"
@@ -65,47 +57,41 @@ def read_picture(path: str | os.PathLike[str]) -> Floats:
     except FileNotFoundError:
         raise InputError(Fault(shown, "a picture", "no such file")) from None
     except (UnidentifiedImageError, OSError, Image.DecompressionBombError) as error:
-        raise InputError(Fault(shown, "a PNG or JPEG picture", str(error)[:100])) from None
+        raise InputError(Fault(shown, wanted, str(error)[:100])) from None
     if min(values.shape) < 24 or np.ptp(values) < 0.02:
-        raise InputError(
-            Fault(shown, "a picture with lines on it", f"{values.shape[1]} x {values.shape[0]} of one shade")
-        )
+        got = f"{values.shape[1]} x {values.shape[0]} of one shade"
+        raise InputError(Fault(shown, "a picture with lines on it", got))
     return values
 
 
-def sand_evidence(picture: Floats, shapes: Floats) -> Floats:
-    """ln of how much a picture speaks for each shape.
+def straightened(picture: Floats) -> Floats:
+    """The forms in which a picture is compared, (n_rows, n_columns) as it is seen: (n_forms, n_points) array."""
+    from_below = picture[::-1].T  # rows of a picture run downward
+    return np.stack([_normal(_flat(one)) for one in _turned(from_below)])
+
+
+def sand_evidence(forms: Floats, shapes: Floats) -> Floats:
+    """ln of how much a picture speaks for each shape, zero for the average of all: (n_modes,) array.
 
     Parameters
     ----------
-    picture : (n_rows, n_columns) array
-        The board from above, x from left to right and y from bottom to top; sand lighter or darker than the board.
+    forms : (n_forms, n_points) array
+        As of `straightened`, of the board from above, x from left to right and y from bottom to top; sand lighter or
+        darker than the board.
     shapes : (n_modes, n_x, n_y) array
         Deflections at evenly spaced points of the whole board, edges included.
-
-    Returns
-    -------
-    (n_modes,) array
-        Zero for the average of all.
     """
-    scores = agreement(picture, shapes)
+    scores = agreement(forms, shapes)
     log_likelihood = -0.5 * _N_CELLS * np.log(1.0 - np.clip(scores, 0.0, 0.999) ** 2)
     top = log_likelihood.max()
     relative = log_likelihood - top - np.log(np.mean(np.exp(log_likelihood - top)))
     return np.asarray(np.logaddexp(relative + np.log(1.0 - _NEVER), np.log(_NEVER)))
 
 
-def agreement(picture: Floats, shapes: Floats) -> Floats:
-    """Correlation of a picture, straightened at its best, with the still lines of each shape: (n_modes,) array."""
+def agreement(forms: Floats, shapes: Floats) -> Floats:
+    """Correlation of a picture in its best form with the still lines of each shape: (n_modes,) array."""
     lines = np.stack([_normal(_flat(_still(shape))) for shape in shapes])
-    straightened = np.stack([_normal(_flat(one)) for one in _straightened(_from_below(picture))])
-    correlation = np.abs(straightened @ lines.T)  # sand may be lighter or darker than the board
-    return np.asarray(correlation.max(axis=0))
-
-
-def _from_below(picture: Floats) -> Floats:
-    """Rows of a picture run downward; columns of the result run along y: (n_x, n_y) array."""
-    return picture[::-1].T
+    return np.asarray(np.abs(forms @ lines.T).max(axis=0))  # sand may be lighter or darker than the board
 
 
 def _still(shape: Floats) -> Floats:
@@ -128,7 +114,7 @@ def _sampled(values: Floats, x: Floats, y: Floats) -> Floats:
     return np.asarray(map_coordinates(values, [x * (n_x - 1), y * (n_y - 1)], order=1, mode="nearest"))
 
 
-def _straightened(picture: Floats) -> list[Floats]:
+def _turned(picture: Floats) -> list[Floats]:
     """The picture turned, seen from the side and scaled in all ways that are tried."""
     from scipy.ndimage import gaussian_filter
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Place = tuple[float, float]
+"""m, from the corner of the edges x0 and y0."""
 
 Motion = Literal["acceleration", "velocity", "displacement", "pressure"]
 MOTIONS: tuple[Motion, ...] = ("acceleration", "velocity", "displacement", "pressure")
@@ -18,26 +19,7 @@ MOTIONS: tuple[Motion, ...] = ("acceleration", "velocity", "displacement", "pres
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A response over time.
-
-    Attributes
-    ----------
-    name : str
-        Of its file, and of the channel where the file has several.
-    rate : float, Hz
-    response : (n_samples,) array
-        In any unit.
-    force : (n_samples,) array or None
-        Of the hammer, in any unit; None where it was not recorded.
-    motion : str
-        What the response is: "acceleration", "velocity", "displacement" or "pressure".
-    full_scale : float
-        Largest value that the file can hold; infinity for numbers without a limit.
-    hammer, sensor : tuple of float or None, m
-        Where the board was hit and where it was listened to, from the corner of the edges x0 and y0.
-    remarks : tuple of str
-        What is told of its file.
-    """
+    """A response over time, (n_samples,) in any unit, and the force of the hammer where it was recorded."""
 
     name: str
     rate: float
@@ -45,37 +27,23 @@ class Recording:
     force: Floats | None = None
     motion: Motion = "acceleration"
     full_scale: float = np.inf
+    """Largest value that the file can hold."""
     hammer: Place | None = None
     sensor: Place | None = None
     remarks: tuple[str, ...] = ()
 
-    def at(self, hammer: Place | None, sensor: Place | None) -> Recording:
-        """The same, taken between two places."""
-        return replace(self, hammer=hammer, sensor=sensor)
-
 
 @dataclass(frozen=True, eq=False)
 class FrequencyResponse:
-    """A response over a force as a function of frequency.
-
-    Attributes
-    ----------
-    frequency : (n_lines,) array, Hz
-        Evenly spaced.
-    values : (n_lines,) complex array
-    coherence : (n_lines,) array or None
-    hammer, sensor : tuple of float or None, m
-    """
+    """A response over a force, (n_lines,) complex, at evenly spaced frequencies in Hz."""
 
     name: str
     frequency: Floats
     values: Complex
-    coherence: Floats | None = None
     motion: Motion = "acceleration"
     hammer: Place | None = None
     sensor: Place | None = None
     remarks: tuple[str, ...] = ()
 
-    def at(self, hammer: Place | None, sensor: Place | None) -> FrequencyResponse:
-        """The same, taken between two places."""
-        return replace(self, hammer=hammer, sensor=sensor)
+
+Read = Recording | FrequencyResponse

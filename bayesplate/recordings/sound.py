@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import struct
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.errors import Fault, InputError
-from bayesplate.recordings.channels import SILENT, is_copy, rings
-from bayesplate.recordings.signals import FrequencyResponse, Motion, Recording
+from bayesplate.recordings.checks import SILENT, is_copy, rings
+from bayesplate.recordings.signals import Motion, Read, Recording
 
 Floats = NDArray[np.float64]
 
@@ -24,13 +23,11 @@ _BITS = {"PCM_S8": 8, "PCM_U8": 8, "PCM_16": 16, "PCM_24": 24, "PCM_32": 32}
 """Of the samples of a file, by the library's name of their kind; others are numbers without a largest."""
 
 
-def read_sound(
-    path: Path, shown: str, rate: float | None, channels: str, motion: Motion
-) -> list[Recording | FrequencyResponse]:
+def read_sound(path: Path, shown: str, rate: float | None, channels: str, motion: Motion) -> list[Read]:
     """The recordings of a sound file; parameters as of `read_recordings`."""
     import soundfile
 
-    content, told = _mended(path.read_bytes(), shown)
+    content, remarks = _mended(path.read_bytes(), shown)
     try:
         with soundfile.SoundFile(io.BytesIO(content)) as file:
             own_rate, bits = float(file.samplerate), _BITS.get(file.subtype)
@@ -42,7 +39,7 @@ def read_sound(
         wanted, remedy = f"{rate:g} Hz, as --rate says", "leave --rate out: the file knows"
         raise InputError(Fault(f"{shown} rate", wanted, f"{own_rate:g} Hz", remedy))
     full_scale = np.inf if bits is None else 1.0 - 2.0 ** (1 - bits)
-    whole = Recording(shown, own_rate, columns[:, 0], None, motion, full_scale, remarks=told)
+    whole = Recording(shown, own_rate, columns[:, 0], None, motion, full_scale, remarks=remarks)
     return [*_of_channels(columns, whole, channels)]
 
 
@@ -77,31 +74,36 @@ def _is_chunk(rest: bytes) -> bool:
     return all(0x20 <= byte < 0x7F for byte in name) and size <= len(rest) - 8
 
 
-def _of_channels(columns: Floats, whole: Recording, channels: str) -> Iterator[Recording]:
+def _of_channels(columns: Floats, whole: Recording, channels: str) -> list[Recording]:
     """What the channels of a file are, (n, n_channels) array, in recordings that are else as `whole`."""
-    count, shown = columns.shape[1], whole.name
-    if channels.isdecimal() and int(channels) > count:
-        raise InputError(Fault(f"{shown} channels", f"channel {channels}, as --channels says", f"{count} channels"))
+    shown = whole.name
     if channels.isdecimal():
-        columns, count = columns[:, [int(channels) - 1]], 1
-    if count > 2:
+        if int(channels) > columns.shape[1]:
+            wanted = f"channel {channels}, as --channels says"
+            raise InputError(Fault(f"{shown} channels", wanted, f"{columns.shape[1]} channels"))
+        columns = columns[:, [int(channels) - 1]]
+    if columns.shape[1] > 2:
         wanted, remedy = "one channel, or two: force and response", "--channels 1, say, takes the first alone"
-        raise InputError(Fault(f"{shown} channels", wanted, str(count), remedy))
-    spans = np.ptp(columns, axis=0) if len(columns) else np.zeros(count)
+        raise InputError(Fault(f"{shown} channels", wanted, str(columns.shape[1]), remedy))
+    if columns.shape[1] == 2:
+        columns, told = _without_idle(columns, whole)
+        whole = replace(whole, remarks=(*whole.remarks, *(f"{shown}: {one}" for one in told)))
+    if columns.shape[1] == 1:
+        return [replace(whole, response=columns[:, 0])]
+    if channels == "response,response":
+        first, second = (replace(whole, name=f"{shown} channel {k + 1}", response=columns[:, k]) for k in (0, 1))
+        return [first, replace(second, remarks=())]
+    force, response = (0, 1) if channels == "force,response" else (1, 0)
+    return [replace(whole, response=columns[:, response], force=columns[:, force])]
+
+
+def _without_idle(columns: Floats, whole: Recording) -> tuple[Floats, list[str]]:
+    """Two channels without one that is silent or a copy of the other, and what is told of it."""
+    spans = np.ptp(columns, axis=0) if len(columns) else np.zeros(2)
     quiet = max(SILENT, _CROSSTALK * spans.max()) if np.isfinite(whole.full_scale) else SILENT
     silent = np.flatnonzero(spans <= quiet)
-    if count == 2 and silent.size == 1 and rings(columns[:, 1 - silent[0]], whole.rate):
-        told = f"{shown}: channel {silent[0] + 1} is silent and left out"
-        columns, whole = columns[:, [1 - silent[0]]], replace(whole, remarks=(*whole.remarks, told))
-    elif count == 2 and is_copy(*columns.T):
-        told = f"{shown}: both channels hold the same sound, and one is used"
-        columns, whole = columns[:, :1], replace(whole, remarks=(*whole.remarks, told))
-    if columns.shape[1] == 1:
-        yield replace(whole, response=columns[:, 0])
-    elif channels == "response,response":
-        for k in (0, 1):
-            remarks = whole.remarks if k == 0 else ()
-            yield replace(whole, name=f"{shown} channel {k + 1}", response=columns[:, k], remarks=remarks)
-    else:
-        force, response = (0, 1) if channels == "force,response" else (1, 0)
-        yield replace(whole, response=columns[:, response], force=columns[:, force])
+    if silent.size == 1 and rings(columns[:, 1 - silent[0]], whole.rate):
+        return columns[:, 1 - silent], [f"channel {silent[0] + 1} is silent and left out"]
+    if is_copy(*columns.T):
+        return columns[:, :1], ["both channels hold the same sound, and one is used"]
+    return columns, []

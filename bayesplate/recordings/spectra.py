@@ -14,6 +14,8 @@ from bayesplate.recordings.signals import FrequencyResponse, Motion, Place, Reco
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Rows = NDArray[np.intp]
+Between = tuple[Place | None, Place | None]
+"""Places of hammer and sensor."""
 
 _ABOVE = 1.25
 """Frequency up to which spectra are kept, over the highest at which modes are looked for."""
@@ -33,14 +35,10 @@ class Spectra:
         From the moment on at which the board rings by itself, without a taper.
     force : (n_lines, n_records) complex array or None
         Spectrum of each hit's force from the same origin of time; one for frequency responses.
-    names : tuple of str
-        Of the records, "tap.wav hit 3".
-    files : (n_records,) array of int
-        Which records are hits of one file.
-    places : (n_records,) array of int
-        Which records were taken between the same two places.
+    files, places : (n_records,) array of int
+        Which records are hits of one file, and which were taken between the same two places.
     between : tuple of (Place or None, Place or None)
-        The places of hammer and sensor, m.
+        Hammer and sensor of each of `places`.
     duration : float, s
         Of each decay.
     """
@@ -51,9 +49,14 @@ class Spectra:
     names: tuple[str, ...]
     files: Rows
     places: Rows
-    between: tuple[tuple[Place | None, Place | None], ...]
+    between: tuple[Between, ...]
     motion: Motion
     duration: float
+
+    @property
+    def spacing(self) -> float:
+        """Of the lines, Hz."""
+        return float(self.frequency[1] - self.frequency[0])
 
     @property
     def noise(self) -> Floats:
@@ -78,63 +81,39 @@ class Spectra:
 
 
 def decay_spectra(heard: Sequence[tuple[Recording, Sequence[Hit]]], highest: float) -> Spectra:
-    """Spectra of what follows every hit, all of one length.
-
-    Parameters
-    ----------
-    heard : sequence of (Recording, sequence of Hit)
-        All of one rate, with the hits that can be used.
-    highest : float, Hz
-        Up to which modes are looked for.
-    """
+    """Spectra of what follows every hit of recordings of one rate, all of one length, for modes up to some Hz."""
     from scipy.fft import prev_fast_len, rfft
 
-    rate = heard[0][0].rate
+    first = heard[0][0]
     every = [(recording, number, hit) for recording, hits in heard for number, hit in enumerate(hits, start=1)]
     shortest = min(hit.stop - hit.start for _, _, hit in every)
-    n_samples = prev_fast_len(min(shortest, round(LONGEST_DURATION * rate)), real=True)
-    n_lines = min(int(_ABOVE * highest * n_samples / rate) + 1, n_samples // 2)
-    frequency = np.arange(n_lines) * rate / n_samples
-    columns, forces = [], []
-    for recording, _, hit in every:
-        decay = recording.response[hit.start : hit.start + n_samples]
-        columns.append(rfft(decay)[:n_lines] / rate)
-        if recording.force is not None:
-            forces.append(_force_spectrum(recording, hit, frequency))
-    between = [(recording.hammer, recording.sensor) for recording, _, _ in every]
-    places, distinct = _grouped(between, [recording.name for recording, _, _ in every])
+    n_samples = prev_fast_len(min(shortest, round(LONGEST_DURATION * first.rate)), real=True)
+    n_lines = min(int(_ABOVE * highest * n_samples / first.rate) + 1, n_samples // 2)
+    frequency = np.arange(n_lines) * first.rate / n_samples
+    columns = [rfft(one.response[hit.start : hit.start + n_samples])[:n_lines] / one.rate for one, _, hit in every]
+    forces = [_force_spectrum(one.force, one.rate, hit, frequency) for one, _, hit in every if one.force is not None]
+    places, between = _grouped([one for one, _, _ in every])
     return Spectra(
         frequency=frequency,
         values=np.stack(columns, axis=1),
-        force=np.stack(forces, axis=1) if len(forces) == len(columns) else None,
-        names=tuple(f"{recording.name} hit {number}" for recording, number, _ in every),
+        force=np.stack(forces, axis=1) if forces else None,
+        names=tuple(f"{one.name} hit {number}" for one, number, _ in every),
         files=np.repeat(np.arange(len(heard)), [len(hits) for _, hits in heard]),
         places=places,
-        between=distinct,
-        motion=heard[0][0].motion,
-        duration=n_samples / rate,
+        between=between,
+        motion=first.motion,
+        duration=n_samples / first.rate,
     )
 
 
 def response_spectra(responses: Sequence[FrequencyResponse], highest: float, padding: int = 1) -> Spectra:
-    """Frequency responses as they are, up to somewhat above the highest frequency.
-
-    Parameters
-    ----------
-    responses : sequence of FrequencyResponse
-        All on one grid.
-    highest : float, Hz
-        Up to which modes are looked for.
-    padding : int
-        How many times as many lines there are as in the records: those at multiples of so many spacings are theirs.
-    """
+    """Frequency responses on one grid up to somewhat above some Hz; of padded ones the lines of their records."""
     first = responses[0]
     spacing = float(first.frequency[1] - first.frequency[0])
     lines = np.rint(first.frequency / spacing).astype(np.intp)
     kept = (first.frequency <= _ABOVE * highest) & (lines % padding == 0)
-    between = [(one.hammer, one.sensor) for one in responses]
-    places, distinct = _grouped(between, [one.name for one in responses])
     values = np.stack([one.values[kept] for one in responses], axis=1).astype(complex)
+    places, between = _grouped(responses)
     return Spectra(
         frequency=first.frequency[kept],
         values=values,
@@ -142,27 +121,24 @@ def response_spectra(responses: Sequence[FrequencyResponse], highest: float, pad
         names=tuple(one.name for one in responses),
         files=np.arange(len(responses)),
         places=places,
-        between=distinct,
+        between=between,
         motion=first.motion,
         duration=1.0 / (padding * spacing),
     )
 
 
-def _force_spectrum(recording: Recording, hit: Hit, frequency: Floats) -> Complex:
+def _force_spectrum(force: Floats, rate: float, hit: Hit, frequency: Floats) -> Complex:
     """Of one pulse, from the moment at which the decay begins; outside the pulse the force is noise."""
-    assert recording.force is not None
-    first = max(hit.onset - round(_BEFORE_PULSE * recording.rate), 0)
-    pulse = recording.force[first : hit.start] - np.median(recording.force)
-    at = (np.arange(first, hit.start) - hit.start) / recording.rate
+    first = max(hit.onset - round(_BEFORE_PULSE * rate), 0)
+    pulse = force[first : hit.start] - np.median(force)
+    at = (np.arange(first, hit.start) - hit.start) / rate
     # few samples and many lines: a product is faster than a transform
-    return np.asarray(np.exp(-2j * np.pi * np.outer(frequency, at)) @ pulse / recording.rate)
+    return np.asarray(np.exp(-2j * np.pi * np.outer(frequency, at)) @ pulse / rate)
 
 
-def _grouped(
-    between: Sequence[tuple[Place | None, Place | None]], names: Sequence[str]
-) -> tuple[Rows, tuple[tuple[Place | None, Place | None], ...]]:
+def _grouped(records: Sequence[Recording | FrequencyResponse]) -> tuple[Rows, tuple[Between, ...]]:
     """Which records share their places; a file of which one place is not known is a pair of places of its own."""
-    keys = [name if None in pair else pair for pair, name in zip(between, names, strict=True)]
+    between = [(one.hammer, one.sensor) for one in records]
+    keys = [one.name if None in pair else pair for pair, one in zip(between, records, strict=True)]
     order = list(dict.fromkeys(keys))
-    places = np.array([order.index(key) for key in keys], dtype=np.intp)
-    return places, tuple(between[keys.index(key)] for key in order)
+    return np.array([order.index(key) for key in keys], dtype=np.intp), tuple(between[keys.index(k)] for k in order)

@@ -27,6 +27,8 @@ board goes with its acceleration."""
 _LATEST = 0.004
 """s by which taps without a force may have been noticed late."""
 _N_DELAYS = 241
+_SIGNED, _MOST_COMPLEX = 3.0, 60.0
+"""Standard deviations of a residue, and degrees by which it may be complex, that still has a sign."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +54,23 @@ class Answer:
     def strength(self) -> float:
         """Root mean square over the places."""
         return float(np.sqrt(np.mean(np.abs(self.mobility) ** 2)))
+
+    @property
+    def complexity(self) -> float:
+        """By how many degrees the residues are complex, 0 to 90, the strongest counting most."""
+        squares, power = np.sum(self.mobility**2), float(np.sum(np.abs(self.mobility) ** 2))
+        # of residues r_k e^(i a) with one a, the sum of squares is real and positive where a is zero
+        return float(np.degrees(0.5 * np.arccos(np.clip(np.real(squares) / max(power, 1e-300), -1.0, 1.0))))
+
+    def sign(self, flips: bool | None) -> str:
+        """Sign of the residue between two places, "+" or "-"; empty where it, or the polarity, is not known.
+
+        `flips` is whether force and response have opposite polarity.
+        """
+        is_known = self.mobility.size == 1 and abs(np.real(self.mobility[0])) >= _SIGNED * self.sd[0]
+        if flips is None or not is_known or self.complexity > _MOST_COMPLEX:
+            return ""
+        return "+" if (np.real(self.mobility[0]) > 0.0) != flips else "-"
 
 
 def answers(spectra: Spectra, modes: Sequence[Mode]) -> list[Answer]:
@@ -87,7 +106,6 @@ def _forces(spectra: Spectra, modes: Sequence[Mode]) -> list[Complex]:
         nearest = [int(np.argmin(np.abs(spectra.frequency - mode.frequency))) for mode in modes]
         return [spectra.force[line] for line in nearest]
     delays, gains = np.zeros(spectra.places.size), np.ones(spectra.places.size)
-    hertz = np.array([mode.frequency for mode in modes])
     ringing = [mode for mode in modes if mode.decay * spectra.duration >= STEADY] or modes  # tones keep their own time
     rung = np.array([mode.frequency for mode in ringing])
     residues = np.array([mode.residues for mode in ringing]).reshape(len(ringing), -1)
@@ -95,7 +113,7 @@ def _forces(spectra: Spectra, modes: Sequence[Mode]) -> list[Complex]:
         own = np.flatnonzero(spectra.places == place)
         if own.size > 1:
             delays[own], gains[own] = _delays(rung, residues[:, own])
-    return [gains * np.exp(-2j * np.pi * one * delays) for one in hertz]
+    return [gains * np.exp(-2j * np.pi * mode.frequency * delays) for mode in modes]
 
 
 def _delays(hertz: Floats, residues: Complex) -> tuple[Floats, Floats]:

@@ -11,7 +11,8 @@ Farina, Simultaneous measurement of impulse response and distortion with a swept
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,16 +36,8 @@ _FLOOR = 1e-4
 """Share of a sweep's greatest power below which a frequency was not excited."""
 
 
-@dataclass(frozen=True, eq=False)
-class Sweep:
-    """An exponential sweep.
-
-    Attributes
-    ----------
-    first, last : float, Hz
-        Where it begins and ends.
-    duration : float, s
-    """
+class Sweep(NamedTuple):
+    """An exponential sweep between two frequencies in Hz, in some seconds."""
 
     first: float
     last: float
@@ -58,51 +51,30 @@ class Sweep:
 
 
 def read_sweep(text: str) -> Sweep:
-    """A sweep from its parameters, "F1,F2,SECONDS".
-
-    Raises
-    ------
-    InputError
-        If they are not those of a sweep.
-    """
+    """A sweep from its parameters, "F1,F2,SECONDS"."""
+    got = f'"{text[:60]}"'
     try:
         first, last, duration = (float(part) for part in text.split(","))
     except ValueError:
-        raise InputError(Fault("sweep", "F1,F2,SECONDS or a file", f'"{text[:60]}"', "45,8000,8")) from None
-    if not (0.0 < first < last and duration > LEAST_DURATION and np.isfinite([first, last, duration]).all()):
-        raise InputError(Fault("sweep", "two rising frequencies in Hz and a time in s", f'"{text[:60]}"', "45,8000,8"))
+        raise InputError(Fault("sweep", "F1,F2,SECONDS or a file", got, "45,8000,8")) from None
+    if not (0.0 < first < last < np.inf and LEAST_DURATION < duration < np.inf):
+        raise InputError(Fault("sweep", "two rising frequencies in Hz and a time in s", got, "45,8000,8"))
     return Sweep(first, last, duration)
 
 
 def impulse_response(recording: Recording, sweep: Sweep | Floats) -> tuple[Recording, Hit]:
     """The impulse response in a recording of a sweep, as if the board had been hit once.
 
-    Parameters
-    ----------
-    recording : Recording
-        Without a force; the sweep and what rings after it.
-    sweep : Sweep or (n_samples,) array
-        Its parameters, or the sweep itself at the rate of the recording.
-
-    Returns
-    -------
-    recording : Recording
-        With the impulse response in place of the response.
-
-    Raises
-    ------
-    InputError
-        If what comes out is no impulse response: the sweep was another.
+    The sweep is given by its parameters, or as samples at the rate of the recording. It is refused where what comes out
+    is no impulse response.
     """
     rate = recording.rate
     whole = _divided(recording.response, sweep.signal(rate) if isinstance(sweep, Sweep) else sweep)
     onset = int(np.argmax(np.abs(whole)))
-    about, apart = round(_ABOUT * rate), round(_APART * rate)
+    about, apart, look = (round(seconds * rate) for seconds in (_ABOUT, _APART, _LOOK))
     before = np.sum(whole[max(onset - apart - about, 0) : max(onset - apart, 0)] ** 2)
     after = max(np.sum(whole[onset : onset + about] ** 2), 1e-300)
-    if before > _MOST_BEFORE * after or _late(
-        whole[max(onset - round(_LOOK * rate), 0) :][: round(2.0 * _LOOK * rate)], rate
-    ):
+    if before > _MOST_BEFORE * after or _late(whole[max(onset - look, 0) :][: 2 * look], rate):
         got = "no impulse when it is turned back: its frequencies come one after the other"
         remedy = "--sweep with what was played: its frequencies and seconds, exponential"
         raise InputError(Fault(recording.name, "the response to this sweep", got, remedy))

@@ -11,7 +11,7 @@ import numpy as np
 
 from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.axes import rate_of
-from bayesplate.recordings.signals import FrequencyResponse, Motion, Recording
+from bayesplate.recordings.signals import FrequencyResponse, Motion, Read, Recording
 
 _TIME, _RESPONSE = 1, 4
 """Kinds of function: a time response, a frequency response."""
@@ -30,36 +30,30 @@ _AXES = {
 """Units of an abscissa in s or Hz, and its kind of data."""
 
 
-def read_uff(
-    path: Path, shown: str, rate: float | None, channels: str, motion: Motion
-) -> list[Recording | FrequencyResponse]:
-    """Time and frequency responses among the data sets 58 and 58b of a UFF file; parameters as of `read_recordings`.
-
-    A force, which is a data set of its own, belongs to the responses that follow it.
-    """
+def read_uff(path: Path, shown: str, rate: float | None, channels: str, motion: Motion) -> list[Read]:
+    """Time and frequency responses among the data sets 58 and 58b of a UFF file; parameters as of `read_recordings`."""
     try:
         import pyuff
     except ImportError:
         remedy = 'pip install "bayesplate[recordings]", or WAV'
         raise InputError(Fault(shown, "pyuff installed, which reads UFF", "none", remedy)) from None
+    sets = []
     try:
         every = pyuff.UFF(str(path)).read_sets()
-    except Exception as error:  # the library stumbles over broken files in many ways
-        raise InputError(Fault(shown, "a UFF file", f"a broken one ({type(error).__name__})")) from None
-    sets = [one for one in (every if isinstance(every, list) else [every]) if one.get("type") == 58]
-    try:
+        sets = [one for one in (every if isinstance(every, list) else [every]) if one.get("type") == 58]
         found = [*_of_sets(sets, shown, motion)]
     except InputError:
         raise
-    except (KeyError, IndexError, TypeError, ValueError, ZeroDivisionError) as error:
-        raise InputError(Fault(shown, "whole data sets 58", f"a broken one ({type(error).__name__})")) from None
+    except Exception as error:  # the library stumbles over broken files in many ways
+        wanted = "whole data sets 58" if sets else "a UFF file"
+        raise InputError(Fault(shown, wanted, f"a broken one ({type(error).__name__})")) from None
     if not found:
         raise InputError(Fault(shown, "data sets 58 or 58b with a time or a frequency response", f"{len(sets)} others"))
     return found
 
 
-def _of_sets(sets: list[dict[str, Any]], shown: str, motion: Motion) -> Iterator[Recording | FrequencyResponse]:
-    """What data sets hold; any error of their numbers where one is broken."""
+def _of_sets(sets: list[dict[str, Any]], shown: str, motion: Motion) -> Iterator[Read]:
+    """What data sets hold; a force, which is a set of its own, belongs to the responses that follow it."""
     force = None
     for number, one in enumerate(sets, start=1):
         name, kind = f"{shown} set {number}", int(one.get("func_type", 0))
@@ -71,7 +65,7 @@ def _of_sets(sets: list[dict[str, Any]], shown: str, motion: Motion) -> Iterator
         at = at * _unit(one, kind, name)
         own = _kind(one, "ordinate", name, motion)
         if kind == _RESPONSE:
-            yield _response(FrequencyResponse(name, at, values.astype(complex), None, motion), own, one, motion)
+            yield _response(FrequencyResponse(name, at, values.astype(complex)), own, one, motion)
         elif own is None:
             force = np.real(values).astype(float)
         else:
@@ -99,9 +93,8 @@ def _kind(one: dict[str, Any], axis: str, name: str, motion: Motion) -> Motion |
     if data in _UNKNOWN:
         return _UNITS.get(unit, motion)
     if data not in _MOTIONS:
-        raise InputError(
-            Fault(name, f"a force or {', '.join(_MOTIONS.values())}", f"kind of data {data}, {unit or '?'}")
-        )
+        wanted = f"a force or {', '.join(_MOTIONS.values())}"
+        raise InputError(Fault(name, wanted, f"kind of data {data}, {unit or '?'}"))
     return _MOTIONS[data]
 
 
@@ -111,12 +104,11 @@ def _response(
     """A frequency response as its header says: of a motion over a force, or turned over."""
     data = int(header.get("orddenom_spec_data_type") or 0)
     below = None if data in _UNKNOWN and numerator is not None else _kind(header, "orddenom", one.name, motion)
-    if (numerator is None) == (below is None):
-        got = "a force over a force" if below is None else f"{numerator} over {below}"
-        raise InputError(Fault(one.name, "a motion over a force", got, "export the response over the force"))
-    if numerator is not None:
+    if numerator is not None and below is None:
         return replace(one, motion=numerator)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        values = np.where(one.values == 0.0, 0.0, 1.0 / one.values)
-    assert below is not None
-    return replace(one, values=values, motion=below, remarks=(f"{one.name}: a force over {below}, turned over",))
+    if numerator is None and below is not None:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            values = np.where(one.values == 0.0, 0.0, 1.0 / one.values)
+        return replace(one, values=values, motion=below, remarks=(f"{one.name}: a force over {below}, turned over",))
+    got = "a force over a force" if below is None else f"{numerator} over {below}"
+    raise InputError(Fault(one.name, "a motion over a force", got, "export the response over the force"))

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesplate.recordings.contract import PickedRow, PickReport
 from bayesplate.recordings.modes_found import Path as FoundPath
 from bayesplate.recordings.picking import Picked
-from bayesplate.recordings.responses import Averaged, averaged
+from bayesplate.recordings.spectra import Spectra
 from bayesplate.report.modes import short_label
 from bayesplate.report.page import from_template, save_page
 from bayesplate.report.saving import drawing
@@ -38,6 +39,8 @@ from bayesplate.report.style import (
 from bayesplate.results.tables import Table
 from bayesplate.results.words import chances, percent, two_digits
 
+Floats = NDArray[np.float64]
+
 MOST_PLACES = 8
 _STEP = 30.0
 """dB between the curves of two places."""
@@ -51,9 +54,38 @@ _PARTS = (
 )
 
 
-def every_picture(report: PickReport, averaged: Sequence[Averaged], paths: Sequence[FoundPath]) -> list[Picture]:
-    """All figures of the page."""
-    return [spectra_picture(report, averaged), errors_picture(report), stability_picture(report, paths)]
+class Averaged(NamedTuple):
+    """The response between two places over frequency in Hz, averaged over hits, and their coherence, 0 to 1."""
+
+    name: str
+    frequency: Floats
+    level: Floats
+    coherence: Floats | None
+
+
+def averaged(spectra: Spectra) -> tuple[Averaged, ...]:
+    """The magnitude of H1 for each pair of places; without a force that of the spectra, each over its own strength.
+
+    H1 is the sum over hits of the conjugate of the force times the response, over the sum of the force's power: noise
+    of the response averages out of it. The coherence is the share of the response's power that the force explains.
+    """
+    found = []
+    for place in range(len(spectra.between)):
+        own = spectra.places == place
+        y, coherence = spectra.values[:, own], None
+        if spectra.force is None:
+            y = y / np.maximum(np.sqrt(np.mean(np.abs(y) ** 2, axis=0)), 1e-300)
+            level = np.sqrt(np.mean(np.abs(y) ** 2, axis=1))
+        else:
+            f = spectra.force[:, own]
+            power = np.maximum(np.sum(np.abs(f) ** 2, axis=1), 1e-300)
+            cross = np.abs(np.sum(f.conj() * y, axis=1))
+            level = cross / power
+            if own.sum() > 1:
+                coherence = cross**2 / power / np.maximum(np.sum(np.abs(y) ** 2, axis=1), 1e-300)
+        name = spectra.names[int(np.flatnonzero(own)[0])].rpartition(" hit ")[0] or spectra.names[0]
+        found.append(Averaged(name, spectra.frequency, level, coherence))
+    return tuple(found)
 
 
 def spectra_picture(report: PickReport, averaged: Sequence[Averaged]) -> Picture:
@@ -162,27 +194,15 @@ def _name(peak: PickedRow) -> str:
     return f"{peak.hz:.1f}" + (f" {short_label(likeliest.label)}" if likeliest and likeliest.probability > 0.5 else "")
 
 
-RECORDINGS_PAGE = "recordings.html"
-
-
 @drawing()
 def write_recordings_page(folder: Path, report: PickReport, picked: Picked) -> Path:
-    """Write the page and its figures as PNG and SVG.
-
-    Parameters
-    ----------
-    folder : Path
-        Made if it is not there.
-
-    Returns
-    -------
-    Path
-        Of recordings.html.
-    """
+    """Write the page and its figures as PNG and SVG; returns the path of the page."""
     aside = [peak for peak in report.peaks if not peak.is_likely]
+    responses = averaged(picked.spectra)
+    every = [spectra_picture(report, responses), errors_picture(report), stability_picture(report, picked.paths)]
     return save_page(
-        folder / RECORDINGS_PAGE,
-        {"every": every_picture(report, averaged(picked.spectra), picked.paths)},
+        folder / "recordings.html",
+        {"every": every},
         lambda pictures: from_template(
             "recordings.html",
             title=", ".join(report.files[:3]) + (" and others" if len(report.files) > 3 else ""),

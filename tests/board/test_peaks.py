@@ -23,6 +23,7 @@ hz = { mean = 404.0, sd = 0.2 }
 sign = "+"
 amplitude = 0.4
 damping_percent = 0.5
+spurious_probability = 0.2
 
 [[setup.peaks]]
 hz = [671, 672]
@@ -48,9 +49,9 @@ def test_peaks_are_those_of_the_list_then_those_of_the_tables(board_text: str) -
     third, fourth = setup.peaks[2:]
 
     assert setup.unlabelled == (448.8, 594.1, 404.0, 671.5)
-    assert (third.sign, third.amplitude, third.damping) == ("+", 0.4, 0.005)
+    assert (third.sign, third.amplitude, third.damping, third.spurious) == ("+", 0.4, 0.005, 0.2)
     assert third.frequency == Quantity.from_mean(404.0, 0.2)
-    assert (fourth.sign, fourth.amplitude, fourth.damping) == ("", None, None)
+    assert (fourth.sign, fourth.amplitude, fourth.damping, fourth.spurious) == ("", None, None, None)
 
 
 def test_the_uncertainty_of_a_listed_peak_is_kept(spoiled: Spoil) -> None:
@@ -119,7 +120,9 @@ def test_missed_and_spurious_peaks(spoiled: Spoil, board_text: str) -> None:
          "0 (the damping ratio in percent: half the loss factor)"),
         ("damping_percent = 0.5", "damping_percent = 101", PEAK + "damping_percent", "a number from 1e-06 to 100 %",
          "101 (the damping ratio in percent: half the loss factor)"),
-        ("damping_percent", "damping", PEAK + "damping", "one of hz, sign, amplitude, damping_percent",
+        ("spurious_probability = 0.2", "spurious_probability = 2", PEAK + "spurious_probability", CHANCE, "2" + HINT),
+        ("damping_percent", "damping", PEAK + "damping",
+         "one of hz, sign, amplitude, damping_percent, spurious_probability",
          "an unknown key (did you mean damping_percent?)"),
     ],
 )  # fmt: skip

@@ -172,7 +172,6 @@ def test_the_mass_of_the_sensor_is_asked_for_in_grams(given):
 BAD_FRAGMENTS = {
     "plate": ("[plate]\nmass_g = 3\n[setup]\n", "fragment.toml plate: wanted nothing but [setup], got another key"),
     "typo": ("[setup]\nunlabeled_hz = [3]\n", "fragment.toml [setup] unlabeled_hz: wanted one of"),
-    "several": ("[[setup]]\n[[setup]]\n", "fragment.toml: wanted one table [setup], got several [[setup]]"),
     "other name": (
         '[setup]\nname = "clamped"\n',
         "fragment.toml [setup] name: wanted the name of a setup of planted.toml",

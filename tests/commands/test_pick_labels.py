@@ -8,11 +8,11 @@ import pytest
 from generator.sand import photograph
 from made_recordings import CARD, SIDES, board
 
-from bayesplate.commands.pick_labels import Labels, label_peaks, upright
+from bayesplate.commands.pick_labels import Labels, label_peaks, pictures_of
 from bayesplate.commands.pick_words import moved_between_hits
 from bayesplate.commands.prepare import prepare
 from bayesplate.recordings.contract import LabelChance, PickedRow
-from bayesplate.recordings.picking import PickedMode
+from bayesplate.recordings.sand import straightened
 from bayesplate.results.words import chances
 
 CASES = {
@@ -36,30 +36,35 @@ def test_the_label_stated_is_never_another_than_the_most_probable(by_all, by_evi
     assert Labels((by_all,), (by_evidence,), None).stated(0) == expected
 
 
-PEAK = PickedMode(
-    frequency=0.0, sd=0.0, noise_sd=0.0, scatter_sd=0.0, window_sd=0.0, damping=0.01, damping_sd=0.001, mobility=(1.0,),
-    mobility_sd=(0.1,), complexity=0.0, alike=1.0, amplitude=1.0, seen=1.0, spurious=0.0, kind="",
+PEAK = PickedRow(
+    hz=0.0, sd_hz=0.0, noise_hz=0.0, scatter_hz=0.0, window_hz=0.0, damping_percent=1.0, damping_sd_percent=0.1,
+    sign="", amplitude=1.0, spurious_probability=0.0, kind="", seen=1.0, alike=1.0,
 )  # fmt: skip
 
 
+def heard(likely: tuple[PickedRow, ...]) -> SimpleNamespace:
+    """What was picked without a force, between places that nobody knows."""
+    spectra = SimpleNamespace(force=None, between=((None, None),))
+    return SimpleNamespace(likely=likely, likely_answers=(), spectra=spectra)
+
+
 def test_a_picture_of_another_mode_or_crosswise_is_told(tmp_path):
-    """Sand of the modes themselves is the negative control."""
+    """The picture is of one of its two peaks: of the other it is told."""
     (tmp_path / "planted.toml").write_text(CARD)
     prepared = prepare(tmp_path / "planted.toml", may_lack_frequencies=True)
-    likely = tuple(replace(PEAK, frequency=hz, sd=1e-3 * hz) for hz in board().damped[:8])
-    picked = SimpleNamespace(likely=likely, spectra=SimpleNamespace(force=None, between=((None, None),)))
+    likely = tuple(replace(PEAK, hz=hz, sd_hz=1e-3 * hz) for hz in board().damped[:8])
+    picked = heard(likely)
     rng = np.random.default_rng(4)
     sand = [photograph(rng, board().modes.shape(m), SIDES) for m in (2, 3)]
     names = ["({},{})".format(*name) for name, _ in board().modes.names()[:4]]
 
-    right = label_peaks(prepared.stated, prepared.prior, picked, None, {2: [sand[0]], 3: [sand[1]]})
-    wrong = label_peaks(prepared.stated, prepared.prior, picked, None, {2: [sand[1]], 3: [sand[1]]})
-    kept, told = upright(prepared.board, {145.0: sand[0], 150.0: sand[1].T})
+    shown = [straightened(picture) for picture in sand]
+    labels = label_peaks(prepared.stated, prepared.prior, picked, None, {2: [shown[1]], 3: [shown[1]]})
+    kept, told = pictures_of(prepared.board, likely, {likely[2].hz: sand[0], 150.0: sand[1].T})
 
-    assert right.doubts == ()
-    (doubt,) = wrong.doubts
+    (doubt,) = labels.doubts
     assert f"shows {names[3]}, and its frequency is that of {names[2]}: is it the picture of this peak" in doubt
-    assert [*kept] == [145.0]
+    assert [*kept] == [2]
     assert told[0].startswith(
         "the sand at 150 Hz left out: the picture is higher than wide, the board 580 mm along x and"
     )
@@ -74,12 +79,12 @@ def test_false_peaks_among_the_lowest_do_not_change_the_labels_of_the_others(tmp
     planted = [(hz, 0.0, name) for hz, name in zip(truth, names, strict=True)]
     false = [(0.5 * truth[0], 0.1, ""), (1.04 * truth[0], 0.15, ""), (1.05 * truth[2], 0.2, "")]
     every = sorted(planted + false)
-    likely = tuple(replace(PEAK, frequency=hz, sd=1e-3 * hz, spurious=spurious) for hz, spurious, _ in every)
-    picked = SimpleNamespace(likely=likely, spectra=SimpleNamespace(force=None, between=((None, None),)))
+    likely = tuple(replace(PEAK, hz=hz, sd_hz=1e-3 * hz, spurious_probability=spurious) for hz, spurious, _ in every)
+    picked = heard(likely)
 
     labels = label_peaks(prepared.stated, prepared.prior, picked, None, {})
 
-    right = [labels.of(i)[0][0] == name and labels.of(i)[0][1] > 0.95 for i, (_, _, name) in enumerate(every) if name]
+    right = [labels.probabilities[i].get(name, 0.0) > 0.95 for i, (_, _, name) in enumerate(every) if name]
     assert all(right)
 
 

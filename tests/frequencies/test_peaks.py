@@ -267,3 +267,15 @@ def test_draws_are_judged_a_few_at_a_time_and_say_the_same(monkeypatch):
     np.testing.assert_array_equal(likelihood.log_likelihood(every, noise), together)
     assert together[7] == -np.inf
     assert np.isfinite(np.delete(together, 7)).all()
+
+
+def test_a_peak_may_be_none_with_a_probability_of_its_own():
+    """The odds that a single peak is a mode go with (1 - s) / s; without its own it has that of its setup."""
+
+    def odds(spurious):
+        setup = setup_of(peaks=[Peak(exact(131.0), spurious=spurious)])
+        share = PeakLikelihood.of(model_of(setup)).probabilities(every_of(setup)[:1], NOISE[:1]).sum()
+        return share / (1.0 - share)
+
+    assert odds(SPURIOUS) == pytest.approx(odds(None), rel=1e-12)
+    assert odds(None) / odds(0.4) == pytest.approx((1.0 - SPURIOUS) / SPURIOUS / (0.6 / 0.4), rel=1e-9)

@@ -9,9 +9,11 @@ import pytest
 import ritz
 from made_boards import board_of, setup_of, with_noise
 
+from bayesplate.board.board import Board
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Peak
+from bayesplate.commands.prepare import prepare
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.labels import Label
 from bayesplate.posterior import first_labels
@@ -159,3 +161,29 @@ def test_a_plate_stiffer_across_its_grain_is_an_unlikely_way(monkeypatch):
 def test_three_peaks_and_boards_with_a_label_are_left_alone():
     assert probable_ways(board_with((), ALL[:3]), PRIOR) == []
     assert probable_ways(board_with([(1, 1)], ALL[1:8]), PRIOR) == []
+
+
+FALSE = {49.51: 0.17, 401.91: 0.18, 441.52: 0.46}
+"""What else was heard on the measured board below, Hz, and how probably it is no mode."""
+
+
+def heard(board: Board, doubts: dict[float, float]) -> Board:
+    """The twelve lowest peaks of a measured board without their labels, among them some that are hardly modes."""
+    (setup,) = board.setups
+    hertz = sorted([*setup.measured, *setup.unlabelled, *doubts])[:12]
+    peaks = tuple(Peak(Quantity.from_mean(hz, 1e-4 * hz), spurious=doubts.get(hz, 0.005)) for hz in hertz)
+    return replace(board, setups=(replace(setup, readings=(), peaks=peaks),))
+
+
+def test_the_right_plate_is_found_though_another_fits_the_peaks_of_a_real_board_better_by_chance():
+    """Spruce 2R, whose residues confirm its labels: with less and less noise a plate of E_x = 50 GPa remains alone."""
+    prepared = prepare("spruce-free-2R")
+    (setup,) = prepared.board.setups
+    known = {float(one.frequency.mean): one.label for one in setup.readings}
+
+    (best, share), *_ = probable_ways(heard(prepared.board, FALSE), load_prior("weakly-informative"))
+
+    found = {float(one.frequency.mean): one.label for one in best.board.setups[0].readings}
+    assert share > 0.9
+    assert {hz: label for hz, label in found.items() if hz in known} == {hz: known[hz] for hz in known if hz < 440.0}
+    assert not {49.51} & found.keys()

@@ -2,54 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from made_recordings import SENSOR, board, hits, write_wav
+from made_recordings import SENSOR, accelerance, board, hits, uff, wav_bytes, write_wav
 from scipy.io import wavfile
 
 from bayesplate.errors import InputError
-from bayesplate.recordings.reading import Read, read_recordings
-from bayesplate.recordings.signals import Recording
+from bayesplate.recordings.reading import read_recordings
+from bayesplate.recordings.signals import Read, Recording
 from bayesplate.recordings.sweeps import Sweep, impulse_response
 from bayesplate.recordings.taking import take
 
 RATE = 6000
 FORCE, HEARD = hits(np.random.default_rng(31), [0.2], (0.03, 0.02), rate=float(RATE), seconds=1.8, decibels=60.0)
 HERTZ = np.arange(0.0, 400.0, 0.5)
-
-
-def accelerance(hertz: np.ndarray = HERTZ) -> np.ndarray:
-    """Of the planted board."""
-    omega, own = 2.0 * np.pi * hertz[:, None], 2.0 * np.pi * board().hertz
-    terms = -(omega**2) * board().residues((0.03, 0.02), SENSOR)
-    return np.sum(terms / (own**2 - omega**2 + 2j * board().damping * own * omega), axis=1)
-
-
-def uff(sets: list[dict]) -> bytes:
-    """A UFF file, as text; keys: kind, x, y, even, axis, unit, top, top_unit, under."""
-    lines = []
-    for one in sets:
-        x, y, even = one["x"], np.asarray(one["y"]), one.get("even", True)
-        is_complex = np.iscomplexobj(y)
-        axis = "{:>10}    0    0    0 {:<20} {:<20}"
-        lines += ["    -1", "    58".ljust(80), *[" " * 80] * 5]
-        lines.append(f"{one['kind']:5d}         0    0         0 NONE               1   3 NONE               1   3")
-        step = x[1] - x[0] if even else 0.0
-        lines.append(f"{6 if is_complex else 4:10d}{y.size:10d}{int(even):10d}{x[0]:13.5e}{step:13.5e}{0.0:13.5e}")
-        lines.append(axis.format(one.get("axis", {1: 17, 4: 18}[one["kind"]]), "NONE", one.get("unit", "NONE")))
-        lines.append(axis.format(one.get("top", 12), "NONE", one.get("top_unit", "NONE")))
-        lines.append(axis.format(one.get("under", 13 if one["kind"] == 4 else 0), "NONE", "NONE"))
-        lines.append(axis.format(0, "NONE", "NONE"))
-        numbers = y.view(float) if is_complex else y
-        if even:
-            lines += ["".join(f"{v:20.11e}" for v in numbers[k : k + 4]) for k in range(0, numbers.size, 4)]
-        else:
-            pairs = [f"{t:13.5e}{v:20.11e}" for t, v in zip(x, y, strict=True)]
-            lines += ["".join(pairs[k : k + 2]) for k in range(0, y.size, 2)]
-        lines.append("    -1")
-    return "\n".join([*lines, ""]).encode()
+ACCELERANCE = accelerance(HERTZ, (0.03, 0.02))
 
 
 def read(path, content: bytes | None = None, **options) -> list[Read]:
@@ -64,7 +31,7 @@ TIMES = np.arange(HEARD.size) / RATE
 TIME = {"kind": 1, "y": HEARD, "even": False}
 
 
-@pytest.mark.parametrize("begin", [0.0, 1.0, -0.4, 12.0])
+@pytest.mark.parametrize("begin", [-0.4, 12.0])
 def test_times_of_six_digits_give_the_rate_of_the_whole_span(tmp_path, begin):
     """From 10 s on a step of the digits is not shorter than one of the samples."""
     (one,) = read(tmp_path / "a.uff", uff([TIME | {"x": TIMES / 3.0 + begin}]))
@@ -72,7 +39,7 @@ def test_times_of_six_digits_give_the_rate_of_the_whole_span(tmp_path, begin):
     assert one.rate == pytest.approx(3.0 * RATE, rel=2e-4)
 
 
-@pytest.mark.parametrize("n_lost", [1, 5, 400])
+@pytest.mark.parametrize("n_lost", [1, 400])
 def test_times_with_a_gap_are_refused(tmp_path, n_lost):
     kept = np.r_[0:3000, 3000 + n_lost : HEARD.size]
 
@@ -80,20 +47,19 @@ def test_times_with_a_gap_are_refused(tmp_path, n_lost):
         read(tmp_path / "a.uff", uff([TIME | {"x": TIMES[kept], "y": HEARD[kept]}]))
 
 
-@pytest.mark.parametrize(("unit", "factor"), [("Hz", 1.0), ("", 1.0), ("kHz", 1e-3), ("rad/s", 2.0 * np.pi)])
+@pytest.mark.parametrize(("unit", "factor"), [("", 1.0), ("rad/s", 2.0 * np.pi)])
 def test_frequencies_are_in_the_unit_of_the_header(tmp_path, unit, factor):
-    (one,) = read(tmp_path / "a.uff", uff([{"kind": 4, "x": HERTZ * factor, "y": accelerance(), "unit": unit}]))
+    (one,) = read(tmp_path / "a.uff", uff([{"kind": 4, "x": HERTZ * factor, "y": ACCELERANCE, "unit": unit}]))
 
     np.testing.assert_allclose(one.frequency, HERTZ, rtol=1e-5)
 
 
 REFUSED = {
     "revolutions": ({"unit": "rpm"}, 'wanted an abscissa in hz, khz, rad/s, rad/sec, got "rpm"'),
-    "an abscissa of time": ({"axis": 17, "unit": "s"}, 'got "s" (kind of data 17)'),
     "a strain": ({"top": 3}, "wanted a force or displacement, velocity, acceleration, pressure, got kind of data 3"),
     "a motion over a motion": ({"under": 12}, "wanted a motion over a force, got acceleration over acceleration"),
     "a force over a force": ({"top": 13}, "wanted a motion over a force, got a force over a force"),
-    "magnitudes": ({"y": np.abs(accelerance())}, "wanted a response with its phase, got one"),
+    "magnitudes": ({"y": np.abs(ACCELERANCE)}, "wanted a response with its phase, got one"),
 }
 
 
@@ -102,16 +68,16 @@ def test_a_header_that_cannot_be_honoured_is_refused(tmp_path, name):
     changed, said = REFUSED[name]
 
     with pytest.raises(InputError) as refused:
-        take([read(tmp_path / "a.uff", uff([{"kind": 4, "x": HERTZ, "y": accelerance()} | changed]))], 400.0)
+        take([read(tmp_path / "a.uff", uff([{"kind": 4, "x": HERTZ, "y": ACCELERANCE} | changed]))], 400.0)
 
     assert said in str(refused.value)
 
 
 def test_a_force_over_a_motion_is_turned_over(tmp_path):
-    mass = {"kind": 4, "x": HERTZ[1:], "y": 1.0 / accelerance()[1:], "top": 13, "under": 12}
+    mass = {"kind": 4, "x": HERTZ[1:], "y": 1.0 / ACCELERANCE[1:], "top": 13, "under": 12}
     (one,) = read(tmp_path / "a.uff", uff([mass]))
 
-    np.testing.assert_allclose(one.values, accelerance()[1:], rtol=1e-6)
+    np.testing.assert_allclose(one.values, ACCELERANCE[1:], rtol=1e-6)
     assert (one.motion, one.remarks) == ("acceleration", ("a.uff set 1: a force over acceleration, turned over",))
 
 
@@ -126,7 +92,6 @@ def test_a_force_is_told_by_its_kind_or_its_unit(tmp_path, top):
 
 NO_PHASE = {
     "magnitude": (np.abs, lambda y: 0.0 * y.real),
-    "magnitude and degrees": (np.abs, lambda y: np.degrees(np.angle(y))),
     "decibels and degrees": (lambda y: 20.0 * np.log10(np.abs(y) + 1e-6), lambda y: np.degrees(np.angle(y))),
     "the other sign": (np.real, lambda y: -y.imag),
 }
@@ -135,18 +100,18 @@ NO_PHASE = {
 @pytest.mark.parametrize("name", NO_PHASE)
 def test_a_response_that_does_not_follow_its_force_is_refused(tmp_path, name):
     real, imaginary = NO_PHASE[name]
-    rows = np.column_stack([HERTZ, real(accelerance()), imaginary(accelerance())])
+    rows = np.column_stack([HERTZ, real(ACCELERANCE), imaginary(ACCELERANCE)])
     np.savetxt(tmp_path / "a.csv", rows, "%.9g", ",", header="f_hz,re,im", comments="")
 
     with pytest.raises(InputError, match=r"a\.csv: wanted a response with its phase, got one that answers before"):
         take([read(tmp_path / "a.csv")], 400.0)
 
 
-@pytest.mark.parametrize("motion", [1.0, -1.0, 1j, -1j])
+@pytest.mark.parametrize("motion", [-1.0, 1j])
 def test_a_response_of_any_motion_and_polarity_follows_its_force(tmp_path, motion):
     """The negative control, lines from 20 Hz on, with noise."""
-    noise = 3e-3 * np.random.default_rng(1).standard_normal((2, HERTZ.size)) * np.abs(accelerance()).max()
-    values = motion * accelerance() + noise[0] + 1j * noise[1]
+    noise = 3e-3 * np.random.default_rng(1).standard_normal((2, HERTZ.size)) * np.abs(ACCELERANCE).max()
+    values = motion * ACCELERANCE + noise[0] + 1j * noise[1]
     rows = np.column_stack([HERTZ, values.real, values.imag])[40:]
     np.savetxt(tmp_path / "a.csv", rows, "%.9g", ",", header="f_hz,re,im", comments="")
 
@@ -157,18 +122,7 @@ def wav(signal: np.ndarray, bits: int = 16) -> bytes:
     """A WAV file of one channel by hand: 44 bytes, then the samples."""
     samples = np.round(0.8 * signal / np.abs(signal).max() * 2.0 ** (bits - 1)).astype("<i4").view(np.uint8)
     data = samples.reshape(-1, 4)[:, : bits // 8].tobytes()
-    numbers = (
-        (36 + len(data), 4),
-        (16, 4),
-        (1, 2),
-        (1, 2),
-        (RATE, 4),
-        (RATE * bits // 8, 4),
-        (bits // 8, 2),
-        (bits, 2),
-    )
-    whole, fmt, *rest = [number.to_bytes(size, "little") for number, size in numbers]
-    return b"RIFF" + whole + b"WAVEfmt " + fmt + b"".join(rest) + b"data" + len(data).to_bytes(4, "little") + data
+    return wav_bytes(1, 1, RATE, bits // 8, bits, data, len(data))
 
 
 def sized(content: bytes, n_bytes: int) -> bytes:
@@ -178,10 +132,8 @@ def sized(content: bytes, n_bytes: int) -> bytes:
 
 N_BYTES = 2 * HEARD.size
 LYING = {
-    "none stated": (sized(wav(HEARD), 0), HEARD.size),
     "none stated, sizes of the whole neither": (b"RIFF" + bytes(4) + sized(wav(HEARD), 0)[8:], HEARD.size),
     "twice as many stated": (sized(wav(HEARD), 2 * N_BYTES), HEARD.size),
-    "some stated": (sized(wav(HEARD), 1000), HEARD.size),
     "the most that can be stated": (sized(wav(HEARD), 0xFFFFFFFF), HEARD.size),
     "a byte too many": (sized(wav(HEARD) + b"\1", N_BYTES + 1), HEARD.size),
     "cut within a sample of 24 bits": (wav(HEARD, 24)[: 44 + 3 * 9000 + 2], 9000),
@@ -207,15 +159,13 @@ def test_a_header_that_is_right_is_no_cause_for_a_remark(tmp_path, more):
 
 
 STEREO = {
-    "the same twice": (HEARD, HEARD, "both channels hold the same sound, and one is used"),
-    "softer in one": (HEARD, 0.3 * HEARD, "both channels hold the same sound, and one is used"),
-    "with the other sign": (HEARD, -HEARD, "both channels hold the same sound, and one is used"),
+    "softer in one, with the other sign": (HEARD, -0.3 * HEARD, "both channels hold the same sound, and one is used"),
     "left alone": (HEARD, 0.0 * HEARD, "channel 2 is silent and left out"),
     "right alone": (0.0 * HEARD, HEARD, "channel 1 is silent and left out"),
 }
 
 
-@pytest.mark.parametrize("channels", ["force,response", "response,response", "response,force"])
+@pytest.mark.parametrize("channels", ["force,response", "response,response"])
 @pytest.mark.parametrize("name", STEREO)
 def test_of_a_stereo_file_with_one_sound_that_is_taken(tmp_path, name, channels):
     first, second, said = STEREO[name]
@@ -277,7 +227,7 @@ def swept(signal: np.ndarray) -> Recording:
 
 @pytest.mark.parametrize(
     "other",
-    [replace(SWEPT, last=1400.0), replace(SWEPT, duration=3.2), replace(SWEPT, first=40.0), Sweep(25.0, 900.0, 6.0)],
+    [SWEPT._replace(last=1400.0), SWEPT._replace(first=40.0), SWEPT._replace(duration=6.0)],
 )
 def test_a_sweep_that_was_not_played_is_refused_as_parameters_and_as_a_file(other):
     heard = swept(SWEPT.signal(3000.0))
@@ -319,7 +269,7 @@ def test_crosstalk_into_a_channel_to_which_nothing_is_connected_is_silence(tmp_p
 
 
 def test_of_the_sets_of_a_file_silent_ones_and_copies_are_left_out(tmp_path):
-    sets = [{"kind": 4, "x": HERTZ, "y": y} for y in (accelerance(), 0.0 * accelerance(), accelerance())]
+    sets = [{"kind": 4, "x": HERTZ, "y": y} for y in (ACCELERANCE, 0.0 * ACCELERANCE, ACCELERANCE)]
     (one,) = read(tmp_path / "a.uff", uff(sets))
 
     assert one.name == "a.uff set 1"

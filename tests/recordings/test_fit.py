@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bayesplate.recordings.greedy import search
-from bayesplate.recordings.local_fit import Window, fitted, refined
+from bayesplate.recordings.local_fit import Window, fitted, refined, search
 
 RATE, N = 4000.0, 6000
 LINES = np.arange(N // 2) * RATE / N
@@ -67,8 +66,8 @@ def test_a_close_pair_is_told_apart_and_a_single_mode_is_left_single():
     noisy = decays(rng, PAIR, 4, 0.02)
     single = decays(rng, PAIR[:1], 4, 0.02)
 
-    both = search(replace(window(noisy / _level(noisy)), least_variance=1.0), 45.0).fit.poles
-    one = search(replace(window(single / _level(single)), least_variance=1.0), 45.0).fit.poles
+    both = search(replace(window(noisy / _level(noisy)), least_variance=1.0), 45.0)[-1]
+    one = search(replace(window(single / _level(single)), least_variance=1.0), 45.0)[-1]
 
     np.testing.assert_allclose(np.sort(both[:, 0]), PAIR[:, 0], atol=0.05)
     assert one.shape == (1, 2)

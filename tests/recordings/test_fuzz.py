@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from fuzzing import accepted_or_refused, fuzzed, memory_below, stopped_if_it_hangs
 from hypothesis import strategies as st
+from made_recordings import uff, wav_bytes
 
 import bayesplate
 from bayesplate.errors import InputError
-from bayesplate.recordings.reading import READERS, read_recordings
+from bayesplate.recordings.reading import read_recordings
 from bayesplate.recordings.signals import FrequencyResponse, Recording
-from bayesplate.recordings.strength import _answer
 
 RATE = 4000
 TIMES = np.arange(1400) / RATE
@@ -32,15 +30,8 @@ OPTIONS = st.fixed_dictionaries(
 )
 
 
-def wav(format_tag: int, channels: int, rate: int, align: int, bits: int, data: bytes, claimed: int) -> bytes:
-    """A WAV file by hand, with whatever its header says."""
-    header = struct.pack("<HHIIHH", format_tag, channels, rate, rate * align & 0xFFFFFFFF, align, bits)
-    chunks = b"fmt " + struct.pack("<I", len(header)) + header + b"data" + struct.pack("<I", claimed) + data
-    return b"RIFF" + struct.pack("<I", (4 + len(chunks)) & 0xFFFFFFFF) + b"WAVE" + chunks
-
-
 SOUND = np.round(16000.0 * np.stack([RING, np.cos(300.0 * TIMES) * RING], axis=1)).astype("<i2").tobytes()
-SOUND_WAV = wav(1, 2, RATE, 4, 16, SOUND, len(SOUND))
+SOUND_WAV = wav_bytes(1, 2, RATE, 4, 16, SOUND, len(SOUND))
 SIZES = st.sampled_from([0, 1, 2, 3, 4, 8, 16, 24, 32, 64, 255, 0x7FFFFFFF, 0xFFFFFFFF, len(SOUND)])
 WORDS = [b"RIFF", b"RIFX", b"RF64", b"WAVE", b"fmt ", b"data", b"LIST", b"ds64", b"fact", b"\xff" * 8, b"\0" * 8]
 
@@ -53,7 +44,7 @@ def headers(draw: st.DrawFn) -> bytes:
     bits = draw(st.sampled_from([0, 1, 7, 8, 12, 16, 24, 32, 64, 80, 65535]))
     rate = draw(st.sampled_from([0, 1, RATE, 48000, 0x7FFFFFFF, 0xFFFFFFFF]))
     data = draw(st.sampled_from([b"", SOUND[:1], SOUND[:777], SOUND]))
-    return wav(tag, draw(small), rate, draw(small), bits, data, draw(st.one_of(st.just(len(data)), SIZES)))
+    return wav_bytes(tag, draw(small), rate, draw(small), bits, data, draw(st.one_of(st.just(len(data)), SIZES)))
 
 
 @st.composite
@@ -102,7 +93,7 @@ def read_wav_file(data: bytes, options: dict[str, Any]) -> None:
 
 
 WAVS = st.one_of(st.binary(max_size=120), headers(), spliced(SOUND_WAV, WORDS, 60), spliced(SOUND_WAV, WORDS, 6000))
-test_wav, test_wav_at_length = fuzzed(read_wav_file, 80, data=WAVS, options=OPTIONS)
+test_wav, test_wav_at_length = fuzzed(read_wav_file, 50, data=WAVS, options=OPTIONS)
 
 NUMBERS = ["0", "1", "-1", "0.5", "1e308", "-1e308", "1e-320", "nan", "inf", "-inf", "1e999", "0x1", "1_0", "١", ""]
 NAMES = ["time", "t", "force", "Force", "acceleration", "velocity", "sound", "f_hz", "re", "im", "coherence", "x", ""]
@@ -135,23 +126,14 @@ def tables(draw: st.DrawFn) -> bytes:
     return text.encode(draw(st.sampled_from(["utf-8", "utf-8", "utf-8", "utf-16", "latin-1"])), "replace")
 
 
-@st.composite
-def small_tables(draw: st.DrawFn) -> bytes:
-    """A header of names that are known or nearly so, and a few hundred lines of the same odd numbers."""
-    names = draw(st.lists(st.sampled_from(NAMES), min_size=1, max_size=4))
-    rows = draw(st.lists(st.lists(st.sampled_from(NUMBERS), min_size=1, max_size=4), max_size=3))
-    lines = [",".join(row) for row in rows] * draw(st.sampled_from([1, 60, 600]))
-    return "\n".join([",".join(names), *lines]).encode()
-
-
 def read_csv_file(data: bytes, options: dict[str, Any]) -> None:
     """Bytes that may be a CSV table."""
     with memory_below(MOST_MEMORY):
         read("a.csv", data, options)
 
 
-TABLES = st.one_of(st.binary(max_size=80), tables(), small_tables())
-test_csv, test_csv_at_length = fuzzed(read_csv_file, 80, data=TABLES, options=OPTIONS)
+TABLES = st.one_of(st.binary(max_size=80), tables())
+test_csv, test_csv_at_length = fuzzed(read_csv_file, 50, data=TABLES, options=OPTIONS)
 
 
 def flac() -> bytes:
@@ -165,24 +147,12 @@ def flac() -> bytes:
     return stream.getvalue()
 
 
-def uff() -> bytes:
-    """A short UFF file, as text."""
-    axis = "{kind:>10}    0    0    0 NONE                                     "
-    head = [
-        "    -1",
-        "    58".ljust(80),
-        *[" " * 80] * 5,
-        "    1         0    0         0                    1   3                    1   3",
-        f"         4{RING.size:10d}         1  0.00000e+00  {1.0 / RATE:.5e}  0.00000e+00",
-        *(axis.format(kind=kind) for kind in (17, 12, 13, 0)),
-    ]
-    rows = ["".join(f"{x:20.11e}" for x in row) for row in RING.reshape(-1, 4)]
-    return "\n".join([*head, *rows, "    -1", ""]).encode()
+UFF = uff([{"kind": 1, "x": TIMES, "y": RING}])
 
 
 def read_other_file(ending: str, cut: int, put: list[tuple[int, bytes]], options: dict[str, Any]) -> None:
     """Bytes that may be a file that a library of the extra reads."""
-    found = flac() if ending == ".flac" else uff()
+    found = flac() if ending == ".flac" else UFF
     for at, piece in put:
         found = found[:at] + piece + found[at + len(piece) :]
     read(f"a{ending}", found[: len(found) * cut // 100], options)
@@ -191,7 +161,7 @@ def read_other_file(ending: str, cut: int, put: list[tuple[int, bytes]], options
 PUT = st.lists(st.tuples(st.integers(0, 700), st.binary(min_size=1, max_size=6)), max_size=3)
 test_extras, test_extras_at_length = fuzzed(
     read_other_file,
-    40,
+    25,
     ending=st.sampled_from([".flac", ".uff", ".unv"]),
     cut=st.sampled_from([0, 1, 10, 50, 90, 100, 100, 100]),
     put=PUT,
@@ -203,22 +173,18 @@ test_extras, test_extras_at_length = fuzzed(
 def test_what_is_spoilt_here_was_sound(data):
     """The negative control: without a change each file is read."""
     ending = ".flac" if data is None else ".uff" if data == b"uff" else ".wav" if data == SOUND_WAV else ".csv"
-    content = flac() if data is None else uff() if data == b"uff" else data
+    content = flac() if data is None else UFF if data == b"uff" else data
     assert len(read(f"a{ending}", content, {"rate": float(RATE) if ending == ".csv" else None})) == 1
 
 
 LINES = "".join(f"{i},1,1\n" for i in range(200))
 FOUND = {
-    "a rate of nothing.wav": (wav(1, 1, 0, 2, 16, SOUND, len(SOUND)), "wanted a WAV file, got"),
     "escapes.csv": (b"\x1b[31mred\n1\n", r'got "\x1b[31mred"'),
-    "no lines.csv": (b"acceleration\n", "wanted samples below the header, got none"),
     "a column twice.csv": (b"force,acceleration,force\n1,2,3\n", 'wanted each column once, got "force" again'),
     "no end.csv": (f"f_hz,re,im\n{LINES}inf,1,1\n".encode(), "a hundred evenly spaced lines or more"),
     "infinite.csv": (f"f_hz,re,im\n{LINES}200,inf,1\n".encode(), "wanted finite numbers, got line 201 is none"),
     "huge.csv": (b"acceleration\n" + b"1e300\n-1e300\n" * 999, "wanted numbers up to 1e+100, got larger ones"),
-    "times that jump.csv": (b"t,acceleration\n-1e308,1\n1e308,2\n", "wanted times in s that rise"),
-    "one time.uff": (uff().replace(b"      1400 ", b"         1 ")[:900] + b"\n    -1\n", "a broken one"),
-    "two times.uff": (uff().replace(b"  2.50000e-04", b"  0.00000e+00"), "wanted times in s that rise"),
+    "two times.uff": (UFF.replace(b"  2.50000e-04", b"  0.00000e+00"), "wanted times in s that rise"),
 }
 """What was once another error, or a warning of a library, or was taken for something else."""
 
@@ -236,15 +202,12 @@ def test_what_was_found_is_refused_with_its_reason(tmp_path, name):
 
 def odd_signals() -> dict[str, np.ndarray]:
     """Recordings that are read and hold no board."""
-    ones = np.ones(3000)
     return {
         "a click": np.eye(1, 3000, 5)[0],
         "a ramp": np.arange(3000.0),
-        "noise of the last digit": ones + 1e-12 * np.random.default_rng(1).standard_normal(3000),
-        "noise": np.random.default_rng(2).standard_normal(3000),
+        "noise of the last digit": np.ones(3000) + 1e-12 * np.random.default_rng(1).standard_normal(3000),
         "a click that is huge": 1e99 * np.eye(1, 3000, 1500)[0] + 1e-3 * np.sin(np.arange(3000.0)),
         "a breath": 1e-90 * np.sin(np.arange(3000.0)),
-        "a ring of no length": np.exp(-np.arange(3000.0)),
     }
 
 
@@ -252,7 +215,7 @@ ODD = odd_signals()
 
 
 @pytest.mark.parametrize("heard", ODD)
-@pytest.mark.parametrize("struck", [None, "a click", "a breath", "noise of the last digit"])
+@pytest.mark.parametrize("struck", [None, "a click"])
 def test_what_is_no_board_is_picked_or_refused(tmp_path, heard, struck):
     """With a force and without: modes, none, or a reason."""
     columns = {"acceleration": ODD[heard], **({} if struck is None else {"force": ODD[struck]})}
@@ -261,7 +224,7 @@ def test_what_is_no_board_is_picked_or_refused(tmp_path, heard, struck):
     accepted_or_refused(lambda: bayesplate.pick([tmp_path / "a.csv"], rate=2000.0, highest=300.0), tmp_path)
 
 
-@pytest.mark.parametrize(("step", "said"), [(0.001, "got 0"), (100.0, "got 3"), (0.2, "")])
+@pytest.mark.parametrize(("step", "said"), [(0.001, "got 0"), (100.0, "got 3")])
 def test_a_response_with_next_to_no_lines_in_the_band_is_refused(tmp_path, step, said):
     hertz = np.arange(1600) * step
     values = 1.0 / (60.0**2 - hertz**2 + 2j * hertz)
@@ -269,27 +232,7 @@ def test_a_response_with_next_to_no_lines_in_the_band_is_refused(tmp_path, step,
 
     found = accepted_or_refused(lambda: bayesplate.pick([tmp_path / "a.csv"], lowest=20.0, highest=310.0), tmp_path)
 
-    assert (f"a.csv between 20 and 310 Hz: wanted 5 lines or more, {said}" in str(found)) == bool(said)
-
-
-def test_a_hit_without_force_at_a_mode_says_nothing_of_it():
-    """Neither a number that is none nor a warning: the mobility is not known there."""
-    spectra = SimpleNamespace(motion="velocity", between=((None, None),), places=np.zeros(2, dtype=int))
-    mode = SimpleNamespace(frequency=100.0, residues=np.zeros(2, complex), residue_sd=np.ones(2))
-    answer = _answer(spectra, mode, np.zeros(2, complex))
-
-    assert np.isfinite(answer.mobility).all()
-    assert answer.sd[0] > 1e100
-
-
-def test_a_header_that_claims_more_than_there_is_costs_no_memory(tmp_path):
-    """What is there is read: recorders that were switched off leave such files."""
-    (tmp_path / "a.wav").write_bytes(wav(1, 2, RATE, 4, 16, SOUND, 0x7FFFFFF0))
-
-    with memory_below(MOST_MEMORY):
-        ((one,),) = read_recordings([tmp_path / "a.wav"])
-
-    assert one.response.size == RING.size
+    assert f"a.csv between 20 and 310 Hz: wanted 5 lines or more, {said}" in str(found)
 
 
 def test_a_line_that_only_python_ends_is_no_line(tmp_path):
@@ -318,7 +261,3 @@ def test_much_memory_would_be_noticed():
     """The negative control."""
     with pytest.raises(AssertionError, match="MB"), memory_below(MOST_MEMORY):
         np.empty(int(2 * MOST_MEMORY), np.uint8)
-
-
-def test_every_kind_of_file_is_tried():
-    assert set(READERS) == {".wav", ".csv", ".flac", ".uff", ".unv", ".ufb"}

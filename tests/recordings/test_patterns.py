@@ -26,7 +26,7 @@ def measured(rng: np.random.Generator, polarity: float) -> np.ndarray:
 def test_the_pattern_names_the_mode_and_the_polarity(polarity):
     found = measured(np.random.default_rng(1), polarity)
 
-    evidence, log_polarity = residue_evidence(found, 0.02 * np.abs(found), PREDICTED, LARGEST, EVERY, has_force=True)
+    evidence, log_polarity = residue_evidence(found, 0.02 * np.abs(found), PREDICTED, LARGEST, EVERY)
 
     assert (np.argmax(evidence, axis=1) == np.arange(N_MODES)).all()
     assert np.sign(log_polarity) == polarity
@@ -37,9 +37,9 @@ def test_patterns_of_nothing_name_nothing():
     """The negative control: residues without a pattern speak for no mode as the right ones do for theirs."""
     rng = np.random.default_rng(2)
     sd = 0.02 * np.repeat(LARGEST[:, None], len(HAMMERS), axis=1)
-    right, _ = residue_evidence(measured(rng, 1.0), sd, PREDICTED, LARGEST, EVERY, has_force=True)
+    right, _ = residue_evidence(measured(rng, 1.0), sd, PREDICTED, LARGEST, EVERY)
     random = 7.0 * LARGEST[:, None] * rng.standard_normal(PREDICTED.shape)
-    wrong, _ = residue_evidence(random, 0.02 * np.abs(random), PREDICTED, LARGEST, EVERY, has_force=True)
+    wrong, _ = residue_evidence(random, 0.02 * np.abs(random), PREDICTED, LARGEST, EVERY)
 
     share = [np.exp(one).max(axis=1) / np.exp(one).sum(axis=1) for one in (right, wrong)]
     assert np.mean(np.argmax(wrong, axis=1) == np.arange(N_MODES)) < 0.5

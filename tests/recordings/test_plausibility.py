@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from bayesplate.recordings import picking
 from bayesplate.recordings.modes_found import Mode
 from bayesplate.recordings.picking import whole_peaks
-from bayesplate.recordings.plausibility import Verdict, broad_odds, verdicts
+from bayesplate.recordings.plausibility import Peak, Verdict, broad_odds, verdicts
 from bayesplate.recordings.spectra import Spectra
 from bayesplate.recordings.strength import Answer
 
@@ -25,7 +23,7 @@ MODE = Verdict(0.02, "")
 def mode(frequency: float, damping: float = 0.007) -> Mode:
     noise, none = np.full(2, 0.01), np.zeros(2)
     one = np.ones(1, dtype=complex)
-    return Mode(frequency, damping * frequency, noise, none, none, one, np.ones(1), 1e4, 0.0, 1.0)
+    return Mode(frequency, damping * frequency, noise, none, none, one, np.ones(1), 0.0, 1.0)
 
 
 def answer(strength: float = 1.0) -> Answer:
@@ -51,12 +49,6 @@ def test_what_is_four_times_as_broad_as_all_others_is_rather_no_mode():
 
     assert odds[-1] > 1.0
     assert odds[:-1].max() < 0.01
-
-
-def test_where_damping_differs_from_mode_to_mode_a_broad_one_may_be_a_mode():
-    damping = np.exp(np.linspace(np.log(0.003), np.log(0.03), 12))
-
-    assert broad_odds(damping, np.ones(12))[-1] < 0.5
 
 
 def test_broad_things_do_not_tell_how_the_board_damps_where_they_are_weak():
@@ -99,9 +91,9 @@ def left_out(monkeypatch):
     words = {404.65: part(2)}
 
     def judged(_, modes):
-        return [picking._Peak(one, answer(), words.get(one.frequency, MODE), one) for one in modes]
+        return [Peak(one, answer(), words.get(one.frequency, MODE), one) for one in modes]
 
-    monkeypatch.setattr(picking, "_judged", judged)
+    monkeypatch.setattr(picking, "judged", judged)
     monkeypatch.setattr(picking, "fit_modes", lambda *_: again)
     return picking._without_parts(None, before, [], (20.0, 1000.0))
 
@@ -126,21 +118,12 @@ def test_a_mode_is_averaged_with_what_was_nearest_to_it_while_the_part_was_there
 def test_damping_is_averaged_as_the_frequency_is_and_its_error_holds_both_fits():
     as_whole, beside_part = mode(400.0, damping=0.005), mode(401.0, damping=0.007)
 
-    one = picking._picked(picking._Peak(as_whole, answer(), MODE, beside_part, doubt=0.8), 1.0)
+    one = picking._row(Peak(as_whole, answer(), MODE, beside_part, doubt=0.8), 1.0)
 
     decay, other = as_whole.decay, beside_part.decay
-    assert one.frequency == pytest.approx(400.2)
-    assert one.damping == pytest.approx((0.8 * decay + 0.2 * other) / 400.2)
-    assert one.damping_sd == pytest.approx(np.hypot(0.01, 0.4 * (other - decay)) / 400.2)
-
-
-def test_damping_carries_by_how_much_it_moves_with_the_choice_of_lines():
-    moved = replace(mode(400.0), window=np.array([0.0, 0.2]))
-
-    one = picking._picked(picking._Peak(moved, answer(), MODE, moved), 1.0)
-
-    assert one.window_sd == 0.0
-    assert one.damping_sd == pytest.approx(np.hypot(0.01, 0.2) / 400.0)
+    assert one.hz == pytest.approx(400.2)
+    assert one.damping_percent == pytest.approx(100.0 * (0.8 * decay + 0.2 * other) / 400.2)
+    assert one.damping_sd_percent == pytest.approx(100.0 * np.hypot(0.01, 0.4 * (other - decay)) / 400.2)
 
 
 def test_beside_loud_lines_that_do_not_decay_no_mode_is_faint_and_they_are_named():

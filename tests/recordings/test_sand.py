@@ -12,7 +12,7 @@ from bayesplate.commands.prepare import prepare
 from bayesplate.errors import InputError
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
-from bayesplate.recordings.sand import agreement, read_picture, sand_evidence
+from bayesplate.recordings.sand import agreement, read_picture, sand_evidence, straightened
 
 GRID = np.linspace(0.0, 1.0, 61)
 MODES = {"finnish-spruce-cantilever": (ritz.FINNISH, (1, 5)), "fiemme-spruce-clamped": (ritz.FIEMME, (2, 5))}
@@ -36,10 +36,10 @@ def test_the_mode_is_told_from_all_others_and_a_picture_of_nothing_from_none(nam
     rng = np.random.default_rng(3)
     for mode in shown:
         picture = photograph(rng, solved.shape(mode), (plate.L_x, plate.L_y))
-        evidence = sand_evidence(picture, shapes)
+        evidence = sand_evidence(straightened(picture), shapes)
         assert int(np.argmax(evidence)) == mode
         assert np.exp(evidence[mode]) / np.exp(evidence).sum() > 0.5
-    nothing = sand_evidence(np.clip(0.5 + 0.2 * rng.standard_normal((120, 240)), 0.0, 1.0), shapes)
+    nothing = sand_evidence(straightened(np.clip(0.5 + 0.2 * rng.standard_normal((120, 240)), 0.0, 1.0)), shapes)
     assert np.exp(nothing).max() / np.exp(nothing).sum() < 0.5
 
 
@@ -48,7 +48,8 @@ def test_lines_may_be_darker_than_the_board():
     shapes = shapes_of("fiemme-spruce-clamped", plate, 4)
     picture = photograph(np.random.default_rng(1), ritz.solve(ritz.Ritz(plate)).shape(3), (plate.L_x, plate.L_y))
 
-    np.testing.assert_allclose(agreement(picture, shapes), agreement(1.0 - picture, shapes), atol=1e-9)
+    dark, light = (agreement(straightened(one), shapes) for one in (picture, 1.0 - picture))
+    np.testing.assert_allclose(dark, light, atol=1e-9)
 
 
 def test_a_picture_is_read_as_it_is_seen(tmp_path):

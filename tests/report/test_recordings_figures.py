@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayesplate.recordings.contract import LabelChance, PickedRow, PickReport
-from bayesplate.recordings.responses import Averaged
-from bayesplate.report.recordings import spectra_picture
+from bayesplate.report.recordings import Averaged, spectra_picture
 from bayesplate.results.modes import UNNAMED
 
 
@@ -19,7 +18,7 @@ def test_names_of_modes_are_whole_within_the_figure():
     peaks = row(55.1, "(1,1)"), row(210.9, UNNAMED), row(985.1, "(10,10)")
     report = PickReport(1, ("a.csv",), 1, 1, 2.0, 20.0, 1000.0, peaks, "", "board", "", ())
     hertz = np.linspace(20.0, 1000.0, 99)
-    figure = spectra_picture(report, [Averaged("a.csv", hertz, np.ones(99), None, 1)]).figure
+    figure = spectra_picture(report, [Averaged("a.csv", hertz, np.ones(99), None)]).figure
     figure.canvas.draw()
     names = [text for panel in figure.axes for text in panel.texts]
 

@@ -103,8 +103,9 @@ ROW = PickedRow(52.0, 0.1, 0.1, 0.0, 0.0, 1.0, 0.1, "+", 1.0, 0.01, "", 1.0, 0.0
 def test_a_text_stays_a_text_on_the_page_of_recordings(tmp_path, monkeypatch):
     """Names of files, of the board, remarks, labels, and the fragment."""
     payload = EVERY
-    pictures = [Picture(f"one-{i}", payload, payload, payload, stacked([0.3])[0]) for i in range(3)]
-    monkeypatch.setattr(home, "every_picture", lambda *_: pictures)
+    for name in ("spectra", "errors", "stability"):
+        picture = Picture(name, payload, payload, payload, stacked([0.3])[0])
+        monkeypatch.setattr(home, f"{name}_picture", lambda *_, picture=picture: picture)
     monkeypatch.setattr(home, "averaged", lambda _: ())
     peaks = (ROW, PickedRow(**{**vars(ROW), "labels": (LabelChance(payload, 0.9),)}))
     report = PickReport(1, (payload, payload), 1, 1, 1.5, 20.0, 200.0, peaks, "same", payload, payload, (payload,))

@@ -88,9 +88,7 @@ def judged(board: Ringing, picked: Picked) -> Record:
     """Picked modes against planted ones: each belongs to one at most, the nearest pairs first."""
     truth = board.damped
     likely = picked.likely
-    pairs = sorted(
-        (abs(mode.frequency / hertz - 1.0), i, j) for i, mode in enumerate(likely) for j, hertz in enumerate(truth)
-    )
+    pairs = sorted((abs(mode.hz / hertz - 1.0), i, j) for i, mode in enumerate(likely) for j, hertz in enumerate(truth))
     of_mode: dict[int, int] = {}
     for off, i, j in pairs:
         if off < NEAR and i not in of_mode and j not in of_mode.values():
@@ -98,21 +96,21 @@ def judged(board: Ringing, picked: Picked) -> Record:
     audible = [j for j, hertz in enumerate(truth) if hertz < HIGHEST]
     modes = []
     for i, j in of_mode.items():
-        error = likely[i].frequency - truth[j]
+        error = likely[i].hz - truth[j]
         gaps = np.sort(np.abs(truth / truth[j] - 1.0))
         modes.append(
             {
-                "z": round(float(error / likely[i].sd), 3),
+                "z": round(float(error / likely[i].sd_hz), 3),
                 "relative": float(error / truth[j]),
                 "control": _control(picked.spectra, float(truth[j])),
                 "lonely": bool(gaps[1] > LONELY),
-                "spurious": round(likely[i].spurious, 4),
+                "spurious": round(likely[i].spurious_probability, 4),
             }
         )
     close = [j for j in audible if np.sort(np.abs(truth / truth[j] - 1.0))[1] < LONELY]
     return {
         "modes": modes,
-        "false": [round(mode.spurious, 4) for i, mode in enumerate(likely) if i not in of_mode],
+        "false": [round(mode.spurious_probability, 4) for i, mode in enumerate(likely) if i not in of_mode],
         "audible": len(audible),
         "missed": len([j for j in audible if j not in of_mode.values()]),
         "close": len(close),

@@ -91,12 +91,12 @@ def simulate_one(base_seed: int, index: int) -> Record:
     picked = pick_modes(take(recordings_of(rng, boards, places), HIGHEST).spectra, 20.0, HIGHEST)
     truth = np.mean([board.damped for board in boards], axis=0)
     names = [f"({m},{n})" for (m, n), _ in boards[0].modes.names()][:N_MODES]
-    likely = [mode for mode in picked.likely if mode.frequency < 0.98 * HIGHEST]
-    nearest = [int(np.argmin(np.abs(truth / mode.frequency - 1.0))) for mode in likely]
-    off = [mode.frequency / truth[k] - 1.0 for mode, k in zip(likely, nearest, strict=True)]
+    likely = [mode for mode in picked.likely if mode.hz < 0.98 * HIGHEST]
+    nearest = [int(np.argmin(np.abs(truth / mode.hz - 1.0))) for mode in likely]
+    off = [mode.hz / truth[k] - 1.0 for mode, k in zip(likely, nearest, strict=True)]
     of_mode = {k: mode for mode, k, far in zip(likely, nearest, off, strict=True) if abs(far) < NEAR}
     readings = "\n".join(
-        f'"{names[k]}" = {{ mean = {mode.frequency:.6g}, sd = {mode.sd:.3g} }}' for k, mode in sorted(of_mode.items())
+        f'"{names[k]}" = {{ mean = {mode.hz:.6g}, sd = {mode.sd_hz:.3g} }}' for k, mode in sorted(of_mode.items())
     )
     at_mm = [[round(1e3 * x, 3), round(1e3 * y, 3)] for x, y in places]
     card = CARD.format(1e3 * SIDES[0], 1e3 * SIDES[1], 1e3 * THICKNESS, DENSITY, 1e3 * SENSOR_MASS, at_mm, readings)
@@ -106,7 +106,7 @@ def simulate_one(base_seed: int, index: int) -> Record:
         elastic = bayesplate.fit(path).summary.elastic
     return {
         "simulation": index,
-        "modes": [round(float((mode.frequency - truth[k]) / mode.sd), 3) for k, mode in of_mode.items()],
+        "modes": [round(float((mode.hz - truth[k]) / mode.sd_hz), 3) for k, mode in of_mode.items()],
         "constants": [
             round(float((elastic[name].mean - value) / elastic[name].sd), 3)
             for name, value in zip(("E_x", "E_y", "G_xy"), moduli, strict=True)
