@@ -4,8 +4,8 @@ The raw hits of a free half-top (2R), its frequency response, and that of anothe
 by another method. The data have no stated licence and are not part of the project: where the folder is absent, this
 says so and ends with exit code 0. Otherwise 0: all peaks found within 0.3 % or the listed spread, their signs agree but
 for one polarity, and no more than two further peaks are rather modes than not by the recordings; 1: not, with what is
-missed; 2: usage. The labels of the listing, which the signs confirm, are the likeliest ones. The listing need not be complete: it is told which of the further ones are modes that the board of the
-card has. Nor need it be right: where a listed peak of a frequency response is missed, it is told where fits of one pole
+missed; 2: usage. The labels of the listing, which the signs confirm, are to be the likeliest ones. The listing need not
+be complete: it is told which of the further ones are modes that the board of the card has. Nor need it be right: where a listed peak of a frequency response is missed, it is told where fits of one pole
 have it that share nothing with `pick`. `--publish` writes the same to a page.
 """
 
@@ -111,9 +111,7 @@ def compared(
         for i, label in stated.items()
         if (top := next((one.label for one in likely[of_peak[i]].labels), "no mode")) != label
     ]
-    lines.append(
-        f"  {len(stated) - len(wrong)} of {len(stated)} labels as listed" + "".join(f"; {one}" for one in wrong)
-    )
+    lines.append("; ".join([f"  {len(stated) - len(wrong)} of {len(stated)} labels as listed", *wrong]))
     held = {
         f"all peaks found within {100 * WITHIN:.1f} % or the listed spread": found == len(peaks),
         "their signs agree": min(alike.values()) == 0,
