@@ -5,8 +5,9 @@ by another method. The data have no stated licence and are not part of the proje
 says so and ends with exit code 0. Otherwise 0: all peaks found within 0.3 % or the listed spread, their signs agree but
 for one polarity, and no more than two further peaks are rather modes than not by the recordings; 1: not, with what is
 missed; 2: usage. The labels of the listing, which the signs confirm, are to be the likeliest ones. The listing need not
-be complete: it is told which of the further ones are modes that the board of the card has. Nor need it be right: where a listed peak of a frequency response is missed, it is told where fits of one pole
-have it that share nothing with `pick`. `--publish` writes the same to a page.
+be complete: it is told which of the further ones are modes that the board of the card has. Nor need it be right: where
+a listed peak of a frequency response is missed, it is told where fits of one pole have it that share nothing with
+`pick`. `--publish` writes the same to a page.
 """
 
 from __future__ import annotations
