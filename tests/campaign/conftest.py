@@ -10,12 +10,16 @@ from bayesplate.commands.fitting import FitResult
 from bayesplate.posterior.slips import Remarks
 
 
-@pytest.fixture(scope="package", autouse=True)
+@pytest.fixture(scope="module", autouse=True)
 def _no_slips():
     """Without the search for slips of the readings, which takes most of a fit and has tests of its own."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("bayesplate.posterior.posing.reading_remarks", lambda *_: Remarks((), ()))
+        leave_out_slips(patch)
         yield
+
+
+def leave_out_slips(patch):
+    patch.setattr("bayesplate.posterior.posing.reading_remarks", lambda *_: Remarks((), ()))
 
 
 @pytest.fixture(scope="package")
@@ -39,5 +43,6 @@ def fitted_campaign(card, campaign):
         return whole(result, folder) if folder.name == "board-0" else (folder / "report.html").write_text("a page")
 
     with pytest.MonkeyPatch.context() as patch:
+        leave_out_slips(patch)  # what is made for all modules comes before what is patched for each
         patch.setattr(FitResult, "write_page", first_whole)
         return bayesplate.fit(campaign, out=card.parent / "out")

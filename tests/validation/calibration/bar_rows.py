@@ -257,7 +257,7 @@ SECURITY = (
         "refused",
         tests=(
             "commands/test_batch.py::test_a_link_out",
-            "commands/test_batch.py::test_bad_rows_are_rows",
+            "commands/test_batch.py::test_names_of_boards_leave_no_folder",
         ),
     ),
     Row(
