@@ -127,6 +127,11 @@ CHECKS = (
         "intervals of the constants.",
     ),
     (
+        "roving",
+        "make roving",
+        "Responses of a sensor at six places: each mode once, and constants that hold the truth.",
+    ),
+    (
         "sand",
         "make sand",
         "Pictures of sand, uneven, partial and askew: how often the right mode is the likeliest.",
