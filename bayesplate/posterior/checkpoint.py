@@ -20,7 +20,7 @@ from bayesplate.errors import CheckpointError, UnwritableError
 from bayesplate.files import write_bytes
 from bayesplate.locks import take
 
-FORMAT = 7
+FORMAT = 8
 """To be raised whenever the same seed would give other draws, so that two programs never share one run."""
 CHAINS = "chains.h5"
 EVERY_SECONDS = 5.0

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bayesplate.posterior.checkpoint import Snapshot
 from bayesplate.posterior.mixture import Mixture
 from bayesplate.posterior.moves import moves
-from bayesplate.posterior.starts import LogDensity, finite_starts
+from bayesplate.posterior.starts import LogDensity, around_estimate, finite_starts
 from bayesplate.streams import stream
 
 Floats = NDArray[np.float64]
@@ -21,6 +21,8 @@ _PILOT_STEPS = 40
 FEWEST_ROUNDS, _MOST_ROUNDS = 3, 60
 _PAIRS_A_ROUND = 8
 """One that teaches proposals makes a round for so many pairs of parameters."""
+_TEACH_AGAIN = 1.2
+"""Times as many rounds, after which proposals are taught anew."""
 _RISE = 1.0
 """Of the mean log density from one round of the pilot to the next, from which on it is still on its way."""
 
@@ -36,12 +38,21 @@ class Ensembles:
         Lower Cholesky factor of the estimate's covariance.
     shape : (int, int)
         Ensembles, and walkers of each.
+    near : (n_draws, n_dim) array, optional
+        Draws of a density that is nearly this one.
     """
 
     def __init__(
-        self, log_density: LogDensity, centre: Floats, factor: Floats, seed: int, shape: tuple[int, int]
+        self,
+        log_density: LogDensity,
+        centre: Floats,
+        factor: Floats,
+        seed: int,
+        shape: tuple[int, int],
+        near: Floats | None = None,
     ) -> None:
         self.log_density, self.centre, self.factor, self.seed, self.shape = log_density, centre, factor, seed, shape
+        self.near = near
         self.n_steps = 0
         self._backends: list[Any] = []
 
@@ -58,9 +69,10 @@ class Ensembles:
     def pilot(self) -> Pilot:
         """The walk from the starts to where the ensembles begin."""
         rng, n_walkers = stream(self.seed, "pilot"), self.shape[0] * self.shape[1]
-        return pilot(
-            self.log_density, self.centre, self.factor, rng, n_walkers, len(self.centre) ** 2 // _PAIRS_A_ROUND
-        )
+        if self.near is not None:
+            return pilot_from(self.log_density, self.near, rng, n_walkers)
+        n_rounds = len(self.centre) ** 2 // _PAIRS_A_ROUND
+        return pilot(self.log_density, self.centre, self.factor, rng, n_walkers, n_rounds)
 
     @property
     def chain(self) -> Floats:
@@ -78,16 +90,11 @@ class Ensembles:
         states = [one.random_state for one in self._backends]
         return Snapshot(tuple(self._backends), states, self.n_steps)
 
-    @cached_property
-    def mixture(self) -> Mixture:
-        """What independent proposals are drawn from."""
-        return Mixture.fitted(self.pilot.draws)
-
     def advance(self, n_steps: int) -> None:
         """Let all ensembles make so many steps."""
         for i, backend in enumerate(self._backends):
             start = None if self.n_steps else self._start(i)
-            walk(self.log_density, self.mixture, backend, start, n_steps)
+            walk(self.log_density, self.pilot.mixture, backend, start, n_steps)
         self.n_steps += n_steps
 
     def _start(self, ensemble: int) -> Any:
@@ -127,12 +134,15 @@ class Pilot:
     ----------
     draws : (n_draws, n_dim) array
         Of its last rounds, a third of them: near the posterior.
+    mixture : Mixture
+        Fitted to its last rounds, two thirds of them.
     points : (n_walkers, n_dim) array
         Where it ended.
     log_prob : (n_walkers,) array
     """
 
     draws: Floats
+    mixture: Mixture
     points: Floats
     log_prob: Floats
 
@@ -156,15 +166,33 @@ def pilot(
     """
     import emcee
 
-    points, log_prob = finite_starts(log_density, centre, factor, n_walkers, rng)
+    points, log_prob = finite_starts(log_density, around_estimate(centre, factor, rng), n_walkers)
     start: Any = emcee.State(points, log_prob=log_prob, random_state=random_state(rng))
     backend, mixture, before = emcee.backends.Backend(), Mixture.with_covariance(centre, factor @ factor.T), -np.inf
     fewest_rounds = min(max(fewest_rounds, FEWEST_ROUNDS), _MOST_ROUNDS)
+    due = 1
     for n_rounds in range(1, _MOST_ROUNDS + 1):
         walk(log_density, mixture, backend, start, _PILOT_STEPS)
-        start, draws = None, backend.chain[-_PILOT_STEPS * -(-n_rounds // 3) :]
-        now = float(backend.log_prob[-_PILOT_STEPS:].mean())
-        if n_rounds >= fewest_rounds and now - before < _RISE:
+        start, now = None, float(backend.log_prob[-_PILOT_STEPS:].mean())
+        is_last = n_rounds == _MOST_ROUNDS or (n_rounds >= fewest_rounds and now - before < _RISE)
+        if n_rounds >= due or is_last:
+            mixture, due = (
+                Mixture.fitted(_last_rounds(backend, n_rounds, 2)),
+                max(n_rounds + 1, int(_TEACH_AGAIN * n_rounds)),
+            )
+        if is_last:
             break
-        mixture, before = Mixture.fitted(draws), now
-    return Pilot(draws.reshape(-1, len(centre)), backend.chain[-1], backend.log_prob[-1])
+        before = now
+    draws = _last_rounds(backend, n_rounds, 1).reshape(-1, len(centre))
+    return Pilot(draws, mixture, backend.chain[-1], backend.log_prob[-1])
+
+
+def _last_rounds(backend: Any, n_rounds: int, thirds: int) -> Floats:
+    """Draws of the last rounds, so many thirds of them."""
+    return np.asarray(backend.chain[-_PILOT_STEPS * max(1, thirds * n_rounds // 3) :])
+
+
+def pilot_from(log_density: LogDensity, near: Floats, rng: np.random.Generator, n_walkers: int) -> Pilot:
+    """What (n_draws, n_dim) draws of a density that is nearly this one teach without a walk."""
+    starts = finite_starts(log_density, lambda n: near[rng.integers(len(near), size=n)], n_walkers)
+    return Pilot(near, Mixture.fitted(near), *starts)

@@ -13,7 +13,7 @@ from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
 from bayesplate.posterior.statistics import effective_share, may_stand, resampled, smoothed
-from bayesplate.posterior.surrogate import Surrogate, find_surrogate, with_surrogate
+from bayesplate.posterior.surrogate import Solved, Surrogate, find_surrogate, with_surrogate
 from bayesplate.posterior.tails import TailCoordinates
 from bayesplate.posterior.target import Posterior
 from bayesplate.posterior.thinning import thin_walker_major
@@ -22,6 +22,8 @@ from bayesplate.streams import stream
 Floats = NDArray[np.float64]
 
 MOST_DRAWS_A_CHAIN, MOST_WEIGHTED_A_CHAIN = 4000, 1000
+_WALKS = "surrogate", "surrogate-taught"
+"""Walks on a surrogate, by their places in a checkpoint."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +65,8 @@ def infer(
     """Sample the posterior of a problem in coordinates that shorten its tails.
 
     Under the exact law the walkers walk on a surrogate of it, unless the law was asked for, and the draws are weighted
-    to the law by Pareto-smoothed importance sampling; where too few count, the law itself is sampled.
+    to the law by Pareto-smoothed importance sampling. Where too few count, what the law gave at them teaches the
+    surrogate, and the walk is made again; where too few count then, the law itself is sampled.
 
     Parameters
     ----------
@@ -85,29 +88,38 @@ def infer(
     )
     posterior = problem.posterior
 
-    def walked(density: Posterior, saved: Checkpoint | None) -> tuple[Chains, Convergence]:
+    def walked(density: Posterior, saved: Checkpoint | None, near: Floats | None = None) -> tuple[Chains, Convergence]:
         chains, convergence = sample(
             coordinates.density(density),
             coordinates.start,
             coordinates.start_covariance(problem.covariance),
             settings,
             names=problem.parameters.names,
+            near=None if near is None else coordinates.y(near),
             checkpoint=saved,
             progress=progress,
         )
         log_density = chains.log_prob - coordinates.log_jacobian(chains.draws)
         return Chains(coordinates.theta(chains.draws), log_density, chains.burn_in), convergence
 
-    surrogate = None
+    surrogate, near = None, None
     if posterior.law == "exact" and not problem.is_forced:
         surrogate = find_surrogate(posterior, problem.centre, problem.covariance, coordinates)
-    if surrogate is not None:
+    for part in _WALKS:
+        if surrogate is None:
+            break
         quick = with_surrogate(posterior, surrogate)
-        found = walked(quick, None if checkpoint is None else checkpoint.part("surrogate"))
-        weighted = _weighted(problem, surrogate, *found, stream(settings.seed, "weights"))
-        if weighted is not None and (weighted.convergence.ess_min >= settings.gate.ess_min or not found[1].passed):
+        found = walked(quick, None if checkpoint is None else checkpoint.part(part), near)
+        weighted, solved = _weighted(problem, surrogate, *found, stream(settings.seed, "weights"))
+        is_walked = found[1].passed
+        if weighted is not None and (weighted.convergence.ess_min >= settings.gate.ess_min or not is_walked):
             return weighted
-    chains, convergence = walked(posterior, checkpoint)
+        if not is_walked:
+            break
+        near = found[0].pooled
+        log_jacobian = coordinates.log_jacobian(coordinates.y(solved.theta))
+        surrogate = surrogate.taught(solved._replace(log_density=solved.log_density + log_jacobian))
+    chains, convergence = walked(posterior, checkpoint, near)
     theta, log_posterior = (
         thin_walker_major(part, chains.burn_in, convergence.tau_max, n_draws_max=MOST_DRAWS_A_CHAIN)
         for part in (chains.draws, chains.log_prob)
@@ -117,30 +129,36 @@ def infer(
 
 def _weighted(
     problem: PosedProblem, surrogate: Surrogate, chains: Chains, convergence: Convergence, rng: np.random.Generator
-) -> Inference | None:
-    """Draws of a surrogate's posterior, drawn again by their weights under the law; None where too few count."""
+) -> tuple[Inference | None, Solved]:
+    """Draws of a surrogate's posterior, drawn again by their weights under the law, and what that gives at them.
+
+    None where too few count.
+    """
     posterior = problem.posterior
     thinned, log_walked = (
         thin_walker_major(part, chains.burn_in, convergence.tau_max, n_draws_max=MOST_WEIGHTED_A_CHAIN)
         for part in (chains.draws, chains.log_prob)
     )
     n_chains, n_draws, n_dim = thinned.shape
-    log_posterior, log_frequency = posterior.evaluate(thinned.reshape(-1, n_dim))
+    theta = thinned.reshape(-1, n_dim)
+    log_posterior, log_frequency = posterior.evaluate(theta)
+    solved = Solved(theta, log_frequency, log_posterior)
     weights, pareto_k = smoothed(log_posterior - log_walked.ravel())
     if not may_stand(weights, pareto_k):
-        return None
+        return None, solved
     picked = np.concatenate(
         [i * n_draws + resampled(part, n_draws, rng) for i, part in enumerate(weights.reshape(n_chains, -1))]
     )
     share = effective_share(weights)
     ess = np.minimum(convergence.ess, thinned[..., 0].size) * share
-    return Inference(
+    inference = Inference(
         problem,
         chains,
         replace(convergence, ess=ess, ess_min=float(ess.min())),
-        thinned.reshape(-1, n_dim)[picked].reshape(thinned.shape),
+        theta[picked].reshape(thinned.shape),
         log_posterior[picked].reshape(n_chains, n_draws),
         tuple(posterior.by_setup(log_frequency[picked])),
         surrogate,
         pareto_k,
     )
+    return inference, solved

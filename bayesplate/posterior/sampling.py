@@ -149,6 +149,7 @@ def sample(
     settings: SamplerSettings,
     *,
     names: Sequence[str] = (),
+    near: Floats | None = None,
     checkpoint: Checkpoint | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> tuple[Chains, Convergence]:
@@ -166,6 +167,8 @@ def sample(
         Its covariance; the walkers start three times as wide.
     names : sequence of str, optional
         Parameter names for messages.
+    near : (n_draws, n_dim) array, optional
+        Draws of a density that is nearly this one: the walkers start at some of them, and not around the estimate.
     checkpoint : Checkpoint, optional
         Where the chains are saved every few seconds, and where an unfinished run is continued from.
     progress : callable, optional
@@ -190,7 +193,8 @@ def sample(
     n_walkers = settings.walkers(n_dim := len(centre))
     names = tuple(names) or tuple(f"parameter {dim + 1}" for dim in range(n_dim))
     starts = np.asarray(centre), cholesky_factor(covariance)
-    ensembles = Ensembles(guarded(log_density, names), *starts, settings.seed, (settings.n_ensembles, n_walkers))
+    shape = settings.n_ensembles, n_walkers
+    ensembles = Ensembles(guarded(log_density, names), *starts, settings.seed, shape, near)
     identity = {"seed": settings.seed, "n_ensembles": settings.n_ensembles, "n_walkers": n_walkers, "n_dim": n_dim}
     kept = nullcontext() if checkpoint is None else checkpoint.session(**identity, chunk_steps=settings.chunk_steps)
     with kept as session:

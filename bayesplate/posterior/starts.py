@@ -67,23 +67,26 @@ def cholesky_factor(covariance: Floats) -> Floats:
         ) from None
 
 
-def finite_starts(
-    log_density: LogDensity, centre: Floats, factor: Floats, n_walkers: int, rng: np.random.Generator
-) -> tuple[Floats, Floats]:
-    """Points around the estimate, drawn again and again those outside the support, and their log densities.
+def around_estimate(centre: Floats, factor: Floats, rng: np.random.Generator) -> Callable[[int], Floats]:
+    """So many points three standard errors around the estimate, from the Cholesky factor of its covariance."""
+    return lambda n: centre + _SPREAD * rng.standard_normal((n, len(centre))) @ factor.T
+
+
+def finite_starts(log_density: LogDensity, drawn: Callable[[int], Floats], n_walkers: int) -> tuple[Floats, Floats]:
+    """Points, drawn again and again those outside the support, and their log densities.
 
     Raises
     ------
     NotConvergedError
         If there are too few points of finite log density.
     """
-    points = np.empty((n_walkers, len(centre)))
-    log_prob = np.full(n_walkers, -np.inf)
+    points = drawn(n_walkers)
+    log_prob = np.asarray(log_density(points))
     for _ in range(_TRIES):
         outside = np.flatnonzero(log_prob == -np.inf)
         if outside.size == 0:
             return points, log_prob
-        points[outside] = centre + _SPREAD * rng.standard_normal((outside.size, len(centre))) @ factor.T
+        points[outside] = drawn(outside.size)
         log_prob[outside] = log_density(points[outside])
     raise NotConvergedError(
         f"start of the sampler: wanted {n_walkers} points of finite posterior around the estimate, got "

@@ -59,6 +59,10 @@ class Solved(NamedTuple):
         """Some of the points."""
         return Solved(*(part[kept] for part in self))
 
+    def beside(self, *others: Solved) -> Solved:
+        """These points and others."""
+        return Solved(*(np.concatenate(parts) for parts in zip(self, *others, strict=True)))
+
     @property
     def weights(self) -> Floats:
         """What each point counts for in a fit: the density, tempered, so that far ones hardly matter; (n,) array."""
@@ -81,6 +85,8 @@ class Surrogate:
         For each order above the second directions of u, the one first along which ln f is bent most.
     coefficients : (n_terms, n_modes) array
         Of 1, u_i, u_i u_j, and of the products of so many coordinates along `bent`.
+    points : Solved
+        That it was fitted to.
     """
 
     columns: NDArray[np.intp]
@@ -88,6 +94,7 @@ class Surrogate:
     whitening: Floats
     bent: Mapping[int, Floats]
     coefficients: Floats
+    points: Solved
 
     @classmethod
     def fitted(cls, points: Solved, columns: NDArray[np.intp], along_bent: Mapping[int, int] = ALONG_BENT) -> Surrogate:
@@ -106,15 +113,19 @@ class Surrogate:
         factor = np.linalg.cholesky(np.atleast_2d(np.cov(x.T, aweights=weights)))
         centre = np.average(x, axis=0, weights=weights)
         none = np.empty((0, points.log_frequency.shape[1]))
-        second = cls(columns, centre, np.asarray(np.linalg.inv(factor).T), {}, none)._fitted_to(points)
+        second = cls(columns, centre, np.asarray(np.linalg.inv(factor).T), {}, none, points)._fitted()
         if weights.sum() ** 2 < _POINTS_PER_TERM * n_terms(columns.size, along_bent) * (weights**2).sum():
             return second
         most_bent = second._most_bent()
-        return replace(second, bent={order: most_bent[:n] for order, n in along_bent.items()})._fitted_to(points)
+        return replace(second, bent={order: most_bent[:n] for order, n in along_bent.items()})._fitted()
 
-    def _fitted_to(self, points: Solved) -> Surrogate:
-        roots = np.sqrt(points.weights)[:, None]
-        found = np.linalg.lstsq(roots * self._terms(points.theta), roots * points.log_frequency, rcond=None)[0]
+    def taught(self, *further: Solved) -> Surrogate:
+        """The same fitted to further points too."""
+        return Surrogate.fitted(self.points.beside(*further), self.columns)
+
+    def _fitted(self) -> Surrogate:
+        roots, terms = np.sqrt(self.points.weights)[:, None], self._terms(self.points.theta)
+        found = np.linalg.lstsq(roots * terms, roots * self.points.log_frequency, rcond=None)[0]
         return replace(self, coefficients=np.asarray(found, dtype=np.float64))
 
     def _most_bent(self) -> Floats:
@@ -213,9 +224,8 @@ def find_surrogate(
     factor = cholesky_factor(coordinates.start_covariance(covariance))
     theta = rng.multivariate_normal(centre, _WIDER**2 * covariance, n_points)
     theta[:, columns] = np.clip(theta[:, columns], bounds.lower, bounds.upper)
-    points = _solved(posterior, coordinates, theta)
+    surrogate = Surrogate.fitted(_solved(posterior, coordinates, theta), columns)
     for _ in range(_MOST_ROUNDS):
-        surrogate = Surrogate.fitted(points, columns)
         density = coordinates.density(with_surrogate(posterior, surrogate))
         walked = pilot(density, coordinates.start, factor, rng).draws
         y = walked[rng.choice(len(walked), n_points, replace=False)]
@@ -228,7 +238,7 @@ def find_surrogate(
         lacks = share_lacking(further_out.log_density, density(y), proposal.log_density(y))
         if may_stand(weights, pareto_k) and effective_share(weights) >= _GOOD_SHARE and lacks <= _MAY_LACK:
             return surrogate
-        points = Solved(*(np.concatenate(parts) for parts in zip(points, solved, further_out, strict=True)))
+        surrogate = surrogate.taught(solved, further_out)
     return None
 
 
