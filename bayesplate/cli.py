@@ -171,10 +171,8 @@ def command(answer: Callable[..., Answer]) -> Command:
 @command
 def check(run: Callable[..., Any], **asked: Any) -> Answer:
     """Every fault of CARD, or what a fit of it can identify."""
-    from bayesplate.commands.shown import show_check
-
     report = run(**asked)
-    return Answer(report, lambda: show_check(report))
+    return Answer(report, report.shown)
 
 
 @command
@@ -183,19 +181,15 @@ def fit(run: Callable[..., Any], **asked: Any) -> Answer:
 
     Writes report.html, summary.json and posterior.nc.
     """
-    from bayesplate.commands.shown import show_fit
-
     result = run(**asked)
-    return Answer(result.summary, lambda: show_fit(result.summary), f"written to {result.folder}")
+    return Answer(result.summary, result.shown, f"written to {result.folder}")
 
 
 @command
 def modes(run: Callable[..., Any], **asked: Any) -> Answer:
     """Lowest modes of CARD, and a sheet of their Chladni figures."""
-    from bayesplate.commands.shown import show_modes
-
     result = run(**asked)
-    return Answer(result.summary, lambda: show_modes(result.summary))
+    return Answer(result.summary, result.shown)
 
 
 @command
@@ -204,10 +198,8 @@ def compare(run: Callable[..., Any], **asked: Any) -> Answer:
 
     Each as a thin and as a shear-flexible plate.
     """
-    from bayesplate.commands.shown import show_compare
-
     result = run(**asked)
-    return Answer(result, lambda: show_compare(result))
+    return Answer(result, result.shown)
 
 
 @command
@@ -216,10 +208,8 @@ def diagnose(run: Callable[..., Any], **asked: Any) -> Answer:
 
     Adds the effect, and reports the error before and after.
     """
-    from bayesplate.commands.shown import show_diagnosis
-
     result = run(**asked)
-    return Answer(result.to_json(), lambda: show_diagnosis(result.diagnosis), f"written to {result.folder}")
+    return Answer(result.to_json(), result.shown, f"written to {result.folder}")
 
 
 @command
@@ -228,11 +218,9 @@ def plan(run: Callable[..., Any], **asked: Any) -> Answer:
 
     Ranks measurements by what they are expected to give and what they cost.
     """
-    from bayesplate.commands.shown import show_plan
-
     result = run(**asked)
     closing = f"written to {asked['out']}: {', '.join(path.name for path in result.files)}"
-    return Answer(result.summary, lambda: show_plan(result.summary), closing)
+    return Answer(result.summary, result.shown, closing)
 
 
 @command
@@ -263,13 +251,12 @@ def pick(run: Callable[..., Any], **asked: Any) -> Answer:
     Writes the [setup] that a card takes, too.
     """
     from bayesplate.commands.pick import FRAGMENT, PAGE
-    from bayesplate.commands.pick_words import show_pick
 
     out = asked["out"]
     result = run(**asked)
     completes = f"{quote(asked.get('card') or 'CARD')} --setup {quote(f'{out}/{FRAGMENT}')}"
     closing = f"written to {out}: {FRAGMENT}, {PAGE}. Next: bayesplate fit {completes}"
-    return Answer(result.summary, lambda: show_pick(result.summary), closing)
+    return Answer(result.summary, result.shown, closing)
 
 
 @command
@@ -288,8 +275,6 @@ def batch(run: Callable[..., Any], **asked: Any) -> Answer:
 
     One table of all, and a page that grades them. SOURCE is the folder or the table.
     """
-    from bayesplate.commands.shown import show_batch
-
     result = run(**asked)
     closing = f"written to {result.folder}"
-    return Answer(result.summary, lambda: show_batch(result.summary, result.grading), closing, result.require_all)
+    return Answer(result.summary, result.shown, closing, result.require_all)

@@ -38,6 +38,7 @@ from bayesplate.commands.options import (
     path_option,
 )
 from bayesplate.commands.prepare import prepared_card
+from bayesplate.commands.shown import Shown, show_batch
 from bayesplate.commands.workers import Call, WorkerDied, computed, dask_cluster, processes
 from bayesplate.errors import (
     BatchError,
@@ -167,6 +168,10 @@ class BatchResult:
         """Raise BatchError where a board was not fitted."""
         if self.summary.n_failed:
             raise BatchError(self.summary.failures_text(self.table.name))
+
+    def shown(self) -> Shown:
+        """What a person is shown of it."""
+        return show_batch(self.summary, self.grading)
 
     def __repr__(self) -> str:
         return f"<BatchResult: {self.summary.n_fitted} of {self.summary.n_boards} boards fitted, {self.table}>"

@@ -36,7 +36,7 @@ from bayesplate.commands.campaign_fit import (
     summed_up,
 )
 from bayesplate.commands.fitting import FIT, FitResult, Run, Stages
-from bayesplate.commands.shown import show_diagnosis
+from bayesplate.commands.shown import Shown, show_campaign_diagnosis
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.forms import forms
 from bayesplate.effects import EFFECTS
@@ -89,9 +89,13 @@ class CampaignDiagnoseResult:
         content: dict[str, Any] = as_json(self.diagnosis)
         return content
 
+    def shown(self) -> Shown:
+        """What a person is shown of it."""
+        return show_campaign_diagnosis(self.diagnosis)
+
     def _repr_html_(self) -> str:
         """The verdict and its tables as a notebook shows them."""
-        return show_diagnosis(self.diagnosis).html(self.diagnosis.name)
+        return self.shown().html(self.diagnosis.name)
 
     def __repr__(self) -> str:
         one = self.diagnosis

@@ -31,7 +31,7 @@ from bayesplate.campaign.summary import (
 )
 from bayesplate.commands.campaign import Campaign
 from bayesplate.commands.fitting import FIT, FitResult, Run, Stages, not_converged
-from bayesplate.commands.shown import show_fit
+from bayesplate.commands.shown import Shown, show_campaign_fit
 from bayesplate.errors import Fault, InputError, NotConvergedError
 from bayesplate.files import write_text, writing
 from bayesplate.posterior.assessment import assess
@@ -135,9 +135,13 @@ class CampaignFitResult:
             with writing(folder / PAGE):
                 write_campaign_report(folder, self.campaign.card.title, self.summary, diagnosis)
 
+    def shown(self) -> Shown:
+        """What a person is shown of it."""
+        return show_campaign_fit(self.summary)
+
     def _repr_html_(self) -> str:
         """The tables as a notebook shows them."""
-        return show_fit(self.summary).html(self.campaign.card.title or self.campaign.name)
+        return self.shown().html(self.campaign.card.title or self.campaign.name)
 
     def __repr__(self) -> str:
         return repr(self.summary).replace("<CampaignSummary", "<CampaignFitResult", 1)

@@ -15,11 +15,11 @@ from bayesplate.campaign.pulls import Pull, moments_before
 from bayesplate.campaign.scatter import expected_width
 from bayesplate.campaign.shared import Shared
 from bayesplate.commands.arguments import checked
-from bayesplate.commands.campaign import Campaign, problem_or_campaign
+from bayesplate.commands.campaign import Campaign, by_kind
 from bayesplate.commands.options import CARD, Effects, SetupFile
 from bayesplate.commands.prepare import Card
 from bayesplate.commands.problem import Problem
-from bayesplate.commands.shown import show_check
+from bayesplate.commands.shown import Shown, show_campaign_check, show_check
 from bayesplate.diagnosis.signatures import INVISIBLE, Signature, look_alikes, signatures
 from bayesplate.diagnosis.terms import normalised
 from bayesplate.estimates.identifiability import remarks
@@ -59,9 +59,25 @@ class CheckResult(CheckReport):
     def __repr__(self) -> str:
         return super().__repr__().replace("<CheckReport", "<CheckResult", 1)
 
+    def shown(self) -> Shown:
+        """What a person is shown of it."""
+        return show_check(self)
+
     def _repr_html_(self) -> str:
         """The tables as a notebook shows them."""
-        return show_check(self).html(self.title or self.name)
+        return self.shown().html(self.title or self.name)
+
+
+class CampaignCheckResult(CampaignCheck):
+    """What a check of a campaign leaves: all of `CampaignCheck`."""
+
+    def shown(self) -> Shown:
+        """What a person is shown of it."""
+        return show_campaign_check(self)
+
+    def _repr_html_(self) -> str:
+        """The tables as a notebook shows them."""
+        return self.shown().html(self.title or self.name)
 
 
 @checked()
@@ -91,8 +107,7 @@ def check(
     InputError, NotIdentifiableError
         As `fit` would.
     """
-    given = problem_or_campaign(card, effects=effects, setup=setup)
-    return _check_campaign(given) if isinstance(given, Campaign) else _check_board(given)
+    return by_kind(card, _check_board, _check_campaign, effects=effects, setup=setup)
 
 
 def _check_board(given: Problem, *, candidates: bool = True) -> CheckResult:
@@ -180,11 +195,11 @@ def expected_sd(problem: PosedProblem) -> dict[str, float]:
     return {name: float(np.nanstd(np.log(v))) for name, v in zip(MODULI, constants, strict=True)}
 
 
-def _check_campaign(campaign: Campaign) -> CampaignCheck:
+def _check_campaign(campaign: Campaign) -> CampaignCheckResult:
     """What each board and all together would tell."""
     campaign.pose()
     population = campaign.population
-    return CampaignCheck(
+    return CampaignCheckResult(
         name=campaign.name,
         title=campaign.card.title,
         shared=_shared(campaign) if campaign.shared else {},

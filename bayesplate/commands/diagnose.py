@@ -15,12 +15,13 @@ from bayesplate.board.material import MODULI
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.values import Key
 from bayesplate.commands.arguments import checked, whole
-from bayesplate.commands.campaign import Campaign, problem_or_campaign
+from bayesplate.commands.campaign import Campaign, by_kind
 from bayesplate.commands.campaign_diagnose import CampaignDiagnoseResult, diagnose_campaign
 from bayesplate.commands.fitting import FIT, FitResult, Run, with_board
 from bayesplate.commands.options import CARD, Effects, Force, OnProgress, Out, Report, Resume, Seed, SetupFile
 from bayesplate.commands.prepare import Card
 from bayesplate.commands.problem import Problem
+from bayesplate.commands.shown import Shown, show_diagnosis
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.claim import Claim, judge_claim, named_in_part, nested_of
 from bayesplate.diagnosis.findings import Case, Side, diagnosis_of
@@ -92,6 +93,10 @@ class DiagnoseResult:
         """The content of diagnosis.json."""
         return diagnosis_json(self.diagnosis)
 
+    def shown(self) -> Shown:
+        """What a person is shown of it."""
+        return show_diagnosis(self.diagnosis)
+
     def __repr__(self) -> str:
         return repr(self.diagnosis).replace("<Diagnosis", "<DiagnoseResult", 1)
 
@@ -151,10 +156,18 @@ def diagnose(
     InputError, NotIdentifiableError, NotConvergedError, CheckpointError
         As `bayesplate.fit`, of the fit without further effects; also if a problem asks for robust noise.
     """
-    problem = problem_or_campaign(card, effects=effects, setup=setup)
     run = Run(seed, out, force=force, resume=resume, progress=progress)
-    if isinstance(problem, Campaign):
-        return diagnose_campaign(problem, run, report=report)
+    return by_kind(
+        card,
+        lambda problem: _diagnose_board(problem, run, n_null, report=report),
+        lambda campaign: diagnose_campaign(campaign, run, report=report),
+        effects=effects,
+        setup=setup,
+    )
+
+
+def _diagnose_board(problem: Problem, run: Run, n_null: int, *, report: bool) -> DiagnoseResult:
+    """Fit, search, control and refit one board, and write what was found."""
     if problem.robust:
         wanted = "a problem with normal noise, which the search for an effect assumes"
         raise InputError(Fault("robust", wanted, "Student's distribution"))
@@ -167,7 +180,7 @@ def diagnose(
     stages.begin("effects that are known", _KNOWN)
     known = known_fits(posed, stages.reached)
     stages.begin("the same search on simulated boards", _CONTROL)
-    control = null_control(ground, np.random.default_rng([seed, _NULL_LINE]), n_null, found.against_none)
+    control = null_control(ground, np.random.default_rng([run.seed, _NULL_LINE]), n_null, found.against_none)
     verdict = decide(found, control)
     folded = nested_of(found, control, verdict.tried)
     in_part = named_in_part(found, verdict, folded)
@@ -205,7 +218,7 @@ def diagnose(
             before=sides[0],
             after=sides[last],
             claim=judge_claim(found, verdict, control, folded) if last else Claim(),
-            recommendation=advice(found, verdict, before.problem.prior, seed),
+            recommendation=advice(found, verdict, before.problem.prior, run.seed),
             known=known,
             stated_claims=stated_claims(posed, known) if known else (),
             finalists=[(one, sides[one.index]) for one in finals if one.index in sides],

@@ -13,7 +13,7 @@ from typing import Any
 
 from bayesplate.board.board import Board
 from bayesplate.commands.problem import Problem, pose_all
-from bayesplate.commands.shown import show_fit
+from bayesplate.commands.shown import Shown, show_fit
 from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.errors import CheckpointError, NotConvergedError
 from bayesplate.files import make_folder, write_text, writing
@@ -102,9 +102,13 @@ class FitResult:
     def __repr__(self) -> str:
         return repr(self.summary).replace("<Summary", "<FitResult", 1)
 
+    def shown(self) -> Shown:
+        """What a person is shown of it."""
+        return show_fit(self.summary)
+
     def _repr_html_(self) -> str:
         """The tables as a notebook shows them."""
-        return show_fit(self.summary).html(self.problem.board.title or self.summary.name)
+        return self.shown().html(self.problem.board.title or self.summary.name)
 
 
 @dataclass
@@ -229,6 +233,18 @@ class Run:
         progress = self.stages.sampled if stage else self.stages.tell
         failure = self.path if tells_failure else None
         return fitted(problem, self.seed, checkpoints, progress, of=of, failure=failure)
+
+
+def fit_problem(problem: Problem, run: Run, *, report: bool) -> FitResult:
+    """The whole run of one fit; `bayesplate.fit` says what is raised."""
+    run.open({"": problem})
+    result = replace(run.fit(problem, tells_failure=True), folder=run.path)
+    if run.folder is not None:
+        result.write(run.folder.path)
+        if report:
+            result.write_page(run.folder.path)
+        run.folder.close()
+    return result
 
 
 def with_board(problem: Problem, board: Board) -> Problem:

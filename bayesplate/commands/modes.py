@@ -14,7 +14,7 @@ from bayesplate.commands.arguments import checked
 from bayesplate.commands.options import CARD, Effects, Force, Out, Seed, SetupFile
 from bayesplate.commands.prepare import Card, Prepared
 from bayesplate.commands.problem import Problem, as_problem
-from bayesplate.commands.shown import show_modes
+from bayesplate.commands.shown import Shown, show_modes
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.identifiability import identifiability, require_identifiable, require_labels
 from bayesplate.estimates.least_squares import weighted_least_squares
@@ -59,9 +59,13 @@ class ModesResult:
     def __repr__(self) -> str:
         return repr(self.summary).replace("<ModesReport", "<ModesResult", 1)
 
+    def shown(self) -> Shown:
+        """What a person is shown of it."""
+        return show_modes(self.summary)
+
     def _repr_html_(self) -> str:
         """The table as a notebook shows it."""
-        return show_modes(self.summary).html(self.summary.title or self.summary.name)
+        return self.shown().html(self.summary.title or self.summary.name)
 
 
 @checked()
