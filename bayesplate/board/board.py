@@ -338,14 +338,7 @@ class Board:
         )
 
     def assuming(self, prior: PriorCard | None, tables: Mapping[str, CoefficientCard] | None = None) -> Board:
-        """The board with what nobody stated of it taken from a prior, as far as that states it.
-
-        Parameters
-        ----------
-        prior : PriorCard or None
-        tables : dict of CoefficientCard, optional
-            By setup, those that the card names.
-        """
+        """The board with what nobody stated of it taken from a prior; `tables`: coefficients that its card names."""
         poisson = (prior and prior.poisson_xy) or usual_poisson(self.isotropic)
         setups = [one.assuming_noise(prior) if one.is_noise_assumed else one for one in self.setups]
         if tables is not None:
@@ -498,22 +491,12 @@ def made_board(
     name: str,
     inputs: Mapping[str, Quantity],
     setups: Sequence[Setup],
-    assumed_poisson: Quantity | None = None,
+    assumed_poisson: Quantity | None = None,  # where `inputs` has none
     **more: Any,
 ) -> Board:
-    """A board from quantities in SI units, without a card.
+    """A board from quantities in SI units, without a card; `more` are other attributes of `Board`.
 
-    Parameters
-    ----------
-    inputs : dict of Quantity
-        length_x, length_y, thickness (m), mass (kg) or density (kg m^-3), and poisson_xy. A thickness or a width that
-        was read at places becomes the mean over the board of the field that the readings tell of.
-    setups : sequence of Setup
-        What their clamps cover becomes parameters too.
-    assumed_poisson : Quantity, optional
-        A Poisson ratio that nobody stated, where `inputs` has none.
-    **more
-        Other attributes of `Board`.
+    A thickness or a width that was read at places becomes the mean over the board of the field of the readings.
     """
     inputs = {**inputs, **_means_of_fields(inputs)}
     assumed = {} if assumed_poisson is None else {"poisson_xy": assumed_poisson}

@@ -128,20 +128,7 @@ class BoardKeys(Section):
 def read_board(
     card: CardFile, may_lack_frequencies: bool = False, setup: str | os.PathLike[str] | None = None
 ) -> tuple[BoardKeys, CardFile]:
-    """The keys of a card, and the card with a fragment that completes it.
-
-    Parameters
-    ----------
-    may_lack_frequencies : bool
-        Whether a board that was not measured yet will do.
-    setup : str or path, optional
-        A file with a table [setup] that takes the place of the card's, key by key.
-
-    Raises
-    ------
-    InputError
-        With every fault of the card at once.
-    """
+    """The keys of a card, and the card with the fragment that completes it; InputError has every fault at once."""
     table, file = card.table, card.shown
     if {*table} == {"setup"} and isinstance(table["setup"], dict):
         remedy = f"it completes a card: CARD --setup {file}"

@@ -54,17 +54,11 @@ def _as_list(value: object) -> list[Any]:
 
 
 class SharedSection(Section):
-    """An effect whose parameters all boards have in common: their values, or their ratios to the boards' moduli.
-
-    Attributes
-    ----------
-    scatter_percent : float
-        Scale of what the boards' own are believed to differ by from what they have in common; 0 if by nothing.
-    """
+    """An effect whose parameters all boards have in common: their values, or their ratios to the boards' moduli."""
 
     effect: Annotated[str, Key(read_effect)] = Field(description="the name of an effect")
     way: Annotated[Way, Key(Choice(WAYS))] = Field(default="value", alias="as")
-    scatter_percent: Annotated[float, Key(Number(0.1, 100, "%"))] = 0.0
+    scatter_percent: Annotated[float, Key(Number(0.1, 100, "%"))] = 0.0  # scale by which a board's own may differ
 
 
 class PopulationSection(Section):
@@ -112,26 +106,12 @@ class CampaignCard(Section):
 
 
 def load_campaign(name_or_path: str | os.PathLike[str]) -> CampaignCard:
-    """Read a campaign card; the cards of its boards are not read.
-
-    Parameters
-    ----------
-    name_or_path : str or path
-        Name of a shipped card, or a path: it contains a separator or ends in .toml.
-
-    Raises
-    ------
-    InputError
-        If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at once.
-    """
+    """Read a campaign card, a shipped one by its name or a path; raises InputError with every fault at once."""
     return validated(CampaignCard, CardFile.load("campaigns", name_or_path), _twice)
 
 
 def is_campaign(name_or_path: object) -> bool:
-    """Whether what a command was given is a campaign: the name of one, or a card that lists boards.
-
-    A file that cannot be read is none: whoever reads it as a board says what is wrong with it.
-    """
+    """Whether it is the name of a campaign, or a card that lists boards; a file that cannot be read is none."""
     if not isinstance(name_or_path, str | os.PathLike):
         return False
     text = os.fspath(name_or_path)

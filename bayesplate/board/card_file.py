@@ -18,22 +18,12 @@ from bayesplate.errors import plain
 
 @dataclass(frozen=True)
 class CardFile:
-    """What a file states, before anything is assumed; or what it would state, for a card that has none.
-
-    Attributes
-    ----------
-    name : str
-        Of the file.
-    folder : Path or None
-        In which cards are looked for that it names by a relative path; None: the working directory.
-    read : str
-        The text of the file; empty where the table was made otherwise.
-    """
+    """What a file states, before anything is assumed; or what it would state, for a card that has none."""
 
     table: Mapping[str, Any]
     name: str
-    folder: Path | None = None
-    read: str = ""
+    folder: Path | None = None  # where the cards stand that it names by a relative path
+    read: str = ""  # the text of the file; empty where the table was made otherwise
 
     @classmethod
     def load(cls, kind: CardKind, name_or_path: str | os.PathLike[str], beside: Path | None = None) -> CardFile:

@@ -45,14 +45,7 @@ _STEPS = {
 
 
 def physical_faults(board: Board) -> list[Fault]:
-    """Every physical fault of a board.
-
-    Returns
-    -------
-    list of Fault
-        Empty if there is none. Cards that it names and that cannot be read are found where they are read, labels that
-        no mode of the board has where modes are computed, effects that cannot act where effects are known, not here.
-    """
+    """Every physical fault of a board that shows without its modes, its effects and the cards that it names."""
     rows = [*_plate(board), *_isotropic(board)]
     for setup, where in zip(board.setups, setup_places(board.file, [one.name for one in board.setups]), strict=True):
         rows += [
@@ -71,13 +64,7 @@ def faults_of(rows: Collection[Row] | Iterator[Row]) -> list[Fault]:
 
 
 def remarks(board: Board, effects: Collection[str]) -> tuple[str, ...]:
-    """What the user of a board should know before its numbers.
-
-    Parameters
-    ----------
-    effects : collection of str
-        Names of the declared effects.
-    """
+    """What the user of a board should know before its numbers; `effects` are the declared ones."""
     rows = [*_assumed(board)]
     for setup in board.setups:
         rows += [_thick(board, setup, effects), *_vague(setup), _finer_than_said(setup), *_twice(setup)]

@@ -124,18 +124,5 @@ class CoefficientCard(Section):
 
 
 def load_coefficients(name_or_path: str | os.PathLike[str], beside: Path | None = None) -> CoefficientCard:
-    """Read a coefficient table.
-
-    Parameters
-    ----------
-    name_or_path : str or path
-        Name of a shipped card, or a path: it contains a separator or ends in .toml.
-    beside : Path, optional
-        Folder that a relative path starts from: that of the board card which names the table.
-
-    Raises
-    ------
-    InputError
-        If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at once.
-    """
+    """Read a coefficient table, shipped or a path from the folder `beside`; InputError names every fault at once."""
     return validated(CoefficientCard, CardFile.load("coefficients", name_or_path, beside))

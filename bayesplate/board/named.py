@@ -18,35 +18,17 @@ Card = TypeVar("Card", PriorCard, CoefficientCard)
 
 @dataclass(frozen=True)
 class NamedCards:
-    """What a board card names, each read once; a relative path starts from the folder of the board card.
+    """What a board card names, each read once; a relative path starts from the folder of the board card."""
 
-    Attributes
-    ----------
-    prior : PriorCard or None
-        None if it cannot be read.
-    tables : dict of CoefficientCard
-        By setup, those that can be read.
-    faults : tuple of Fault
-        Of the cards that cannot, with the place where each was named.
-    """
-
-    prior: PriorCard | None
-    tables: Mapping[str, CoefficientCard]
-    faults: tuple[Fault, ...]
+    prior: PriorCard | None  # None if it cannot be read
+    tables: Mapping[str, CoefficientCard]  # by setup, as far as they can be read
+    faults: tuple[Fault, ...]  # of the others, with the place where each was named
 
 
 def load_named(
     board: Board, prior: PriorCard | None = None, tables: Mapping[str, CoefficientCard] | None = None
 ) -> NamedCards:
-    """Read every card that a board card names and that is not given.
-
-    Parameters
-    ----------
-    prior : PriorCard, optional
-        In place of the one that the card names.
-    tables : dict of CoefficientCard, optional
-        By setup, in place of those that the card names.
-    """
+    """Read every card that a board card names and that is not given; tables are by setup."""
     file, beside = board.file, board.folder
     faults: list[Fault] = []
     where = f"{file} [material] prior"

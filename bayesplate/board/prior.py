@@ -290,20 +290,7 @@ class PriorCard(Section):
 
 
 def load_prior(name_or_path: str | os.PathLike[str], beside: Path | None = None) -> PriorCard:
-    """Read a prior card.
-
-    Parameters
-    ----------
-    name_or_path : str or path
-        Name of a shipped card, or a path: it contains a separator or ends in .toml.
-    beside : Path, optional
-        Folder that a relative path starts from: that of the board card which names the prior.
-
-    Raises
-    ------
-    InputError
-        If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at once.
-    """
+    """Read a prior card, a shipped one or a path from the folder `beside`; InputError names every fault at once."""
     return validated(PriorCard, CardFile.load("priors", name_or_path, beside), _set_faults)
 
 

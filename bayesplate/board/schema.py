@@ -36,22 +36,9 @@ def validated(
     context: Mapping[str, Any] | None = None,
     file: str = "",
 ) -> CardModel:
-    """A card from the table of its file.
+    """A card from the table of its file; raises InputError with every fault at once.
 
-    Parameters
-    ----------
-    faults_of : callable
-        What is wrong with keys beside one another, from the raw table and the file's name as messages show it: these
-        faults are reported together with those of single keys.
-    context : mapping, optional
-        Handed to the model.
-    file : str
-        In place of the file's name in messages.
-
-    Raises
-    ------
-    InputError
-        With every fault of the card at once, the first fifty written out.
+    `faults_of` tells what is wrong with keys beside one another, from the raw table and the file's name in messages.
     """
     table, file = card.table, file or card.shown
     found = [*_name_faults(table, file, card.stem), *faults_of(table, file)]

@@ -18,15 +18,7 @@ _CHECKOUT = _PACKAGE.parent / "models"
 
 
 def shelf_folder(kind: CardKind) -> Path:
-    """The folder of the shipped cards of one kind.
-
-    An installed package carries its cards in `bayesplate/models`; an editable install reads `models/` of the checkout.
-
-    Raises
-    ------
-    InputError
-        If neither folder exists; names both.
-    """
+    """The folder of the shipped cards of one kind, in the package or the checkout; InputError if there is none."""
     for shelf in (_INSTALLED, _CHECKOUT):
         if (shelf / kind).is_dir():
             return shelf / kind
@@ -40,20 +32,9 @@ def card_names(kind: CardKind) -> tuple[str, ...]:
 
 
 def find(kind: CardKind, name_or_path: str | os.PathLike[str], beside: Path | None = None) -> Path:
-    """The file of a card.
+    """The file of a card: a path, from the folder `beside`, if it looks like one, otherwise a name on the shelf.
 
-    Parameters
-    ----------
-    kind : {"boards", "priors", "coefficients", "campaigns"}
-    name_or_path : str or path
-        A path if it contains a separator, ends in .toml or is a path object; otherwise the name of a shipped card.
-    beside : Path, optional
-        Folder that a relative path starts from; the working directory if not given.
-
-    Raises
-    ------
-    InputError
-        If a name is not on the shelf; names the shelf, the nearest card, and how to write a path.
+    Raises InputError if a name is not on the shelf, with the nearest card and how to write a path.
     """
     text = os.fspath(name_or_path)
     if isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or any(mark in text for mark in "/\\"):

@@ -25,35 +25,19 @@ _AIR = (
 
 @dataclass(frozen=True)
 class Starter:
-    """What somebody knows of a board before its first card.
-
-    Attributes
-    ----------
-    sizes : dict of float
-        Any of length_x, length_y, thickness (mm), mass (g).
-    edges : dict of str
-        Condition of x0, x1, y0 and y1.
-    frequencies : dict of float
-        Label to Hz.
-    """
+    """What somebody knows of a board before its first card."""
 
     name: str
     title: str = ""
     notes: str = ""
-    sizes: Mapping[str, float] = field(default_factory=dict)
+    sizes: Mapping[str, float] = field(default_factory=dict)  # any of length_x, length_y, thickness, mm; mass, g
     edges: Mapping[str, str] = field(default_factory=lambda: dict.fromkeys(EDGES, "free"))
     prior: str = "weakly-informative"
-    frequencies: Mapping[str, float] = field(default_factory=dict)
+    frequencies: Mapping[str, float] = field(default_factory=dict)  # label to Hz
 
 
 def starter_text(starter: Starter, examples: Sequence[Label]) -> str:
-    """A board card in TOML.
-
-    Parameters
-    ----------
-    examples : sequence of Label
-        Modes that a board with these edges has; those without a frequency become lines to be filled in.
-    """
+    """A board card in TOML; the examples, modes of such a board, are lines to be filled in where not measured."""
     edges = ", ".join(f"{edge} = {_quoted(starter.edges[edge])}" for edge in EDGES)
     free_texts = {"title": starter.title, "notes": starter.notes}
     lines = [

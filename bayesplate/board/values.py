@@ -45,18 +45,10 @@ def _same(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Key:
-    """How a value of a card is read into SI units, and how it is written again: the annotation of a field.
+    """How a value of a card is read into SI units, and how it is written again: the annotation of a field."""
 
-    Attributes
-    ----------
-    read : callable
-        From what the TOML reader returned to the value; raises Refusal.
-    write : callable
-        From the value to what the TOML writer takes.
-    """
-
-    read: Callable[[Any], Any]
-    write: Callable[[Any], Any] = _same
+    read: Callable[[Any], Any]  # from what the TOML reader returned; raises Refusal
+    write: Callable[[Any], Any] = _same  # to what the TOML writer takes
 
     def __get_pydantic_core_schema__(self, source: object, handler: object) -> core_schema.CoreSchema:
         writing = core_schema.plain_serializer_function_ser_schema(self.write)
