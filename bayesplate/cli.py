@@ -56,23 +56,11 @@ def main() -> None:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a command found.
+    """What a command found, and what it prints; an error of `then`, called at the end, is the command's."""
 
-    Attributes
-    ----------
-    content : object
-        What `--json` prints.
-    shown : callable, optional
-        What people are shown.
-    closing : str
-        Where things were written, and what comes next.
-    then : callable, optional
-        Called at the end; its error is the command's.
-    """
-
-    content: Any
+    content: Any  # what `--json` prints
     shown: Callable[[], Shown] | None = None
-    closing: str = ""
+    closing: str = ""  # where things were written, and what comes next
     then: Callable[[], None] | None = None
 
     def print(self, *, as_json: bool, quiet: bool) -> None:
@@ -87,14 +75,9 @@ class Answer:
 
 
 class Command(click.Command):
-    """A public function as a command: what it takes is what the signature says.
+    """A public function as a command of its name: what it takes is what the signature says.
 
     The function, and with it the libraries, is loaded when the command is called or its help is read.
-
-    Parameters
-    ----------
-    answer : callable
-        Calls the function with the arguments that were given, and says what is printed; it bears the function's name.
     """
 
     def __init__(self, answer: Callable[..., Answer]) -> None:

@@ -32,17 +32,8 @@ Rule = Callable[[Mapping[str, Any]], Iterable[Fault]]
 def checked(*rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """A function whose arguments are read by the `Key` of their annotations, and which runs in one thread.
 
-    Thousands of small matrices in several threads of linear algebra would only wait for one another.
-
-    Parameters
-    ----------
-    *rules
-        Held against several arguments together.
-
-    Raises
-    ------
-    InputError
-        When it is called: with every argument that cannot be used, and with those that contradict each other.
+    Thousands of small matrices in several threads of linear algebra would only wait for one another. A call raises
+    InputError with every argument that cannot be used, and with those that contradict each other by a rule.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:

@@ -179,10 +179,7 @@ def _sharing(campaign: Campaign, effects: Sequence[str]) -> Campaign:
 
 
 def shareable(campaign: Campaign) -> tuple[tuple[str, ...], ...]:
-    """Effects that all boards may have, of one size each, and that boards of one rig, day or species may have alike.
-
-    Single ones, then pairs.
-    """
+    """Effects, single and in pairs, that all boards may have, of one size each, alike on one rig, day or species."""
     can_act = set.intersection(*(set(forms(one.prepared.board)) for one in campaign.problems))
     able = [name for name, effect in EFFECTS.items() if effect.is_of_campaign and name in can_act]
     single = [name for name in able if _has_one_size(campaign, (name,))]

@@ -183,9 +183,9 @@ def compare(
 def _posteriors(
     problem: PosedProblem, settings: SamplerSettings, progress: OnProgress
 ) -> tuple[list[Method], Inference, Draws]:
-    """The posteriors of both laws: the wider, exact one sampled, the linear one by weights where these leave enough.
+    """The posteriors of both laws, of the problem as the exact draws label its peaks.
 
-    Of the problem as the exact draws label its peaks.
+    The wider, exact one is sampled; the linear one has its draws by weights, where these leave enough.
     """
     inference, draws = _sampled(problem, settings, progress)
     problem = inference.problem

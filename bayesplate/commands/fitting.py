@@ -113,16 +113,10 @@ class FitResult:
 
 @dataclass
 class Stages:
-    """The progress of a run of several parts: tells each part and the share of the whole, which never falls.
-
-    Attributes
-    ----------
-    left : float
-        How long the parts that are still to come take, begun ones not counted, in any unit of time.
-    """
+    """The progress of a run of several parts: tells each part and the share of the whole, which never falls."""
 
     tell: Callable[[Progress], None] | None
-    left: float
+    left: float  # how long the parts to come take, begun ones not counted, in any unit of time
     _stage: str = ""
     _past: float = 0.0
     _length: float = 0.0
@@ -148,17 +142,7 @@ class Stages:
 
 
 class Run:
-    """A run of one fit or several: its seed, its progress, and its output folder.
-
-    Parameters
-    ----------
-    out : path or None
-        Output folder; None writes nothing.
-    force, resume : bool
-        Replace the results in the folder, or continue an interrupted run.
-    progress : callable, optional
-        Told of the parts of the run and of its sampling.
-    """
+    """A run of one fit or several: its seed, its progress, and its output folder; without `out` nothing is written."""
 
     def __init__(
         self,
@@ -179,23 +163,9 @@ class Run:
         return None if self.folder is None else self.folder.path
 
     def open(self, first: Mapping[str, Problem], left: float = 0.0) -> None:
-        """Pose problems and open the folder; whatever is refused is refused before that, and nothing is written.
+        """Pose what is fitted first, by its place in the checkpoint, and open the folder for parts that take `left`.
 
-        Parameters
-        ----------
-        first : dict of Problem
-            What is fitted first, by the subfolders of the checkpoint.
-        left : float
-            How long the parts of the run take.
-
-        Raises
-        ------
-        InputError
-            If the folder may not be used.
-        NotIdentifiableError
-            If the data leave a constant open.
-        CheckpointError
-            If there is nothing to resume.
+        Raises InputError, NotIdentifiableError or CheckpointError; whatever is refused is so before a file is written.
         """
         self.stages.left = left
         if self.folder is not None:
@@ -214,19 +184,7 @@ class Run:
     def fit(
         self, problem: Problem, place: str = "", stage: str = "", *, of: str = "", tells_failure: bool = False
     ) -> FitResult:
-        """Fit one problem of the run.
-
-        Parameters
-        ----------
-        place : str
-            Subfolder of its checkpoint.
-        stage : str
-            What the progress says; without it that of the sampler alone is told.
-        of : str
-            What is fitted, for the message where it does not converge.
-        tells_failure : bool
-            Whether summary.json then says so.
-        """
+        """Fit one problem of the run; see `fitted`. Without a `stage` the progress of the sampler alone is told."""
         if stage:
             self.stages.begin(stage, FIT)
         checkpoints = None if self.folder is None else self.folder.checkpoint / place
@@ -255,23 +213,13 @@ def with_board(problem: Problem, board: Board) -> Problem:
 def fitted(
     problem: Problem,
     seed: int,
-    checkpoints: Path | None = None,
+    checkpoints: Path | None = None,  # one subfolder per law
     progress: Callable[[Progress], None] | None = None,
     *,
-    of: str = "",
-    failure: Path | None = None,
+    of: str = "",  # what is fitted, for the error of a run that fits more than one board
+    failure: Path | None = None,  # where summary.json says that the sampler did not converge
 ) -> FitResult:
-    """Sample a problem, and once more under the exact law if the draws show that the linear one does not serve.
-
-    Parameters
-    ----------
-    checkpoints : Path or None
-        Folder of the unfinished run's chunks, one subfolder per law; None keeps none.
-    of : str
-        What is fitted, for the message of the error, where a run fits more than one board.
-    failure : Path or None
-        Where summary.json says that the sampler did not converge.
-    """
+    """Sample a problem, and once more under the exact law if the draws show that the linear one does not serve."""
 
     def sampled(under: PosedProblem) -> tuple[Inference, Draws]:
         checkpoint = None if checkpoints is None else checkpoint_in(checkpoints, problem, under)

@@ -33,17 +33,7 @@ from bayesplate.posterior.sampling import Progress
 
 
 class Option:
-    """An option of the command line, or what stands there without a name, that gives an argument of a function.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Words of the command line, as click takes them.
-    otherwise : callable or None
-        Of the first argument of the command, where the option is not given.
-    settings : dict
-        Of `click.Option` or `click.Argument`; a default that is shown is that of the function.
-    """
+    """An option of the command line, or what stands there without a name, that gives an argument of a function."""
 
     def __init__(self, *names: str, otherwise: Callable[[str], Any] | None = None, **settings: Any) -> None:
         self.names, self.otherwise, self.settings = names, otherwise, settings
@@ -62,15 +52,7 @@ class Option:
 
 
 class Joined:
-    """Several options that give one argument.
-
-    Attributes
-    ----------
-    options : dict of Option
-        By the names under which they are joined.
-    join : callable
-        Of the values by name; raises click.UsageError where they exclude each other.
-    """
+    """Several options that give one argument; `join` raises click.UsageError where they exclude each other."""
 
     def __init__(self, join: Callable[..., Any], **options: Option) -> None:
         self.options, self.join = options, join

@@ -70,24 +70,10 @@ def prepare(
     may_lack_frequencies: bool = False,
     setup: str | os.PathLike[str] | None = None,
 ) -> Prepared:
-    """Read a board card and everything it names.
+    """Read a board card and everything it names; raises InputError with every schema fault, else every physical one.
 
-    A board made in Python goes through its own card: what would be refused there is refused here, with the same places.
-
-    Parameters
-    ----------
-    effects, prior, setup
-        In place of what the card says: see `Problem.from_card`.
-    may_lack_frequencies : bool
-        Whether a board that was not measured yet will do.
-
-    Raises
-    ------
-    InputError
-        Every schema fault at once; if there is none, every physical fault at once; if there is none, what all
-        frequencies together say of their unit.
-    NotIdentifiableError
-        If the sides or the orders of the labels seem to be exchanged.
+    Else with what all frequencies together say of their unit; NotIdentifiableError if sides or orders seem exchanged. A
+    board made in Python goes through its own card: what would be refused there is refused here, with the same places.
     """
     _require_card(card)
     given = prior if prior is None or isinstance(prior, PriorCard) else load_prior(prior)
