@@ -7,7 +7,8 @@ import itertools
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
-from bayesplate.board.board import INPUTS, Board, density
+from bayesplate.board.board import Board, density
+from bayesplate.board.inputs import INPUTS
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.repeated import CALIPER, FEELER, RULE, SCALES, are_alike
 from bayesplate.board.setup import Setup

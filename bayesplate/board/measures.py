@@ -8,7 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from bayesplate.board.quantity import Kind, Quantity
+from bayesplate.board.density import Kind
+from bayesplate.board.quantity import Quantity
 from bayesplate.board.repeated import are_alike, comma_complaint, scatter_complaint
 from bayesplate.board.units import SI, in_unit, median_and_factor
 from bayesplate.board.values import (

@@ -10,7 +10,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bayesplate.board.quantity import Kind, Quantity
+from bayesplate.board.density import Kind
+from bayesplate.board.quantity import Quantity
 from bayesplate.errors import Fault, InputError
 
 Name = TypeVar("Name", str, int)
