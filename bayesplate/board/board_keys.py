@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Annotated, Any, Literal
 
@@ -142,35 +142,22 @@ def read_board(
     return validated(BoardKeys, card, _faults_beside, context, file), card
 
 
-def _faults_beside(table: Mapping[str, Any], file: str) -> list[Fault]:
-    return [*_mass_faults(table, file), *_setup_name_faults(table, file)]
-
-
-def _mass_faults(table: Mapping[str, Any], file: str) -> list[Fault]:
-    plate = table.get("plate")
-    if not isinstance(plate, dict):
-        return []
-    given = [key for key in ("mass_g", "density_kg_m3") if key in plate]
-    if len(given) == 1:
-        return []
-    got = f"both, {shown(plate['mass_g'])} and {shown(plate['density_kg_m3'])}" if given else "neither"
-    return [Fault(place(file, table, ("plate",)), "exactly one of mass_g and density_kg_m3", got)]
-
-
-def _setup_name_faults(table: Mapping[str, Any], file: str) -> list[Fault]:
-    setups = table.get("setup")
-    if not isinstance(setups, list) or len(setups) < 2 or len(setups) > MOST_SETUPS:
-        return []
-    faults = []
+def _faults_beside(table: Mapping[str, Any], file: str) -> Iterator[Fault]:
+    """Exactly one of mass and density; and a name of its own for each of several setups."""
+    plate, setups = table.get("plate"), table.get("setup")
+    given = [key for key in ("mass_g", "density_kg_m3") if isinstance(plate, dict) and key in plate]
+    if isinstance(plate, dict) and len(given) != 1:
+        got = f"both, {shown(plate['mass_g'])} and {shown(plate['density_kg_m3'])}" if given else "neither"
+        yield Fault(place(file, table, ("plate",)), "exactly one of mass_g and density_kg_m3", got)
+    if not isinstance(setups, list) or not 2 <= len(setups) <= MOST_SETUPS:
+        return
     seen: set[str] = set()
     for index, setup in enumerate(setups):
         if not isinstance(setup, dict):
             continue
-        name = setup.get("name")
-        where = place(file, table, ("setup", index, "name"))
+        name, where = setup.get("name"), place(file, table, ("setup", index, "name"))
         if name is None:
-            faults.append(Fault(where, "a name, because there are several setups", "nothing"))
+            yield Fault(where, "a name, because there are several setups", "nothing")
         elif isinstance(name, str) and name.casefold() in seen:
-            faults.append(Fault(where, "a name of its own", f"{quoted(name)} again"))
+            yield Fault(where, "a name of its own", f"{quoted(name)} again")
         seen.add(str(name).casefold())
-    return faults

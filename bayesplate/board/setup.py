@@ -32,10 +32,6 @@ _ALIKE = ("name", "clamped", "first_label", "resolution", "missed", "spurious", 
 NOISE_WANTED = "a relative noise and how far it may be off: Quantity.from_median(0.005, 2)"
 
 
-def _is_noise(value: object) -> bool:
-    return isinstance(value, Quantity) and not value.is_exact
-
-
 def _is_number(value: object) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
 
@@ -177,7 +173,7 @@ class Setup:
             ("name", name, isinstance(name, str), "a text"),
             ("frequencies", frequencies, isinstance(frequencies, Mapping), "a dict of frequencies by label"),
             ("edges", edges, isinstance(edges, str | Mapping), "a word, or a dict of words by edge"),
-            ("noise", noise, noise is None or _is_noise(noise), NOISE_WANTED),
+            ("noise", noise, noise is None or (isinstance(noise, Quantity) and not noise.is_exact), NOISE_WANTED),
             ("resolution", resolution, _is_number(resolution), "a number, in Hz"),
             ("first_label", first_label, is_place(first_label), "a pair of whole numbers"),
             ("clamped", clamped, isinstance(clamped, Mapping | None), "a dict of lengths by edge"),

@@ -39,16 +39,12 @@ class Refusal(ValueError):
         return [replace(one, inside=(*keys, *one.inside)) for one in self.complaints]
 
 
-def _same(value: Any) -> Any:
-    return value
-
-
 @dataclass(frozen=True)
 class Key:
     """How a value of a card is read into SI units, and how it is written again: the annotation of a field."""
 
     read: Callable[[Any], Any]  # from what the TOML reader returned; raises Refusal
-    write: Callable[[Any], Any] = _same  # to what the TOML writer takes
+    write: Callable[[Any], Any] = lambda value: value  # to what the TOML writer takes
 
     def __get_pydantic_core_schema__(self, source: object, handler: object) -> core_schema.CoreSchema:
         writing = core_schema.plain_serializer_function_ser_schema(self.write)

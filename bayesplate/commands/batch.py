@@ -222,8 +222,13 @@ def batch(
             raise RunInterrupted("interrupted; --resume goes on with the boards that are left") from None
         finally:
             journal.close()
-    placed = [_at_its_place(journal.rows[key], board.place) for key, board in zip(keys, boards, strict=True)]
-    rows = with_copies_in_doubt(placed)
+    rows = [journal.rows[key] for key in keys]
+    rows = with_copies_in_doubt(
+        [
+            row if row.is_fitted or not board.place else replace(row, message=f"{board.place} -> {row.message}")
+            for row, board in zip(rows, boards, strict=True)
+        ]
+    )
     written = write_table(folder.path, table, rows)
     graded = grade(rows, grading or GradingRequest())
     summary = _summary(rows, seed, aside)
@@ -232,11 +237,6 @@ def batch(
     _write_grading(folder.path, graded, summary, folders=folders and report, report=report)
     folder.close()
     return BatchResult(folder.path, written, summary, graded)
-
-
-def _at_its_place(row: BoardRow, place: str) -> BoardRow:
-    """The row of a board; its message says where the board stands, if its own file does not."""
-    return row if row.is_fitted or not place else replace(row, message=f"{place} -> {row.message}")
 
 
 def _summary(rows: Sequence[BoardRow], seed: int, aside: tuple[str, ...]) -> BatchSummary:

@@ -68,7 +68,7 @@ class FitResult:
     @cached_property
     def tree(self) -> Any:
         """The draws as posterior.nc holds them: an xarray.DataTree."""
-        attributes = attributes_of(self.inference, self.summary, self.problem.prepared.card_text)
+        attributes = attributes_of(self.inference, self.summary, self.problem.prepared.card.text)
         return posterior_tree(self.inference, self.draws, attributes)
 
     def to_arviz(self) -> Any:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import numpy as np
 
-from bayesplate.board.board import Board, Values
+from bayesplate.board.board import Values
 from bayesplate.commands.arguments import checked
 from bayesplate.commands.options import CARD, Effects, Force, Out, Seed, SetupFile
 from bayesplate.commands.prepare import Card, Prepared
@@ -142,16 +142,12 @@ def _constants(prepared: Prepared) -> tuple[Values, Precision | None, list[str]]
         estimate = weighted_least_squares(board)
         require_identifiable(board, identifiability(estimate.sensitivities, estimate.scales, board.symmetry))
     except NotIdentifiableError as error:
-        return prior_medians(board, prepared.prior), None, [str(error)] if _has_labels(board) else []
+        return prior_medians(board, prepared.prior), None, [str(error)] * any(setup.readings for setup in board.setups)
     widenings = noise_widenings(board, estimate.residuals)
     scales = estimate.scales * np.repeat(widenings, [len(setup.readings) for setup in board.setups])
     noise = {setup.name: setup.noise.median * w for setup, w in zip(board.setups, widenings.tolist(), strict=True)}
     found = identifiability(estimate.sensitivities, scales, board.symmetry)
     return estimate.values, Precision(found.of_rigidities, noise), []
-
-
-def _has_labels(board: Board) -> bool:
-    return any(setup.readings for setup in board.setups)
 
 
 def _sheets(

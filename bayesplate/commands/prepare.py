@@ -33,13 +33,8 @@ class Prepared:
     """The cards that a board names, the board as stated, and the board with the parameters of its declared effects."""
 
     named: NamedCards
-    stated: Board
+    card: Board
     board: Board
-
-    @property
-    def card(self) -> Board:
-        """The board with its card."""
-        return self.stated
 
     @property
     def prior(self) -> PriorCard:
@@ -47,14 +42,9 @@ class Prepared:
         assert self.named.prior is not None
         return self.named.prior
 
-    @property
-    def card_text(self) -> str:
-        """The card as it was read."""
-        return self.stated.text
-
     def with_effects(self, effects: Sequence[str]) -> Prepared:
         """The same cards, not read again, with other declared effects; raises InputError as `prepare`."""
-        return prepared_card(self.stated, self.named, effects)
+        return prepared_card(self.card, self.named, effects)
 
 
 def default_folder(card: str | os.PathLike[str]) -> Path:

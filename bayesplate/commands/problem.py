@@ -101,7 +101,7 @@ class Problem:
     @property
     def board(self) -> Board:
         """The board as its card states it; `dataclasses.replace` makes another one of it."""
-        return self.prepared.stated
+        return self.prepared.card
 
     @property
     def prior(self) -> PriorCard:

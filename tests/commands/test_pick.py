@@ -63,7 +63,7 @@ def test_the_fragment_is_a_setup_and_completes_the_card(bench):
     folder, found = bench
     setup = tomllib.loads((folder / "out" / "setup.toml").read_text())["setup"]
     prepared = prepare(folder / "planted.toml", setup=folder / "out" / "setup.toml")
-    (read,) = prepared.stated.setups
+    (read,) = prepared.card.setups
 
     assert setup["hammer"]["at_mm"] == [20, 20]
     assert setup["attached"] == [{"kind": "accelerometer", "at_mm": [560, 197], "mass_g": {"mean": 0.6, "sd": 0.1}}]
