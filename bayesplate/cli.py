@@ -91,7 +91,7 @@ class Command(click.Command):
 
     @cached_property
     def _arguments(self) -> Mapping[str, inspect.Parameter]:
-        """Those that the function itself states, whatever a tool writes on what is wrapped around it."""
+        """Parameters of the function itself, without those of its wrappers."""
         return inspect.signature(inspect.unwrap(self._function)).parameters
 
     @cached_property
@@ -103,7 +103,7 @@ class Command(click.Command):
         return {name: found[name] for name in (*alone, *_SHARED) if name in found}
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        """Those of the function, and those of the printing."""
+        """Parameters of the function, and those of the printing."""
         if not self.params:
             for name, part in self._options.items():
                 self.params += part.parameters(name, self._arguments[name].default)

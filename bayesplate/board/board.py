@@ -294,14 +294,14 @@ class Board:
 
     @classmethod
     def from_text(cls, text: str, name: str, may_lack_frequencies: bool = False) -> Board:
-        """The same from what might stand in the file NAME.toml."""
+        """Read a board card from a text, as if it stood in NAME.toml."""
         return cls.from_card(CardFile.of(text, f"{name.removesuffix('.toml')}.toml"), may_lack_frequencies)
 
     @classmethod
     def from_card(
         cls, card: CardFile, may_lack_frequencies: bool = False, setup: str | os.PathLike[str] | None = None
     ) -> Board:
-        """The same from the table of a card."""
+        """Read a board card from its table; the options are those of `from_toml`."""
         keys, card = read_board(card, may_lack_frequencies, setup)
         plate, material = keys.plate, keys.material
         inputs = {**dict(plate), "poisson_xy": material.poisson_xy}
@@ -323,7 +323,7 @@ class Board:
         )
 
     def assuming(self, prior: PriorCard | None, tables: Mapping[str, CoefficientCard] | None = None) -> Board:
-        """The board with what nobody stated of it taken from a prior; `tables`: coefficients that its card names."""
+        """The board with noise and Poisson ratio of a prior where nobody stated them, and coefficient tables."""
         poisson = (prior and prior.poisson_xy) or usual_poisson(self.isotropic)
         setups = [one.assuming_noise(prior) if one.is_noise_assumed else one for one in self.setups]
         if tables is not None:
@@ -361,7 +361,7 @@ class Board:
         }
 
     def _unstatable(self) -> Iterator[Fault]:
-        """Every quantity that a card cannot state."""
+        """A fault for every quantity that a card cannot state."""
         for one in self.parameters:
             if not one.is_of_effect and one.owner.kind != "group":  # sessions are found again when the card is read
                 yield from unstatable(one.name, one.prior, "normal" if one.name == "poisson_xy" else "log-normal")
@@ -409,7 +409,7 @@ class Board:
 
     @property
     def folder(self) -> Path | None:
-        """Where cards that it names by a relative path are looked for; None for the working directory."""
+        """Folder from which its relative paths start; None for the working directory."""
         return None if self.card is None else self.card.folder
 
     @property
@@ -444,7 +444,7 @@ def _named(place: str, name: str, among: Iterable[Named]) -> Named:
 
 
 def assumed_notes(board: Board) -> tuple[str, ...]:
-    """A sentence on the Poisson ratio that was assumed, where nobody stated one."""
+    """A sentence on the Poisson ratio if it was assumed."""
     nu = board.parameter("poisson_xy")
     told = f"nu_xy = {nu.prior.mean:g} ± {nu.prior.sd:g} was assumed"
     return (f"the card gives no Poisson ratio: {told}",) if nu.is_assumed else ()

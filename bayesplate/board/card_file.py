@@ -18,7 +18,7 @@ from bayesplate.errors import plain
 
 @dataclass(frozen=True)
 class CardFile:
-    """What a file states, before anything is assumed; or what it would state, for a card that has none."""
+    """The table of a card, as its file states it, or would state it where there is none."""
 
     table: Mapping[str, Any]
     name: str
@@ -27,13 +27,13 @@ class CardFile:
 
     @classmethod
     def load(cls, kind: CardKind, name_or_path: str | os.PathLike[str], beside: Path | None = None) -> CardFile:
-        """That of a shipped card, or of a path that may start from a folder; raises InputError if it is no table."""
+        """A card of the shelf by its name, or of a path; raises InputError if it is no table."""
         path = find(kind, name_or_path, beside)
         return cls.of(read_file(path), path.name, path.parent)
 
     @classmethod
     def of(cls, content: bytes | str, name: str, folder: Path | None = None) -> CardFile:
-        """What stands, or might stand, in a file of a name; raises InputError if it is no table."""
+        """A card from the content of a file; raises InputError if it is no table."""
         data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
         return cls(read_table(data, plain(name)), name, folder, data.decode("utf-8"))
 
@@ -49,12 +49,11 @@ class CardFile:
 
     @property
     def path(self) -> Path:
-        """The file."""
         return (self.folder or Path()) / self.name
 
     @cached_property
     def text(self) -> str:
-        """The file as it was read: in UTF-8 it is the bytes that `sha256` is of, whatever the file holds by now."""
+        """The text of the file as it was read, or the table as TOML; `sha256` is that of its bytes in UTF-8."""
         return self.read or toml_text(self.table)
 
     @cached_property

@@ -18,7 +18,7 @@ _LOG_ROOT_TWO_PI = 0.5 * math.log(2.0 * math.pi)
 
 @dataclass(frozen=True)
 class Density:
-    """What a `Quantity` is as a density; a fixed number, of sd = 0, has one value whatever the coordinate is."""
+    """A number and its uncertainty as a density; an exact one, sd = 0, has one value at every coordinate."""
 
     mean: float
     sd: float = 0.0

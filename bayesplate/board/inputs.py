@@ -1,4 +1,4 @@
-"""What is stated of a board in numbers, as parameters: sizes, mass, Poisson ratio, and what a clamp covers."""
+"""Inputs of a board as parameters: sizes, mass, Poisson ratio, and what a clamp covers."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ ISOTROPIC_POISSON = Quantity.from_mean(0.3, 0.06, "normal")
 
 
 def usual_poisson(is_isotropic: bool) -> Quantity:
-    """The Poisson ratio of a board of which nothing is known, of wood or isotropic: an object of its own."""
+    """The usual Poisson ratio, of wood or of an isotropic board: an object of its own, see `Parameter.is_assumed`."""
     return replace(ISOTROPIC_POISSON if is_isotropic else DEFAULT_POISSON)
 
 
 def parameters_of(
     inputs: Mapping[str, Quantity], setups: Sequence[Setup], assumed_poisson: Quantity | None
 ) -> tuple[Parameter, ...]:
-    """The inputs as parameters, a Poisson ratio that nobody stated too, and what the clamps cover.
+    """Inputs and clamped lengths as parameters, with an assumed Poisson ratio where none is stated.
 
     A thickness or a width that was read at places becomes the mean over the board of the field of the readings.
     """
@@ -55,7 +55,7 @@ def parameters_of(
 
 
 def _means_of_fields(inputs: Mapping[str, Quantity]) -> dict[str, Quantity]:
-    """Sizes that were read at places with the mean over the board that their field has; an exact mean stays."""
+    """Sizes that were read at places, with the mean of their field over the board; an exact mean stays."""
     read: dict[str, PlacedReadings | None] = {}
     if "length_y" in inputs and inputs["length_y"].has_profile:
         read["length_y"] = width_readings(inputs["length_y"], inputs["length_x"])
@@ -66,7 +66,7 @@ def _means_of_fields(inputs: Mapping[str, Quantity]) -> dict[str, Quantity]:
 
 
 def warps_of(stated: Mapping[str, Quantity | ArrayLike], place: str) -> tuple[dict[str, Quantity], list[Fault]]:
-    """Heights by name from what was stated of them, cup and twist from zero on, and what cannot be one."""
+    """Heights of a warp by name as quantities, cup and twist from zero on, and faults."""
     unknown = [unknown_name(f"{place} warp", key, WARPS) for key in stated if key not in WARPS]
     known = {key: stated[key] for key in WARPS if key in stated}
     found, faults = quantities_of(known, f"{place} warp", "in m", dict.fromkeys(WARPS, "normal"))
@@ -77,7 +77,7 @@ def warps_of(stated: Mapping[str, Quantity | ArrayLike], place: str) -> tuple[di
 
 
 def unknown_name(place: str, name: object, known: Iterable[str]) -> Fault:
-    """That a name is none of those that there are."""
+    """The fault of an unknown name."""
     names = tuple(known)
     near = did_you_mean(name, names) if isinstance(name, str) else ""
     return Fault(place, f"one of {', '.join(names)}", str(name), near)

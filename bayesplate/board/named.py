@@ -49,7 +49,7 @@ def load_named(
 
 
 def _of_another_symmetry(place: str, name: str, is_isotropic: bool) -> Fault:
-    """That a prior card does not state what the board has: one modulus, or three."""
+    """The fault of a prior that states one modulus for a board of three, or three for a board of one."""
     if not is_isotropic:
         return Fault(place, "a prior of three constants", f"{name}, which states E alone", "or isotropic = true?")
     remedy = "weakly-informative states one, or a card of your own with [E]"
@@ -59,7 +59,7 @@ def _of_another_symmetry(place: str, name: str, is_isotropic: bool) -> Fault:
 def _read(
     load: Callable[[str, Path | None], Card], name: str, beside: Path | None, place: str, faults: list[Fault]
 ) -> Card | None:
-    """One card; if it cannot be read its faults join the others."""
+    """Read one card; its faults join the others."""
     try:
         return load(name, beside)
     except InputError as error:

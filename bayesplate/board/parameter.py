@@ -75,7 +75,7 @@ class Parameter:
 
     @property
     def is_listed(self) -> bool:
-        """Whether it is told of by itself: a component that belongs to no effect means nothing alone."""
+        """Whether results list it alone: a component that belongs to no effect means nothing by itself."""
         return self.is_of_effect or not self.is_component
 
     @property

@@ -215,14 +215,14 @@ def read_prior_text(text: str, name: str) -> PriorCard:
 
 
 def _is_of_a_card(quantity: object, kinds: tuple[str, ...]) -> bool:
-    """Whether a prior card can state a density: it is of such a kind, and has no bounds but those of its kind."""
+    """Whether a prior card can state a density: of one of these kinds, without bounds but those of its kind."""
     if not isinstance(quantity, Quantity) or quantity.is_exact or quantity.kind not in kinds:
         return False
     return quantity.kind == "log-uniform" or (quantity.lower == -math.inf and quantity.upper == math.inf)
 
 
 def _source_faults(name: str, source: str | Mapping[str, str], stated: Collection[str]) -> Iterator[Fault]:
-    """Sources that are empty or lacking, and those of a name that a prior cannot have."""
+    """Faults of sources that are empty, lacking, or of an unknown name."""
     wanted = "where the numbers come from"
     if isinstance(source, str):
         if not source.strip():
@@ -238,7 +238,7 @@ def _source_faults(name: str, source: str | Mapping[str, str], stated: Collectio
 
 
 def _set_faults(table: Mapping[str, Any], file: str) -> list[Fault]:
-    """Three priors that belong together, no mixture and no gap; or that of an isotropic board alone."""
+    """The constants are all moduli, all rigidities, or E alone."""
     given = [name for name in (*MODULI, *RIGIDITIES) if name in table]
     if tuple(given) in (MODULI, RIGIDITIES) or (not given and OF_ISOTROPIC in table):
         return []

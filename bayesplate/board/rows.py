@@ -98,7 +98,7 @@ class Columns:
                 yield Fault(f"{self.file} column {i}", wanted, f"{quoted(name)} alone", remedy)
 
     def _common_readings(self) -> Iterator[Fault]:
-        """What the template has read would silently be read on every board."""
+        """Readings of the template would silently be those of every board."""
         own = {column.inside for column in self._columns if column is not None}
         stray: list[str] = []
         for setup in _setups_of(self.template.table):

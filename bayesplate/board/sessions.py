@@ -118,7 +118,7 @@ def discrepancy_names(setup: Setup, label: Label) -> tuple[str, str] | None:
 
 
 def unknown_discrepancies(board: Board, setup: Setup) -> Floats:
-    """Variance of what modes of a setup depart from the plate by where no session has read them: (n_modes,) array.
+    """Variance of the discrepancies of a setup's modes that no session has read: (n_modes,) array.
 
     Zero of those whose discrepancy is a parameter of the board, and where sessions share nothing and the noise has it.
     """

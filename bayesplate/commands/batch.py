@@ -134,7 +134,7 @@ class BatchResult:
             raise BatchError(self.summary.failures_text(self.table.name))
 
     def shown(self) -> Shown:
-        """What a person is shown of it."""
+        """Tables and sentences for a person."""
         return show_batch(self.summary, self.grading)
 
     def __repr__(self) -> str:

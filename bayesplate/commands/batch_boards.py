@@ -88,7 +88,7 @@ def _card_in(folder: Path, file: str) -> Board:
 
 
 def _content_of(folder: Path, file: str) -> Mapping[str, Any]:
-    """What a card holds; nothing where it cannot be read, which is told when the board's turn comes."""
+    """Content of a card; empty where it cannot be read, which is reported when the board's turn comes."""
     try:
         return read_table(read_file(os.path.join(folder, file)), plain(file)) if _is_inside(folder, file) else {}
     except InputError:

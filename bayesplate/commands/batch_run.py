@@ -50,7 +50,7 @@ class BatchRun:
     versions: Mapping[str, str] = field(default_factory=versions)
 
     def fitted(self, free: list[Executor], progress: Callable[[Progress], None] | None) -> list[str]:
-        """Fit the boards that the journal does not hold; the keys of the rows of all, in the order of their names."""
+        """Fit the boards that the journal lacks; the keys of all rows, in the order of the names."""
         n = len(self.boards)
         keys = [""] * n
         told = Counter[bool]()
@@ -95,7 +95,7 @@ class BatchRun:
         return row.outcome not in _AGAIN and (not self.folders or not row.is_fitted or own.is_file())
 
     def _posed(self, board: Entry) -> tuple[str, BoardRow, Call]:
-        """The key of a board's row, what the row says even if the fit fails, and the fit; raises InputError."""
+        """The key of a board's row, the row as it is before the fit, and the fit to compute; raises InputError."""
         card = board.card()
         named = load_named(card)
         if named.faults or named.prior is None:
@@ -113,7 +113,7 @@ class BatchRun:
 
 
 def _answered(row: BoardRow, future: Future[Any]) -> BoardRow:
-    """The row of a board that was computed, from what was known of it before."""
+    """The row of a board that was computed: its constants, or its error."""
     error = future.exception()
     if error is None:
         return replace(row_of(future.result()), seed=row.seed, readings_sha256=row.readings_sha256)

@@ -85,7 +85,7 @@ class Campaign:
 
     @property
     def name(self) -> str:
-        """Of the campaign."""
+        """Name of the campaign."""
         return self.card.name
 
     def pose(self) -> None:

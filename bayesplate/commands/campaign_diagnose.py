@@ -90,11 +90,10 @@ class CampaignDiagnoseResult:
         return content
 
     def shown(self) -> Shown:
-        """What a person is shown of it."""
+        """Tables and sentences for a person."""
         return show_campaign_diagnosis(self.diagnosis)
 
     def _repr_html_(self) -> str:
-        """The verdict and its tables as a notebook shows them."""
         return self.shown().html(self.diagnosis.name)
 
     def __repr__(self) -> str:
@@ -126,7 +125,7 @@ def diagnose_campaign(campaign: Campaign, run: Run, *, report: bool) -> Campaign
 
 
 def _diagnosed(campaign: Campaign, alone: Campaign, run: Run) -> CampaignDiagnoseResult:
-    """The diagnosis of a campaign whose boards can be fitted, nothing written but checkpoints."""
+    """The diagnosis of a campaign whose boards can be fitted; nothing is written but checkpoints."""
     could_share = () if campaign.shared else shareable(campaign)
     before = fit_boards(alone, run, f"{BEFORE}/")
     if campaign.shared:
@@ -153,7 +152,7 @@ def _diagnosed(campaign: Campaign, alone: Campaign, run: Run) -> CampaignDiagnos
 
 
 def _without_shared(campaign: Campaign) -> Campaign:
-    """The same boards side by side, without what they share."""
+    """The boards side by side, without the shared effects."""
     names = {one.effect for one in campaign.shared}
     if not names:
         return campaign
@@ -165,7 +164,7 @@ def _without_shared(campaign: Campaign) -> Campaign:
 
 
 def _sharing(campaign: Campaign, effects: Sequence[str]) -> Campaign:
-    """The same boards with effects that they share: as ratios where an effect has such a thing."""
+    """The boards with effects that they share, as ratios where an effect has ratios."""
     if not effects:
         return campaign
     problems = tuple(
@@ -200,7 +199,7 @@ def _has_one_size(campaign: Campaign, effects: Sequence[str]) -> bool:
 def _searched(
     before: Mapping[str, FitResult], effects: Sequence[tuple[str, ...]], stages: Stages
 ) -> tuple[Explanation, ...]:
-    """What every board's tables say together."""
+    """Explanations by the tables of all boards together."""
     if not effects:
         return ()
     tried = [name for name, *others in effects if not others]

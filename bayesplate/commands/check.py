@@ -60,11 +60,10 @@ class CheckResult(CheckReport):
         return super().__repr__().replace("<CheckReport", "<CheckResult", 1)
 
     def shown(self) -> Shown:
-        """What a person is shown of it."""
+        """Tables and sentences for a person."""
         return show_check(self)
 
     def _repr_html_(self) -> str:
-        """The tables as a notebook shows them."""
         return self.shown().html(self.title or self.name)
 
 
@@ -72,11 +71,10 @@ class CampaignCheckResult(CampaignCheck):
     """What a check of a campaign leaves: all of `CampaignCheck`."""
 
     def shown(self) -> Shown:
-        """What a person is shown of it."""
+        """Tables and sentences for a person."""
         return show_campaign_check(self)
 
     def _repr_html_(self) -> str:
-        """The tables as a notebook shows them."""
         return self.shown().html(self.title or self.name)
 
 
@@ -111,7 +109,7 @@ def check(
 
 
 def _check_board(given: Problem, *, candidates: bool = True) -> CheckResult:
-    """Check one board; without candidates, what effects that are not declared would do is not computed."""
+    """Check one board, without signatures of effects that are not declared if there are to be no candidates."""
     problem = given.posed
     board = problem.board
     estimate, found = problem.estimate, problem.identifiability
@@ -159,7 +157,7 @@ def _check_board(given: Problem, *, candidates: bool = True) -> CheckResult:
 
 
 def _of_poisson(problem: PosedProblem) -> list[str]:
-    """What the modes tell of an uncertain Poisson ratio of an isotropic board, beside its one modulus."""
+    """A sentence on how well the modes tell an uncertain Poisson ratio of an isotropic board."""
     names = problem.parameters.inputs
     if not problem.board.isotropic or "poisson_xy" not in names:
         return []
@@ -196,7 +194,7 @@ def expected_sd(problem: PosedProblem) -> dict[str, float]:
 
 
 def _check_campaign(campaign: Campaign) -> CampaignCheckResult:
-    """What each board and all together would tell."""
+    """Check each board, and what all together would tell of shared numbers."""
     campaign.pose()
     population = campaign.population
     return CampaignCheckResult(
@@ -209,7 +207,7 @@ def _check_campaign(campaign: Campaign) -> CampaignCheckResult:
 
 
 def _shared(campaign: Campaign) -> dict[str, CheckedShared]:
-    """What normal approximations of the boards' posteriors say of the shared numbers."""
+    """Shared numbers by normal approximations of the boards' posteriors."""
     pulls = {one.board.name: _pull(one.posed, campaign) for one in campaign.problems}
     width = expected_width(campaign.shared)
     alone = {name: expected_sds(campaign.shared, [pull]) for name, pull in pulls.items()}
@@ -228,7 +226,7 @@ def _shared(campaign: Campaign) -> dict[str, CheckedShared]:
 
 
 def expected_sds(shared: Sequence[Shared], pulls: Sequence[Pull]) -> list[float]:
-    """Standard deviation of each shared number after what some boards say, over that of its prior, bounds kept."""
+    """Expected sd of each shared number over that of its prior, from the pulls of some boards, bounds kept."""
     before = np.array([moments_before(one.prior)[1] for one in shared])
     precision = np.diag(1.0 / before) + np.sum([one.precision for one in pulls], axis=0)
     return [float(sd) for sd in np.sqrt(np.diagonal(np.linalg.inv(precision)) / before)]

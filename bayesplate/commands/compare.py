@@ -82,11 +82,10 @@ class CompareResult(Comparison):
         return super().__repr__().replace("<Comparison", "<CompareResult", 1)
 
     def shown(self) -> Shown:
-        """What a person is shown of it."""
+        """Tables and sentences for a person."""
         return show_compare(self)
 
     def _repr_html_(self) -> str:
-        """The tables as a notebook shows them."""
         return self.shown().html(f"{self.name}: every method side by side")
 
 

@@ -94,14 +94,13 @@ class DiagnoseResult:
         return diagnosis_json(self.diagnosis)
 
     def shown(self) -> Shown:
-        """What a person is shown of it."""
+        """Tables and sentences for a person."""
         return show_diagnosis(self.diagnosis)
 
     def __repr__(self) -> str:
         return repr(self.diagnosis).replace("<Diagnosis", "<DiagnoseResult", 1)
 
     def _repr_html_(self) -> str:
-        """The verdict and its tables as a notebook shows them."""
         return self.diagnosis._repr_html_()
 
 

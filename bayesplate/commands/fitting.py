@@ -103,11 +103,10 @@ class FitResult:
         return repr(self.summary).replace("<Summary", "<FitResult", 1)
 
     def shown(self) -> Shown:
-        """What a person is shown of it."""
+        """Tables and sentences for a person."""
         return show_fit(self.summary)
 
     def _repr_html_(self) -> str:
-        """The tables as a notebook shows them."""
         return self.shown().html(self.problem.board.title or self.summary.name)
 
 

@@ -60,11 +60,10 @@ class ModesResult:
         return repr(self.summary).replace("<ModesReport", "<ModesResult", 1)
 
     def shown(self) -> Shown:
-        """What a person is shown of it."""
+        """Tables and sentences for a person."""
         return show_modes(self.summary)
 
     def _repr_html_(self) -> str:
-        """The table as a notebook shows it."""
         return self.shown().html(self.summary.title or self.summary.name)
 
 

@@ -80,11 +80,10 @@ class PickResult:
         return f"<PickResult of {', '.join(self.summary.files[:3])}: {len(self.summary.likely)} modes, Hz: {found}>"
 
     def shown(self) -> Shown:
-        """What a person is shown of it."""
+        """Tables and sentences for a person."""
         return show_pick(self.summary)
 
     def _repr_html_(self) -> str:
-        """The table as a notebook shows it."""
         return self.shown().html("Picked modes")
 
 

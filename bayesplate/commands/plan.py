@@ -75,11 +75,10 @@ class PlanResult:
         return repr(self.summary).replace("<Plan", "<PlanResult", 1)
 
     def shown(self) -> Shown:
-        """What a person is shown of it."""
+        """Tables and sentences for a person."""
         return show_plan(self.summary)
 
     def _repr_html_(self) -> str:
-        """The tables as a notebook shows them."""
         return self.shown().html(self.summary.title or self.summary.name)
 
 
@@ -157,7 +156,7 @@ def plan(
 
 @dataclass(frozen=True)
 class _Asked:
-    """What is planned: a board or a campaign, and what makes its beliefs."""
+    """A board or a campaign that is planned, and the function that makes its beliefs."""
 
     card: Board | CampaignCard
     problems: Sequence[Problem]
@@ -178,7 +177,7 @@ def _of_board(
     folder: Path | None,
     progress: OnProgress,
 ) -> Beliefs:
-    """What is believed of a board: from a search, from a finished one, or from the prior."""
+    """Beliefs of a board: from a search, from a finished diagnosis, or from the prior."""
     prepared, rng = given.prepared, stream(seed, BELIEFS)
     board, prior = prepared.board, prepared.prior
     if between is not None:
@@ -210,7 +209,7 @@ def _of_board(
 
 
 def _of_campaign(campaign: Campaign, goal: str | None, between: Sequence[str] | None, progress: OnProgress) -> Beliefs:
-    """What is believed of several boards and of what their card shares: effects are not searched for."""
+    """Beliefs of several boards and of what they share: effects are not searched for."""
     if between is not None:
         raise InputError(_untold("between", "a campaign"))
     if goal == EXPLANATIONS:
@@ -226,7 +225,7 @@ def _of_campaign(campaign: Campaign, goal: str | None, between: Sequence[str] | 
 
 
 def _untold(place: str, got: str) -> Fault:
-    """Why explanations cannot be told apart."""
+    """The fault that explanations cannot be told apart."""
     return Fault(place, "the frequencies of a board, by which effects are told apart", got)
 
 
@@ -241,7 +240,7 @@ def _require_possible(board: Board, between: Sequence[str]) -> None:
 
 @dataclass(frozen=True)
 class _Finished:
-    """What a finished diagnosis says: probabilities of the answers that may survive, and that of no effect."""
+    """Probabilities of the answers of a finished diagnosis that may survive, and that of no effect."""
 
     support: Mapping[tuple[str, ...], float]
     none: float

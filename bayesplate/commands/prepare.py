@@ -30,7 +30,7 @@ Card = str | os.PathLike[str] | Board
 
 @dataclass(frozen=True)
 class Prepared:
-    """The cards that a board names, the board as stated, and the board with the parameters of its declared effects."""
+    """A board as its card states it, the cards that it names, and the board with its declared effects' parameters."""
 
     named: NamedCards
     card: Board
@@ -38,7 +38,6 @@ class Prepared:
 
     @property
     def prior(self) -> PriorCard:
-        """The prior, which was read."""
         assert self.named.prior is not None
         return self.named.prior
 
@@ -88,7 +87,7 @@ def _require_card(card: object) -> None:
 
 
 def prepared_card(read: Board, named: NamedCards, effects: Sequence[str] | None = None) -> Prepared:
-    """The same of cards that were read already: no file is looked at; raises as `prepare`."""
+    """Prepare cards that were read already: no file is looked at; raises as `prepare`."""
     stated = read.assuming(named.prior, named.tables)
     implied = implied_effects(stated)
     listed = (*stated.effects, *implied) if effects is None else map(effect_named, effects)
@@ -106,7 +105,7 @@ def prepared_card(read: Board, named: NamedCards, effects: Sequence[str] | None 
 
 
 def _lost(given: Board, prepared: Board) -> Iterator[Fault]:
-    """What a board holds of its effects that its card cannot say: it must not be put aside unsaid."""
+    """Faults of effects whose priors or forms a card cannot state: they must not be dropped silently."""
     again = prepared.inputs
     remedy = "a card states an effect by its name, and the effect's own prior holds: vary Problem.board, which has none"
     for one in given.parameters:
