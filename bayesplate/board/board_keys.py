@@ -6,16 +6,16 @@ import math
 import os
 from collections.abc import Iterator, Mapping
 from functools import partial
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
 from bayesplate.board.card_file import CardFile
 from bayesplate.board.fragment import merged
 from bayesplate.board.measures import DENSITY, POISSON, QuantityReader
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.repeated import CALIPER, FEELER, FURTHEST_SIZES, RULE, SCALES
-from bayesplate.board.schema import Section, place, validated
+from bayesplate.board.schema import Card, Section, place, validated
 from bayesplate.board.setup_keys import SetupKeys
 from bayesplate.board.shelf import CAMPAIGN_REMEDY
 from bayesplate.board.values import (
@@ -23,10 +23,8 @@ from bayesplate.board.values import (
     Key,
     Number,
     Refusal,
+    one_or_more,
     read_effects,
-    read_format,
-    read_list,
-    read_name,
     read_reference,
     read_switch,
     read_table,
@@ -102,25 +100,15 @@ class MaterialKeys(Section):
     prior: Annotated[str, Key(read_reference)] = DEFAULT_PRIOR
 
 
-def _as_list(value: object) -> list[Any]:
-    """One [setup] is a list of one; the tables themselves are read by SetupKeys."""
-    if isinstance(value, dict):
-        return [value]
-    return read_list(value, "[[setup]] tables", MOST_SETUPS)
-
-
-class BoardKeys(Section):
+class BoardKeys(Card):
     """A board card, in SI units. `read_board` makes one; a `Board` is made from it."""
 
-    format: Annotated[Literal[1], Key(read_format)] = Field(description="1")
-    name: Annotated[str, Key(read_name)] = Field(description="the name of the file without .toml")
-    title: Annotated[str, Key(read_text)] = ""
     source: Annotated[str, Key(read_text)] = ""
     notes: Annotated[str, Key(read_text)] = ""
     effects: Annotated[tuple[str, ...] | None, Key(read_effects, list)] = None
     plate: PlateKeys = Field(description="a [plate] table")
     material: MaterialKeys = MaterialKeys()
-    setups: Annotated[tuple[SetupKeys, ...], BeforeValidator(_as_list)] = Field(
+    setups: Annotated[tuple[SetupKeys, ...], one_or_more("[[setup]] tables", MOST_SETUPS)] = Field(
         alias="setup", description="a [setup] table, or several [[setup]]"
     )
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, PrivateAttr
+from pydantic import Field, PrivateAttr
 
 from bayesplate.board.card_file import CardFile
-from bayesplate.board.schema import Section, place, validated
+from bayesplate.board.schema import Card, Section, place, validated
 from bayesplate.board.shelf import card_names
 from bayesplate.board.toml import read_file, read_table
 from bayesplate.board.values import (
@@ -19,12 +19,11 @@ from bayesplate.board.values import (
     Key,
     Number,
     Refusal,
+    one_or_more,
     read_each,
     read_effect,
     read_effects,
-    read_format,
     read_list,
-    read_name,
     read_reference,
     read_text,
 )
@@ -48,11 +47,6 @@ def _read_boards(value: object) -> tuple[str, ...]:
     return tuple(boards)
 
 
-def _as_list(value: object) -> list[Any]:
-    """One [shared] is a list of one."""
-    return [value] if isinstance(value, dict) else read_list(value, "[[shared]] tables", MOST_SHARED)
-
-
 class SharedSection(Section):
     """An effect whose parameters all boards have in common: their values, or their ratios to the boards' moduli."""
 
@@ -67,17 +61,14 @@ class PopulationSection(Section):
     prior: Annotated[str, Key(read_reference)] = Field(description="a card of models/priors")
 
 
-class CampaignCard(Section):
+class CampaignCard(Card):
     """Boards and what they share. `load_campaign` makes one."""
 
-    format: Annotated[Literal[1], Key(read_format)] = Field(description="1")
-    name: Annotated[str, Key(read_name)] = Field(description="the name of the file without .toml")
-    title: Annotated[str, Key(read_text)] = ""
     source: Annotated[str, Key(read_text)] = ""
     notes: Annotated[str, Key(read_text)] = ""
     boards: Annotated[tuple[str, ...], Key(_read_boards)] = Field(description="a list of board cards")
     effects: Annotated[tuple[str, ...], Key(read_effects)] = ()
-    shared: Annotated[tuple[SharedSection, ...], BeforeValidator(_as_list)] = ()
+    shared: Annotated[tuple[SharedSection, ...], one_or_more("[[shared]] tables", MOST_SHARED)] = ()
     population: PopulationSection | None = None
     _card: CardFile = PrivateAttr()
 

@@ -6,14 +6,14 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
 from bayesplate.board.card_file import CardFile
 from bayesplate.board.measures import FIRST_LABEL, LARGEST_POISSON, by_label
 from bayesplate.board.reading import NO_OFFSET
-from bayesplate.board.schema import Section, validated
+from bayesplate.board.schema import Card, Section, validated
 from bayesplate.board.setup_keys import Edges
 from bayesplate.board.values import (
     Complaint,
@@ -21,9 +21,7 @@ from bayesplate.board.values import (
     Number,
     Refusal,
     read_each,
-    read_format,
     read_list,
-    read_name,
     read_table,
     read_text,
 )
@@ -97,12 +95,9 @@ class TrainingSection(Section):
     steps: Annotated[tuple[float, ...], Key(_read_steps)] = ()
 
 
-class CoefficientCard(Section):
+class CoefficientCard(Card):
     """A printed or computed table of a, b, c. `load_coefficients` makes one."""
 
-    format: Annotated[Literal[1], Key(read_format)] = Field(description="1")
-    name: Annotated[str, Key(read_name)] = Field(description="the name of the file without .toml")
-    title: Annotated[str, Key(read_text)] = ""
     source: Annotated[str, Key(read_text)] = Field(description="where the numbers come from")
     aspect_ratio: Annotated[float, Key(_read_aspect)] = Field(description="[L_x, L_y] or their ratio")
     first_label: Annotated[Label, FIRST_LABEL] = NO_OFFSET

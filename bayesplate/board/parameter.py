@@ -6,11 +6,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from bayesplate.board.quantity import Quantity
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -86,18 +83,6 @@ class Parameter:
         if self.prior.is_exact or self.prior.kind != "normal":
             return self.prior.median
         return float(np.clip(self.prior.value(1.0), self.prior.lower, self.prior.upper))
-
-    def log_density(self, value: ArrayLike) -> Floats:
-        """Logarithm of the prior density at values in SI units: array of the same shape, per unit."""
-        return self.prior.log_density(value)
-
-    def quantile(self, probability: ArrayLike) -> Floats:
-        """Values in SI units below which the prior has given probabilities: array of the same shape."""
-        return self.prior.quantile(probability)
-
-    def sample(self, rng: np.random.Generator, n: int) -> Floats:
-        """Draws from the prior: (n,) array, SI."""
-        return self.prior.sample(rng, n)
 
 
 _PEOPLE = {"Pa": (1e-9, "GPa"), "m": (1e3, "mm"), "kg": (1e3, "g"), "1": (1.0, ""), "rad": (180.0 / np.pi, "degrees")}

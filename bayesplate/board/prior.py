@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 from pydantic import Field
 
@@ -15,9 +15,8 @@ from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.board.prior_keys import DensityPrior, ElasticPrior, NoisePrior, PoissonPrior, RigidityPrior
 from bayesplate.board.prior_keys import StatedPrior as StatedPrior
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.schema import Section, validated
+from bayesplate.board.schema import Card, validated
 from bayesplate.board.stated import wrong_types
-from bayesplate.board.values import Key, read_format, read_name, read_text
 from bayesplate.board.words import did_you_mean
 from bayesplate.board.writing import toml_text, write_card
 from bayesplate.errors import Fault, InputError
@@ -27,15 +26,12 @@ OF_ISOTROPIC = "E"
 _CONSTANTS = (*MODULI, *RIGIDITIES, OF_ISOTROPIC)
 
 
-class PriorCard(Section):
+class PriorCard(Card):
     """Priors of E_x, E_y, G_xy or of D_x, D_y, D_s, of E for isotropic boards, and optionally the noise and nu_xy.
 
     `load_prior` makes one.
     """
 
-    format: Annotated[Literal[1], Key(read_format)] = Field(description="1")
-    name: Annotated[str, Key(read_name)] = Field(description="the name of the file without .toml")
-    title: Annotated[str, Key(read_text)] = ""
     E_x: ElasticPrior = None
     E_y: ElasticPrior = None
     G_xy: ElasticPrior = None
@@ -207,11 +203,6 @@ class PriorCard(Section):
 def load_prior(name_or_path: str | os.PathLike[str], beside: Path | None = None) -> PriorCard:
     """Read a prior card, a shipped one or a path from the folder `beside`; InputError names every fault at once."""
     return validated(PriorCard, CardFile.load("priors", name_or_path, beside), _set_faults)
-
-
-def read_prior_text(text: str, name: str) -> PriorCard:
-    """Read a prior card from a text, as if it stood in NAME.toml; raises InputError like `load_prior`."""
-    return validated(PriorCard, CardFile.of(text, f"{name}.toml"), _set_faults)
 
 
 def _is_of_a_card(quantity: object, kinds: tuple[str, ...]) -> bool:

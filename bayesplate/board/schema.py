@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
-from typing import Any, TypeVar, get_args, get_type_hints
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 
 from bayesplate.board.card_file import CardFile
-from bayesplate.board.values import Complaint, Refusal
+from bayesplate.board.values import Complaint, Key, Refusal, read_format, read_name, read_text
 from bayesplate.board.words import did_you_mean, name_complaint, quoted, shown
 from bayesplate.errors import Fault, InputError
 
@@ -26,7 +26,15 @@ class Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-CardModel = TypeVar("CardModel", bound=Section)
+class Card(Section):
+    """A whole card: what the cards of all kinds have."""
+
+    format: Annotated[Literal[1], Key(read_format)] = Field(description="1")
+    name: Annotated[str, Key(read_name)] = Field(description="the name of the file without .toml")
+    title: Annotated[str, Key(read_text)] = ""
+
+
+CardModel = TypeVar("CardModel", bound=Card)
 
 
 def validated(

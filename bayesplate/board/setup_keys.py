@@ -66,12 +66,7 @@ class Edges(Section):
     @property
     def words(self) -> dict[str, End]:
         """Edge name to word, in the order x0, x1, y0, y1."""
-        return {"x0": self.x0, "x1": self.x1, "y0": self.y0, "y1": self.y1}
-
-    @property
-    def letters(self) -> str:
-        """The paper's four letters, "CFFF", in its order x0, y0, x1, y1."""
-        return edge_letters(self.words)
+        return dict(self)
 
 
 def edge_letters(words: Mapping[str, str]) -> str:

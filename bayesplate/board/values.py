@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
+from pydantic import BeforeValidator
 from pydantic_core import core_schema
 
 from bayesplate.board.units import OTHER_UNITS, SI, in_unit
@@ -101,6 +102,11 @@ def read_list(value: object, what: str, most: int, why: str = "") -> list[Any]:
     if len(value) > most:
         raise Refusal(Complaint(f"at most {most} {what}", str(len(value)), why))
     return value
+
+
+def one_or_more(tables: str, most: int) -> BeforeValidator:
+    """A table alone is a list of one; the tables are read by their model."""
+    return BeforeValidator(lambda value: [value] if isinstance(value, dict) else read_list(value, tables, most))
 
 
 @dataclass(frozen=True)
