@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -35,7 +36,7 @@ from bayesplate.diagnosis.search import Found
 from bayesplate.diagnosis.sizes import refit_board
 from bayesplate.diagnosis.stated import stated_claims
 from bayesplate.diagnosis.told import relabelled_sentence
-from bayesplate.diagnosis.verdict import Verdict, answer_words, decide
+from bayesplate.diagnosis.verdict import Answer, Verdict, answer_words, decide
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
 from bayesplate.estimates.leave_one_out import carrying_modes, indices_of, united
 from bayesplate.files import write_text
@@ -166,14 +167,28 @@ def diagnose(
 
 
 def _diagnose_board(problem: Problem, run: Run, n_null: int, *, report: bool) -> DiagnoseResult:
-    """Fit, search, control and refit one board, and write what was found."""
+    """Fit one board, diagnose the fit, and write what was found."""
     if problem.robust:
         wanted = "a problem with normal noise, which the search for an effect assumes"
         raise InputError(Fault("robust", wanted, "Student's distribution"))
     run.open({BEFORE: problem}, 2.0 * FIT + _SEARCH + _KNOWN + _CONTROL + _CHOICE)
-    stages = run.stages
     before = run.fit(problem, BEFORE, "fit without further effects", tells_failure=True)
-    posed = before.inference.problem
+    diagnosis, after = _diagnosed(problem, before, run, n_null)
+    if run.folder is not None:
+        path = run.folder.path
+        if after is not before:
+            before.write(path / BEFORE)
+        after.write(path)
+        write_text(path / DIAGNOSIS, json_text(diagnosis_json(diagnosis)))
+        if report:
+            after.write_page(path, diagnosis)
+        run.folder.close()
+    return DiagnoseResult(run.path, diagnosis, before, after)
+
+
+def _diagnosed(problem: Problem, before: FitResult, run: Run, n_null: int) -> tuple[Diagnosis, FitResult]:
+    """Search, null control, verdict and refits of a fitted board; nothing is written but checkpoints."""
+    posed, stages = before.inference.problem, run.stages
     stages.begin("search for effects", _SEARCH)
     ground, found = full_search(baseline_of(posed), tell=stages.reached)
     stages.begin("effects that are known", _KNOWN)
@@ -185,14 +200,8 @@ def _diagnose_board(problem: Problem, run: Run, n_null: int, *, report: bool) ->
     in_part = named_in_part(found, verdict, folded)
     finals = verdict.fitted_again[:_MOST_FINALISTS]
     stages.left = FIT * len(finals) + (_CHOICE if verdict.index else 0.0)
-    fits, failures = {0: before}, []
-    for answer in finals:
-        try:
-            name = "-".join((*answer.members, str(answer.index)))
-            stage = f"fit with {answer_words(found, answer)}"
-            fits[answer.index] = run.fit(with_board(problem, refit_board(found, answer.index)), name, stage)
-        except (NotIdentifiableError, NotConvergedError) as error:
-            failures.append(f"the model could not be fitted again with {' and '.join(answer.members)}: {error}")
+    again, failures = _fitted_again(problem, run, found, finals)
+    fits = {0: before, **again}
     last = verdict.tried if (verdict.index or in_part) and verdict.tried in fits else 0
     after = fits[last]
     known_carrying = (carrying_modes(posed.board, one.errors.leverages, MODULI) for one in known)
@@ -227,16 +236,22 @@ def _diagnose_board(problem: Problem, run: Run, n_null: int, *, report: bool) ->
             carrying=carrying_any,
         )
     )
-    if run.folder is not None:
-        path = run.folder.path
-        if last:
-            before.write(path / BEFORE)
-        after.write(path)
-        write_text(path / DIAGNOSIS, json_text(diagnosis_json(diagnosis)))
-        if report:
-            after.write_page(path, diagnosis)
-        run.folder.close()
-    return DiagnoseResult(run.path, diagnosis, before, after)
+    return diagnosis, after
+
+
+def _fitted_again(
+    problem: Problem, run: Run, found: Found, finals: Sequence[Answer]
+) -> tuple[dict[int, FitResult], list[str]]:
+    """The fits with the finalists among the answers, by index, and a sentence for each that failed."""
+    fits, failures = {}, []
+    for answer in finals:
+        try:
+            name = "-".join((*answer.members, str(answer.index)))
+            stage = f"fit with {answer_words(found, answer)}"
+            fits[answer.index] = run.fit(with_board(problem, refit_board(found, answer.index)), name, stage)
+        except (NotIdentifiableError, NotConvergedError) as error:
+            failures.append(f"the model could not be fitted again with {' and '.join(answer.members)}: {error}")
+    return fits, failures
 
 
 def _measured(one: FitResult) -> NDArray[np.float64]:
