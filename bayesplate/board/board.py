@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bayesplate.board.board_keys import WARPS, BoardKeys, MaterialKeys, PlateKeys, read_board
+from bayesplate.board.board_keys import BoardKeys, MaterialKeys, PlateKeys, read_board
 from bayesplate.board.card_file import CardFile
 from bayesplate.board.coefficients import CoefficientCard
 from bayesplate.board.inputs import INPUTS, KINDS, parameters_of, unknown_name, usual_poisson, warps_of
@@ -20,11 +20,12 @@ from bayesplate.board.material import ISOTROPIC, ORTHOTROPIC, Symmetry
 from bayesplate.board.parameter import BOARD, Parameter
 from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.setup import NOISE_WANTED, Setup
-from bayesplate.board.stated import are, quantities_of, unstatable, wrong_types
+from bayesplate.board.setup import Setup
+from bayesplate.board.stated import are, quantities_of, wrong_types
+from bayesplate.board.unstatable import unstatable
 from bayesplate.board.words import effect_named
 from bayesplate.board.writing import toml_text, write_card
-from bayesplate.errors import Fault, InputError
+from bayesplate.errors import InputError
 
 Values = Mapping[str, NDArray[np.float64]]
 """Values of named quantities, SI: each a number or an (n_draws,) array."""
@@ -340,7 +341,7 @@ class Board:
         """The table of its card; raises InputError if a quantity has a density that no card can state."""
         own = [one for one in self.parameters if one.owner == BOARD and not one.is_of_effect and not one.is_assumed]
         inputs = {one.name: one.prior for one in own}
-        faults = [*self._unstatable()]
+        faults = [*unstatable(self)]
         if faults:
             raise InputError(faults)
         poisson_xy = inputs.pop("poisson_xy", None)
@@ -359,23 +360,6 @@ class Board:
             **keys.model_dump(by_alias=True, exclude_defaults=True, exclude={"setups"}),
             "setup": setups[0] if len(setups) == 1 else setups,
         }
-
-    def _unstatable(self) -> Iterator[Fault]:
-        """A fault for every quantity that a card cannot state."""
-        for one in self.parameters:
-            if not one.is_of_effect and one.owner.kind != "group":  # sessions are found again when the card is read
-                yield from unstatable(one.name, one.prior, "normal" if one.name == "poisson_xy" else "log-normal")
-        for name, modulus in (("shear_xz", self.shear_xz), ("shear_yz", self.shear_yz)):
-            if modulus is not None:
-                yield from unstatable(name, modulus)
-        for setup in self.setups:
-            for place, quantity in setup.uncertain_keys():
-                yield from unstatable(f"{setup.name} {place}", quantity)
-        for name, rise in self.warp.items():
-            yield from unstatable(f"warp {name}", rise, "normal", WARPS[name])
-        for setup in self.setups:
-            if setup.noise.is_exact:
-                yield Fault(f"{setup.name} noise", NOISE_WANTED, "an exact number")
 
     def to_toml(self, path: str | os.PathLike[str] | None = None, *, force: bool = False) -> str:
         """The board as a card, in TOML.

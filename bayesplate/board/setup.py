@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from numbers import Real
@@ -292,19 +292,6 @@ class Setup:
         )
         stated = keys.model_dump(by_alias=True, exclude_defaults=True)
         return {"name": self.name, **stated, **({"frequencies_hz": frequencies} if frequencies else {})}
-
-    def uncertain_keys(self) -> Iterator[tuple[str, Quantity]]:
-        """Every log-normal quantity that a card states of the setup, with its place."""
-        yield "noise", self.noise
-        yield from ((str(reading.label), reading.frequency) for reading in self.readings)
-        yield from ((f"peak {i}", peak.frequency) for i, peak in enumerate(self.peaks, start=1))
-        for i, item in enumerate(self.attached, start=1):
-            stated = (item.mass, item.coil, item.suspension, item.resonance)
-            yield from ((f"attached {i}", one) for one in stated if one is not None)
-        if self.fluid is not None and self.fluid.density is not None:
-            yield "fluid", self.fluid.density
-        if self.bounce is not None:
-            yield "bounce", self.bounce
 
     def assuming_noise(self, prior: PriorCard | None = None) -> Setup:
         """The setup with the noise of a prior, or else of its edges, in place of any that it has."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import TypeVar
@@ -66,13 +65,3 @@ def is_place(value: object) -> bool:
     except ValueError:
         return False
     return pair.shape == (2,) and pair.dtype.kind in "iuf"
-
-
-def unstatable(place: str, one: Quantity, kind: Kind = "log-normal", lower: float = -math.inf) -> list[Fault]:
-    """Faults of a quantity that a card cannot state, because its key takes one kind and one lower bound."""
-    if one.is_exact or (one.kind == kind and (one.lower, one.upper) == (lower, math.inf)):
-        return []
-    is_bounded = math.isfinite(one.lower) or math.isfinite(one.upper)
-    got = f"a {one.kind} one" + (" with bounds" if is_bounded else "")
-    bounds = f"from {lower:g} on" if math.isfinite(lower) else "without bounds"
-    return [Fault(place, f"a {kind} quantity {bounds}, as cards state it", got)]
