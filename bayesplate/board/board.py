@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bayesplate.board.board_keys import BoardKeys, MaterialKeys, PlateKeys, read_board
-from bayesplate.board.card_file import CardFile
 from bayesplate.board.coefficients import CoefficientCard
 from bayesplate.board.inputs import INPUTS, KINDS, parameters_of, unknown_name, usual_poisson, warps_of
 from bayesplate.board.material import ISOTROPIC, ORTHOTROPIC, Symmetry
@@ -21,6 +20,7 @@ from bayesplate.board.parameter import BOARD, Parameter
 from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
+from bayesplate.board.shelf import CardFile
 from bayesplate.board.stated import are, quantities_of, wrong_types
 from bayesplate.board.unstatable import unstatable
 from bayesplate.board.words import effect_named

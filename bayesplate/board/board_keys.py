@@ -10,14 +10,13 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from bayesplate.board.card_file import CardFile
 from bayesplate.board.fragment import merged
 from bayesplate.board.measures import DENSITY, POISSON, QuantityReader
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.repeated import CALIPER, FEELER, FURTHEST_SIZES, RULE, SCALES
 from bayesplate.board.schema import Card, Section, place, validated
 from bayesplate.board.setup_keys import SetupKeys
-from bayesplate.board.shelf import CAMPAIGN_REMEDY
+from bayesplate.board.shelf import CAMPAIGN_REMEDY, CardFile
 from bayesplate.board.values import (
     Complaint,
     Key,

@@ -9,9 +9,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr
 
-from bayesplate.board.card_file import CardFile
 from bayesplate.board.schema import Card, Section, place, validated
-from bayesplate.board.shelf import card_names
+from bayesplate.board.shelf import CardFile, card_names
 from bayesplate.board.toml import read_file, read_table
 from bayesplate.board.values import (
     Choice,

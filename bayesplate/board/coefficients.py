@@ -10,11 +10,11 @@ from typing import Annotated
 
 from pydantic import Field
 
-from bayesplate.board.card_file import CardFile
 from bayesplate.board.measures import FIRST_LABEL, LARGEST_POISSON, by_label
 from bayesplate.board.reading import NO_OFFSET
 from bayesplate.board.schema import Card, Section, validated
 from bayesplate.board.setup_keys import Edges
+from bayesplate.board.shelf import CardFile
 from bayesplate.board.values import (
     Complaint,
     Key,

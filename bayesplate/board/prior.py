@@ -10,12 +10,12 @@ from typing import Any
 
 from pydantic import Field
 
-from bayesplate.board.card_file import CardFile
 from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.board.prior_keys import DensityPrior, ElasticPrior, NoisePrior, PoissonPrior, RigidityPrior
 from bayesplate.board.prior_keys import StatedPrior as StatedPrior
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.schema import Card, validated
+from bayesplate.board.shelf import CardFile
 from bayesplate.board.stated import wrong_types
 from bayesplate.board.words import did_you_mean
 from bayesplate.board.writing import toml_text, write_card

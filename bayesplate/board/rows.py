@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 from bayesplate.board.board import Board
 from bayesplate.board.board_keys import BoardKeys
-from bayesplate.board.card_file import CardFile
 from bayesplate.board.schema import sections_of
+from bayesplate.board.shelf import CardFile
 from bayesplate.board.words import did_you_mean, quoted
 from bayesplate.errors import Fault, InputError
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args, get_type_hints
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 
-from bayesplate.board.card_file import CardFile
+from bayesplate.board.shelf import CardFile
 from bayesplate.board.values import Complaint, Key, Refusal, read_format, read_name, read_text
 from bayesplate.board.words import did_you_mean, name_complaint, quoted, shown
 from bayesplate.errors import Fault, InputError

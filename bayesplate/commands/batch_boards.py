@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from bayesplate.board.board import Board
-from bayesplate.board.card_file import CardFile
 from bayesplate.board.csv_table import csv_table
 from bayesplate.board.rows import Cell, Columns, is_empty
+from bayesplate.board.shelf import CardFile
 from bayesplate.board.toml import read_file, read_table
 from bayesplate.errors import Fault, InputError, plain
 from bayesplate.grading.storage import parquet_library

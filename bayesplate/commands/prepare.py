@@ -11,12 +11,11 @@ import numpy as np
 
 from bayesplate.board.board import Board, assumed_notes
 from bayesplate.board.campaign import is_campaign
-from bayesplate.board.card_file import CardFile
 from bayesplate.board.checks import physical_faults, remarks
 from bayesplate.board.named import NamedCards, load_named
 from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.board.sessions import notes as session_notes
-from bayesplate.board.shelf import find
+from bayesplate.board.shelf import CardFile, find
 from bayesplate.board.words import effect_named
 from bayesplate.effects import declare, effect_faults, implied_effects, notes
 from bayesplate.errors import Fault, InputError
