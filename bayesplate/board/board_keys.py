@@ -21,13 +21,13 @@ from bayesplate.board.values import (
     Complaint,
     Key,
     Number,
+    Reference,
     Refusal,
+    Text,
     one_or_more,
     read_effects,
-    read_reference,
     read_switch,
     read_table,
-    read_text,
 )
 from bayesplate.board.words import quoted, shown
 from bayesplate.errors import Fault, InputError
@@ -96,14 +96,14 @@ class MaterialKeys(Section):
     shear_xz: Annotated[Quantity | None, _SHEAR] = Field(default=None, alias="shear_xz_gpa")
     shear_yz: Annotated[Quantity | None, _SHEAR] = Field(default=None, alias="shear_yz_gpa")
     isotropic: Annotated[bool, Key(read_switch)] = False
-    prior: Annotated[str, Key(read_reference)] = DEFAULT_PRIOR
+    prior: Reference = DEFAULT_PRIOR
 
 
 class BoardKeys(Card):
     """A board card, in SI units. `read_board` makes one; a `Board` is made from it."""
 
-    source: Annotated[str, Key(read_text)] = ""
-    notes: Annotated[str, Key(read_text)] = ""
+    source: Text = ""
+    notes: Text = ""
     effects: Annotated[tuple[str, ...] | None, Key(read_effects, list)] = None
     plate: PlateKeys = Field(description="a [plate] table")
     material: MaterialKeys = MaterialKeys()

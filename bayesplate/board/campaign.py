@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeGuard, get_args
 
 from pydantic import Field, PrivateAttr
 
@@ -17,21 +17,21 @@ from bayesplate.board.values import (
     Complaint,
     Key,
     Number,
+    Reference,
     Refusal,
+    Text,
     one_or_more,
     read_each,
     read_effect,
     read_effects,
     read_list,
     read_reference,
-    read_text,
 )
 from bayesplate.board.words import effect_named, quoted
 from bayesplate.errors import Fault, plain
 
 FEWEST_BOARDS, MOST_BOARDS = 2, 200
 MOST_SHARED = 10
-WAYS = ("value", "ratio")
 Way = Literal["value", "ratio"]
 
 
@@ -50,21 +50,21 @@ class SharedSection(Section):
     """An effect whose parameters all boards have in common: their values, or their ratios to the boards' moduli."""
 
     effect: Annotated[str, Key(read_effect)] = Field(description="the name of an effect")
-    way: Annotated[Way, Key(Choice(WAYS))] = Field(default="value", alias="as")
+    way: Annotated[Way, Key(Choice(get_args(Way)))] = Field(default="value", alias="as")
     scatter_percent: Annotated[float, Key(Number(0.1, 100, "%"))] = 0.0  # scale by which a board's own may differ
 
 
 class PopulationSection(Section):
     """That the boards' constants share a distribution, and what is believed of it before measuring."""
 
-    prior: Annotated[str, Key(read_reference)] = Field(description="a card of models/priors")
+    prior: Reference = Field(description="a card of models/priors")
 
 
 class CampaignCard(Card):
     """Boards and what they share. `load_campaign` makes one."""
 
-    source: Annotated[str, Key(read_text)] = ""
-    notes: Annotated[str, Key(read_text)] = ""
+    source: Text = ""
+    notes: Text = ""
     boards: Annotated[tuple[str, ...], Key(_read_boards)] = Field(description="a list of board cards")
     effects: Annotated[tuple[str, ...], Key(read_effects)] = ()
     shared: Annotated[tuple[SharedSection, ...], one_or_more("[[shared]] tables", MOST_SHARED)] = ()
@@ -100,7 +100,7 @@ def load_campaign(name_or_path: str | os.PathLike[str]) -> CampaignCard:
     return validated(CampaignCard, CardFile.load("campaigns", name_or_path), _twice)
 
 
-def is_campaign(name_or_path: object) -> bool:
+def is_campaign(name_or_path: object) -> TypeGuard[str | os.PathLike[str]]:
     """Whether it is the name of a campaign, or a card that lists boards; a file that cannot be read is none."""
     if not isinstance(name_or_path, str | os.PathLike):
         return False

@@ -15,16 +15,7 @@ from bayesplate.board.reading import NO_OFFSET
 from bayesplate.board.schema import Card, Section, validated
 from bayesplate.board.setup_keys import Edges
 from bayesplate.board.shelf import CardFile
-from bayesplate.board.values import (
-    Complaint,
-    Key,
-    Number,
-    Refusal,
-    read_each,
-    read_list,
-    read_table,
-    read_text,
-)
+from bayesplate.board.values import Complaint, Key, Number, Refusal, Text, read_each, read_list, read_table
 from bayesplate.board.words import shown
 from bayesplate.labels import Label
 
@@ -98,7 +89,7 @@ class TrainingSection(Section):
 class CoefficientCard(Card):
     """A printed or computed table of a, b, c. `load_coefficients` makes one."""
 
-    source: Annotated[str, Key(read_text)] = Field(description="where the numbers come from")
+    source: Text = Field(description="where the numbers come from")
     aspect_ratio: Annotated[float, Key(_read_aspect)] = Field(description="[L_x, L_y] or their ratio")
     first_label: Annotated[Label, FIRST_LABEL] = NO_OFFSET
     edges: Edges = Field(description="how the four edges are held")

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 
 from bayesplate.board.shelf import CardFile
-from bayesplate.board.values import Complaint, Key, Refusal, read_format, read_name, read_text
+from bayesplate.board.values import Complaint, Key, Refusal, Text, read_format, read_name
 from bayesplate.board.words import did_you_mean, name_complaint, quoted, shown
 from bayesplate.errors import Fault, InputError
 
@@ -31,7 +31,7 @@ class Card(Section):
 
     format: Annotated[Literal[1], Key(read_format)] = Field(description="1")
     name: Annotated[str, Key(read_name)] = Field(description="the name of the file without .toml")
-    title: Annotated[str, Key(read_text)] = ""
+    title: Text = ""
 
 
 CardModel = TypeVar("CardModel", bound=Card)

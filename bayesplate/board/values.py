@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from pydantic import BeforeValidator
 from pydantic_core import core_schema
@@ -270,3 +270,7 @@ def read_effects(value: object) -> tuple[str, ...]:
     if twice:
         raise Refusal(Complaint("each name once", f"{listed(twice)} twice"))
     return tuple(read)
+
+
+Text = Annotated[str, Key(read_text)]
+Reference = Annotated[str, Key(read_reference)]

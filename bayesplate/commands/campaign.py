@@ -118,16 +118,15 @@ def by_kind(
 
     Raises InputError as `Problem.from_card` and `Campaign.from_card`; also for a Campaign beside what it states itself.
     """
-    is_card = isinstance(given, str | os.PathLike) and is_campaign(given)
-    if setup is not None and (is_card or isinstance(given, Campaign)):
-        raise InputError(Fault("setup", "a board, whose setup it completes", "a campaign", "give it to each board"))
-    if isinstance(given, Campaign):
+    if isinstance(given, Campaign) or is_campaign(given):
+        if setup is not None:
+            raise InputError(Fault("setup", "a board, whose setup it completes", "a campaign", "give it to each board"))
+        if not isinstance(given, Campaign):
+            return of_campaign(Campaign.from_card(given, effects, law, robust))
         if effects is not None or law is not None or robust:
             wanted, remedy = "nothing beside a Campaign", "Campaign.from_card takes it"
             raise InputError(Fault("effects, law, robust", wanted, "a value", remedy))
         return of_campaign(given)
-    if is_card and isinstance(given, str | os.PathLike):
-        return of_campaign(Campaign.from_card(given, effects, law, robust))
     return of_board(
         as_problem(
             given, effects=effects, law=law, robust=robust, setup=setup, may_lack_frequencies=may_lack_frequencies
