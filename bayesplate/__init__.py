@@ -37,106 +37,6 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from bayesplate.board.attached import AttachedItem, DeclaredFluid
-    from bayesplate.board.board import Board
-    from bayesplate.board.prior import PriorCard
-    from bayesplate.board.quantity import Quantity
-    from bayesplate.board.reading import Peak, Reading
-    from bayesplate.board.setup import Setup
-    from bayesplate.campaign.checking import CampaignCheck
-    from bayesplate.campaign.diagnosis import CampaignDiagnosis
-    from bayesplate.campaign.summary import CampaignSummary
-    from bayesplate.commands.batch import BatchResult, batch
-    from bayesplate.commands.campaign import Campaign
-    from bayesplate.commands.campaign_diagnose import CampaignDiagnoseResult
-    from bayesplate.commands.campaign_fit import CampaignFitResult
-    from bayesplate.commands.check import CheckResult, check
-    from bayesplate.commands.cite import cite
-    from bayesplate.commands.compare import CompareResult, compare
-    from bayesplate.commands.diagnose import DiagnoseResult, diagnose
-    from bayesplate.commands.fit import fit
-    from bayesplate.commands.fit_board import FitRequest, fit_board
-    from bayesplate.commands.fitting import FitResult
-    from bayesplate.commands.modes import ModesResult, modes
-    from bayesplate.commands.new import new
-    from bayesplate.commands.pick import PickResult, pick
-    from bayesplate.commands.plan import PlanResult, plan
-    from bayesplate.commands.problem import Problem
-    from bayesplate.diagnosis.result import Diagnosis
-    from bayesplate.errors import (
-        BatchError,
-        BayesplateError,
-        CheckpointError,
-        Fault,
-        InputError,
-        NotConvergedError,
-        NotIdentifiableError,
-    )
-    from bayesplate.grading.matching import Grading, GradingRequest
-    from bayesplate.labels import Label
-    from bayesplate.planning.plan import Plan
-    from bayesplate.recordings.contract import PickReport
-    from bayesplate.results.checking import CheckReport
-    from bayesplate.results.comparison import Comparison
-    from bayesplate.results.sheets import ModesReport
-    from bayesplate.results.summary import Summary
-
-__all__ = [
-    "AttachedItem",
-    "BatchError",
-    "BatchResult",
-    "BayesplateError",
-    "Board",
-    "Campaign",
-    "CampaignCheck",
-    "CampaignDiagnoseResult",
-    "CampaignDiagnosis",
-    "CampaignFitResult",
-    "CampaignSummary",
-    "CheckReport",
-    "CheckResult",
-    "CheckpointError",
-    "CompareResult",
-    "Comparison",
-    "DeclaredFluid",
-    "DiagnoseResult",
-    "Diagnosis",
-    "Fault",
-    "FitRequest",
-    "FitResult",
-    "Grading",
-    "GradingRequest",
-    "InputError",
-    "Label",
-    "ModesReport",
-    "ModesResult",
-    "NotConvergedError",
-    "NotIdentifiableError",
-    "Peak",
-    "PickReport",
-    "PickResult",
-    "Plan",
-    "PlanResult",
-    "PriorCard",
-    "Problem",
-    "Quantity",
-    "Reading",
-    "Setup",
-    "Summary",
-    "batch",
-    "check",
-    "cite",
-    "compare",
-    "diagnose",
-    "fit",
-    "fit_board",
-    "modes",
-    "new",
-    "pick",
-    "plan",
-]
-
 _HOMES = {
     "AttachedItem": "bayesplate.board.attached",
     "BatchError": "bayesplate.errors",
@@ -191,7 +91,63 @@ _HOMES = {
     "pick": "bayesplate.commands.pick",
     "plan": "bayesplate.commands.plan",
 }
-"""Where each name is defined."""
+"""Where each public name is defined; a type checker, which cannot follow it, reads the imports below."""
+
+if TYPE_CHECKING:
+    from bayesplate.board.attached import AttachedItem as AttachedItem
+    from bayesplate.board.attached import DeclaredFluid as DeclaredFluid
+    from bayesplate.board.board import Board as Board
+    from bayesplate.board.prior import PriorCard as PriorCard
+    from bayesplate.board.quantity import Quantity as Quantity
+    from bayesplate.board.reading import Peak as Peak
+    from bayesplate.board.reading import Reading as Reading
+    from bayesplate.board.setup import Setup as Setup
+    from bayesplate.campaign.checking import CampaignCheck as CampaignCheck
+    from bayesplate.campaign.diagnosis import CampaignDiagnosis as CampaignDiagnosis
+    from bayesplate.campaign.summary import CampaignSummary as CampaignSummary
+    from bayesplate.commands.batch import BatchResult as BatchResult
+    from bayesplate.commands.batch import batch as batch
+    from bayesplate.commands.campaign import Campaign as Campaign
+    from bayesplate.commands.campaign_diagnose import CampaignDiagnoseResult as CampaignDiagnoseResult
+    from bayesplate.commands.campaign_fit import CampaignFitResult as CampaignFitResult
+    from bayesplate.commands.check import CheckResult as CheckResult
+    from bayesplate.commands.check import check as check
+    from bayesplate.commands.cite import cite as cite
+    from bayesplate.commands.compare import CompareResult as CompareResult
+    from bayesplate.commands.compare import compare as compare
+    from bayesplate.commands.diagnose import DiagnoseResult as DiagnoseResult
+    from bayesplate.commands.diagnose import diagnose as diagnose
+    from bayesplate.commands.fit import fit as fit
+    from bayesplate.commands.fit_board import FitRequest as FitRequest
+    from bayesplate.commands.fit_board import fit_board as fit_board
+    from bayesplate.commands.fitting import FitResult as FitResult
+    from bayesplate.commands.modes import ModesResult as ModesResult
+    from bayesplate.commands.modes import modes as modes
+    from bayesplate.commands.new import new as new
+    from bayesplate.commands.pick import PickResult as PickResult
+    from bayesplate.commands.pick import pick as pick
+    from bayesplate.commands.plan import PlanResult as PlanResult
+    from bayesplate.commands.plan import plan as plan
+    from bayesplate.commands.problem import Problem as Problem
+    from bayesplate.diagnosis.result import Diagnosis as Diagnosis
+    from bayesplate.errors import BatchError as BatchError
+    from bayesplate.errors import BayesplateError as BayesplateError
+    from bayesplate.errors import CheckpointError as CheckpointError
+    from bayesplate.errors import Fault as Fault
+    from bayesplate.errors import InputError as InputError
+    from bayesplate.errors import NotConvergedError as NotConvergedError
+    from bayesplate.errors import NotIdentifiableError as NotIdentifiableError
+    from bayesplate.grading.matching import Grading as Grading
+    from bayesplate.grading.matching import GradingRequest as GradingRequest
+    from bayesplate.labels import Label as Label
+    from bayesplate.planning.plan import Plan as Plan
+    from bayesplate.recordings.contract import PickReport as PickReport
+    from bayesplate.results.checking import CheckReport as CheckReport
+    from bayesplate.results.comparison import Comparison as Comparison
+    from bayesplate.results.sheets import ModesReport as ModesReport
+    from bayesplate.results.summary import Summary as Summary
+else:
+    __all__ = sorted(_HOMES)
 
 
 def __getattr__(name: str) -> object:

@@ -1,4 +1,4 @@
-"""What `new` is told on the terminal: answers to questions, each of which may be skipped."""
+"""The questions of `new` on the terminal, each of which may be skipped."""
 
 from __future__ import annotations
 

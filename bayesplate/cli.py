@@ -56,23 +56,11 @@ def main() -> None:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a command found.
+    """What a command found, and what it prints; an error of `then`, called at the end, is the command's."""
 
-    Attributes
-    ----------
-    content : object
-        What `--json` prints.
-    shown : callable, optional
-        What people are shown.
-    closing : str
-        Where things were written, and what comes next.
-    then : callable, optional
-        Called at the end; its error is the command's.
-    """
-
-    content: Any
+    content: Any  # what `--json` prints
     shown: Callable[[], Shown] | None = None
-    closing: str = ""
+    closing: str = ""  # where things were written, and what comes next
     then: Callable[[], None] | None = None
 
     def print(self, *, as_json: bool, quiet: bool) -> None:
@@ -87,14 +75,9 @@ class Answer:
 
 
 class Command(click.Command):
-    """A public function as a command: what it takes is what the signature says.
+    """A public function as a command of its name: what it takes is what the signature says.
 
     The function, and with it the libraries, is loaded when the command is called or its help is read.
-
-    Parameters
-    ----------
-    answer : callable
-        Calls the function with the arguments that were given, and says what is printed; it bears the function's name.
     """
 
     def __init__(self, answer: Callable[..., Answer]) -> None:
@@ -108,7 +91,7 @@ class Command(click.Command):
 
     @cached_property
     def _arguments(self) -> Mapping[str, inspect.Parameter]:
-        """Those that the function itself states, whatever a tool writes on what is wrapped around it."""
+        """Parameters of the function itself, without those of its wrappers."""
         return inspect.signature(inspect.unwrap(self._function)).parameters
 
     @cached_property
@@ -120,7 +103,7 @@ class Command(click.Command):
         return {name: found[name] for name in (*alone, *_SHARED) if name in found}
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        """Those of the function, and those of the printing."""
+        """Parameters of the function, and those of the printing."""
         if not self.params:
             for name, part in self._options.items():
                 self.params += part.parameters(name, self._arguments[name].default)
@@ -171,10 +154,8 @@ def command(answer: Callable[..., Answer]) -> Command:
 @command
 def check(run: Callable[..., Any], **asked: Any) -> Answer:
     """Every fault of CARD, or what a fit of it can identify."""
-    from bayesplate.commands.shown import show_check
-
     report = run(**asked)
-    return Answer(report, lambda: show_check(report))
+    return Answer(report, report.shown)
 
 
 @command
@@ -183,19 +164,15 @@ def fit(run: Callable[..., Any], **asked: Any) -> Answer:
 
     Writes report.html, summary.json and posterior.nc.
     """
-    from bayesplate.commands.shown import show_fit
-
     result = run(**asked)
-    return Answer(result.summary, lambda: show_fit(result.summary), f"written to {result.folder}")
+    return Answer(result.summary, result.shown, f"written to {result.folder}")
 
 
 @command
 def modes(run: Callable[..., Any], **asked: Any) -> Answer:
     """Lowest modes of CARD, and a sheet of their Chladni figures."""
-    from bayesplate.commands.shown import show_modes
-
     result = run(**asked)
-    return Answer(result.summary, lambda: show_modes(result.summary))
+    return Answer(result.summary, result.shown)
 
 
 @command
@@ -204,10 +181,8 @@ def compare(run: Callable[..., Any], **asked: Any) -> Answer:
 
     Each as a thin and as a shear-flexible plate.
     """
-    from bayesplate.commands.shown import show_compare
-
     result = run(**asked)
-    return Answer(result, lambda: show_compare(result))
+    return Answer(result, result.shown)
 
 
 @command
@@ -216,10 +191,8 @@ def diagnose(run: Callable[..., Any], **asked: Any) -> Answer:
 
     Adds the effect, and reports the error before and after.
     """
-    from bayesplate.commands.shown import show_diagnosis
-
     result = run(**asked)
-    return Answer(result.to_json(), lambda: show_diagnosis(result.diagnosis), f"written to {result.folder}")
+    return Answer(result.to_json(), result.shown, f"written to {result.folder}")
 
 
 @command
@@ -228,11 +201,9 @@ def plan(run: Callable[..., Any], **asked: Any) -> Answer:
 
     Ranks measurements by what they are expected to give and what they cost.
     """
-    from bayesplate.commands.shown import show_plan
-
     result = run(**asked)
     closing = f"written to {asked['out']}: {', '.join(path.name for path in result.files)}"
-    return Answer(result.summary, lambda: show_plan(result.summary), closing)
+    return Answer(result.summary, result.shown, closing)
 
 
 @command
@@ -263,13 +234,12 @@ def pick(run: Callable[..., Any], **asked: Any) -> Answer:
     Writes the [setup] that a card takes, too.
     """
     from bayesplate.commands.pick import FRAGMENT, PAGE
-    from bayesplate.commands.pick_words import show_pick
 
     out = asked["out"]
     result = run(**asked)
     completes = f"{quote(asked.get('card') or 'CARD')} --setup {quote(f'{out}/{FRAGMENT}')}"
     closing = f"written to {out}: {FRAGMENT}, {PAGE}. Next: bayesplate fit {completes}"
-    return Answer(result.summary, lambda: show_pick(result.summary), closing)
+    return Answer(result.summary, result.shown, closing)
 
 
 @command
@@ -288,8 +258,6 @@ def batch(run: Callable[..., Any], **asked: Any) -> Answer:
 
     One table of all, and a page that grades them. SOURCE is the folder or the table.
     """
-    from bayesplate.commands.shown import show_batch
-
     result = run(**asked)
     closing = f"written to {result.folder}"
-    return Answer(result.summary, lambda: show_batch(result.summary, result.grading), closing, result.require_all)
+    return Answer(result.summary, result.shown, closing, result.require_all)

@@ -13,13 +13,7 @@ from bayesplate.errors import Fault, InputError, UnwritableError
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[BinaryIO]:
-    """A stream whose content takes the place of a file when it is complete, even after a power cut.
-
-    Raises
-    ------
-    OSError
-        If the disk is full or the place is not ours; what stood there before stays.
-    """
+    """A stream that takes the place of a file when it is complete, even after a power cut; raises OSError."""
     partial = path.with_name(path.name + ".partial")
     try:
         with partial.open("wb") as stream:
@@ -33,13 +27,7 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Writing a file or a folder's files: what the system refuses is told with the place.
-
-    Raises
-    ------
-    UnwritableError
-        In place of an OSError.
-    """
+    """Writing files at a place: an OSError becomes an UnwritableError that tells of it."""
     try:
         yield
     except OSError as error:
@@ -49,30 +37,18 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def write_bytes(path: Path, data: bytes) -> None:
-    """Write a file completely or not at all.
-
-    Raises
-    ------
-    UnwritableError
-        If the disk is full or the place is not ours.
-    """
+    """Write a file completely or not at all; raises UnwritableError."""
     with writing(path), whole_file(path) as stream:
         stream.write(data)
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file completely or not at all; raises as `write_bytes`."""
+    """Write a text file completely or not at all; raises UnwritableError."""
     write_bytes(path, text.encode("utf-8"))
 
 
 def make_folder(folder: Path) -> None:
-    """Make the folder of an output.
-
-    Raises
-    ------
-    UnwritableError
-        If it cannot be made.
-    """
+    """Make the folder of an output; raises UnwritableError."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -81,13 +57,7 @@ def make_folder(folder: Path) -> None:
 
 
 def names_in(folder: Path) -> list[str]:
-    """What a folder of outputs holds; nothing where there is none yet.
-
-    Raises
-    ------
-    InputError
-        If it is no folder, or the system does not let us look.
-    """
+    """What a folder of outputs holds, nothing where there is none yet; raises InputError if it cannot be looked at."""
     try:
         return os.listdir(folder)
     except FileNotFoundError:
@@ -99,13 +69,7 @@ def names_in(folder: Path) -> list[str]:
 
 
 def require_new(folder: Path, names: Iterable[str], *, force: bool) -> tuple[Path, ...]:
-    """The files that a command will write beside others, checked before any work and without writing.
-
-    Raises
-    ------
-    InputError
-        If one is there and `force` is not given, or if the folder is no folder.
-    """
+    """The files that a command will write, checked before any work; InputError if one is there and not `force`."""
     found = set(names_in(folder))
     paths = tuple(folder / name for name in names)
     there = [path.name for path in paths if path.name in found]

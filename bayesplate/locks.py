@@ -12,14 +12,9 @@ from bayesplate.errors import CheckpointError
 
 
 def take(folder: Path) -> IO[bytes]:
-    """Lock a folder for sole use until the stream that is returned is closed; made if it is not there.
+    """Lock a folder, made if need be, for sole use until the stream is closed; CheckpointError if another run has it.
 
     The system frees the lock of a process that died, so none is ever stale.
-
-    Raises
-    ------
-    CheckpointError
-        If another run holds it, or it cannot be written to; nothing in it is changed then.
     """
     path = folder / "lock"
     while True:
@@ -49,13 +44,7 @@ def take(folder: Path) -> IO[bytes]:
 
 
 def _try_lock(stream: IO[bytes]) -> bool:
-    """Lock an open file for as long as it stays open; False if another one holds it.
-
-    Raises
-    ------
-    OSError
-        If the file system knows no locks; the file is closed then.
-    """
+    """Lock an open file for as long as it stays open; False if another one holds it, OSError if there are no locks."""
     try:
         if sys.platform == "win32":
             import msvcrt

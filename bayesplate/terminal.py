@@ -43,13 +43,7 @@ def print_json(content: Any) -> None:
 
 
 def say(text: str, *, nl: bool = True) -> None:
-    """Print a text on the standard output; the name of a folder in it may hold anything, and steers nothing.
-
-    Raises
-    ------
-    UnwritableError
-        If it cannot be written, as on a full disk.
-    """
+    """Print a text; the name of a folder in it may hold anything, and steers nothing. Raises UnwritableError."""
     _write("\n".join(plain(line) for line in text.split("\n")) + "\n" * nl)
 
 

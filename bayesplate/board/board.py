@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,36 +12,23 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bayesplate.board.board_keys import WARPS, BoardKeys, MaterialKeys, PlateKeys, read_board
-from bayesplate.board.card_file import CardFile
+from bayesplate.board.board_keys import BoardKeys, MaterialKeys, PlateKeys, read_board
 from bayesplate.board.coefficients import CoefficientCard
+from bayesplate.board.inputs import INPUTS, KINDS, parameters_of, unknown_name, usual_poisson, warps_of
 from bayesplate.board.material import ISOTROPIC, ORTHOTROPIC, Symmetry
 from bayesplate.board.parameter import BOARD, Parameter
 from bayesplate.board.prior import PriorCard, load_prior
-from bayesplate.board.quantity import Kind, Quantity
-from bayesplate.board.random_field import PlacedReadings, conditioned, thickness_readings, width_readings
-from bayesplate.board.setup import NOISE_WANTED, Setup
-from bayesplate.board.stated import are, quantities_of, unstatable, wrong_types
-from bayesplate.board.words import did_you_mean, effect_named
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import Setup
+from bayesplate.board.shelf import CardFile
+from bayesplate.board.stated import are, quantities_of, wrong_types
+from bayesplate.board.unstatable import unstatable
+from bayesplate.board.words import effect_named
 from bayesplate.board.writing import toml_text, write_card
-from bayesplate.errors import Fault, InputError
+from bayesplate.errors import InputError
 
 Values = Mapping[str, NDArray[np.float64]]
 """Values of named quantities, SI: each a number or an (n_draws,) array."""
-
-INPUTS = {
-    "length_x": ("m", "length along the grain"),
-    "length_y": ("m", "length across the grain"),
-    "thickness": ("m", "thickness"),
-    "mass": ("kg", "mass"),
-    "density": ("kg/m^3", "density"),
-    "poisson_xy": ("1", "Poisson ratio nu_xy"),
-}
-"""What a card states of a board: unit, and what people call it."""
-_KINDS: Mapping[str, Kind] = {"poisson_xy": "normal"}
-DEFAULT_POISSON = Quantity.from_mean(0.4, 0.08, "normal")
-ISOTROPIC_POISSON = Quantity.from_mean(0.3, 0.06, "normal")
-"""Of an isotropic board: foams and glass lie near 0.2, most metals near 0.3, acrylic near 0.37."""
 
 
 @dataclass(frozen=True)
@@ -143,8 +129,8 @@ class Board:
         """The board with other priors of some of its parameters, by their names; numbers as in `from_numbers`."""
         if not isinstance(priors, Mapping):
             raise InputError(wrong_types(self.name, [("priors", priors, False, "a dict of quantities by name")]))
-        faults = [_unknown("priors", name, self.inputs) for name in priors if name not in self.inputs]
-        stated, unread = quantities_of(priors, "priors", "SI", _KINDS)
+        faults = [unknown_name("priors", name, self.inputs) for name in priors if name not in self.inputs]
+        stated, unread = quantities_of(priors, "priors", "SI", KINDS)
         if faults or unread:
             raise InputError([*faults, *unread])
         return replace(
@@ -254,8 +240,8 @@ class Board:
         }  # fmt: skip
         needed = ("length_x", "length_y", "thickness")
         values = {key: one for key, one in stated.items() if one is not None or key in needed}
-        quantities, unread = quantities_of(values, str(name), "SI", _KINDS)
-        warps, faulty = _warps(warp, str(name)) if isinstance(warp, Mapping) else ({}, [])
+        quantities, unread = quantities_of(values, str(name), "SI", KINDS)
+        warps, faulty = warps_of(warp, str(name)) if isinstance(warp, Mapping) else ({}, [])
         unread += faulty
         if faults or unread:
             raise InputError([*faults, *unread])
@@ -309,14 +295,14 @@ class Board:
 
     @classmethod
     def from_text(cls, text: str, name: str, may_lack_frequencies: bool = False) -> Board:
-        """The same from what might stand in the file NAME.toml."""
+        """Read a board card from a text, as if it stood in NAME.toml."""
         return cls.from_card(CardFile.of(text, f"{name.removesuffix('.toml')}.toml"), may_lack_frequencies)
 
     @classmethod
     def from_card(
         cls, card: CardFile, may_lack_frequencies: bool = False, setup: str | os.PathLike[str] | None = None
     ) -> Board:
-        """The same from the table of a card."""
+        """Read a board card from its table; the options are those of `from_toml`."""
         keys, card = read_board(card, may_lack_frequencies, setup)
         plate, material = keys.plate, keys.material
         inputs = {**dict(plate), "poisson_xy": material.poisson_xy}
@@ -338,14 +324,7 @@ class Board:
         )
 
     def assuming(self, prior: PriorCard | None, tables: Mapping[str, CoefficientCard] | None = None) -> Board:
-        """The board with what nobody stated of it taken from a prior, as far as that states it.
-
-        Parameters
-        ----------
-        prior : PriorCard or None
-        tables : dict of CoefficientCard, optional
-            By setup, those that the card names.
-        """
+        """The board with noise and Poisson ratio of a prior where nobody stated them, and coefficient tables."""
         poisson = (prior and prior.poisson_xy) or usual_poisson(self.isotropic)
         setups = [one.assuming_noise(prior) if one.is_noise_assumed else one for one in self.setups]
         if tables is not None:
@@ -362,7 +341,7 @@ class Board:
         """The table of its card; raises InputError if a quantity has a density that no card can state."""
         own = [one for one in self.parameters if one.owner == BOARD and not one.is_of_effect and not one.is_assumed]
         inputs = {one.name: one.prior for one in own}
-        faults = [*self._unstatable()]
+        faults = [*unstatable(self)]
         if faults:
             raise InputError(faults)
         poisson_xy = inputs.pop("poisson_xy", None)
@@ -381,23 +360,6 @@ class Board:
             **keys.model_dump(by_alias=True, exclude_defaults=True, exclude={"setups"}),
             "setup": setups[0] if len(setups) == 1 else setups,
         }
-
-    def _unstatable(self) -> Iterator[Fault]:
-        """Every quantity that a card cannot state."""
-        for one in self.parameters:
-            if not one.is_of_effect and one.owner.kind != "group":  # sessions are found again when the card is read
-                yield from unstatable(one.name, one.prior, "normal" if one.name == "poisson_xy" else "log-normal")
-        for name, modulus in (("shear_xz", self.shear_xz), ("shear_yz", self.shear_yz)):
-            if modulus is not None:
-                yield from unstatable(name, modulus)
-        for setup in self.setups:
-            for place, quantity in setup.uncertain_keys():
-                yield from unstatable(f"{setup.name} {place}", quantity)
-        for name, rise in self.warp.items():
-            yield from unstatable(f"warp {name}", rise, "normal", WARPS[name])
-        for setup in self.setups:
-            if setup.noise.is_exact:
-                yield Fault(f"{setup.name} noise", NOISE_WANTED, "an exact number")
 
     def to_toml(self, path: str | os.PathLike[str] | None = None, *, force: bool = False) -> str:
         """The board as a card, in TOML.
@@ -431,7 +393,7 @@ class Board:
 
     @property
     def folder(self) -> Path | None:
-        """Where cards that it names by a relative path are looked for; None for the working directory."""
+        """Folder from which its relative paths start; None for the working directory."""
         return None if self.card is None else self.card.folder
 
     @property
@@ -455,40 +417,18 @@ class Board:
         return self.reading_names if len(self.setups) > 1 else tuple(map(str, self.setups[0].labels))
 
 
-def _warps(stated: Mapping[str, Quantity | ArrayLike], place: str) -> tuple[dict[str, Quantity], list[Fault]]:
-    """Heights by name from what was stated of them, cup and twist from zero on, and what cannot be one."""
-    unknown = [_unknown(f"{place} warp", key, WARPS) for key in stated if key not in WARPS]
-    known = {key: stated[key] for key in WARPS if key in stated}
-    found, faults = quantities_of(known, f"{place} warp", "in m", dict.fromkeys(WARPS, "normal"))
-    for key, one in found.items():
-        if one.kind == "normal" and not one.is_exact and one.lower == -math.inf:
-            found[key] = replace(one, lower=WARPS[key])
-    return found, [*unknown, *faults]
-
-
-def _unknown(place: str, name: object, known: Iterable[str]) -> Fault:
-    names = tuple(known)
-    near = did_you_mean(name, names) if isinstance(name, str) else ""
-    return Fault(place, f"one of {', '.join(names)}", str(name), near)
-
-
 Named = TypeVar("Named", Parameter, Setup)
 
 
 def _named(place: str, name: str, among: Iterable[Named]) -> Named:
     by_name = {one.name: one for one in among}
     if name not in by_name:
-        raise InputError(_unknown(place, name, by_name))
+        raise InputError(unknown_name(place, name, by_name))
     return by_name[name]
 
 
-def usual_poisson(is_isotropic: bool) -> Quantity:
-    """The Poisson ratio of a board of which nothing is known, of wood or isotropic: an object of its own."""
-    return replace(ISOTROPIC_POISSON if is_isotropic else DEFAULT_POISSON)
-
-
 def assumed_notes(board: Board) -> tuple[str, ...]:
-    """A sentence on the Poisson ratio that was assumed, where nobody stated one."""
+    """A sentence on the Poisson ratio if it was assumed."""
     nu = board.parameter("poisson_xy")
     told = f"nu_xy = {nu.prior.mean:g} ± {nu.prior.sd:g} was assumed"
     return (f"the card gives no Poisson ratio: {told}",) if nu.is_assumed else ()
@@ -501,39 +441,8 @@ def made_board(
     assumed_poisson: Quantity | None = None,
     **more: Any,
 ) -> Board:
-    """A board from quantities in SI units, without a card.
-
-    Parameters
-    ----------
-    inputs : dict of Quantity
-        length_x, length_y, thickness (m), mass (kg) or density (kg m^-3), and poisson_xy. A thickness or a width that
-        was read at places becomes the mean over the board of the field that the readings tell of.
-    setups : sequence of Setup
-        What their clamps cover becomes parameters too.
-    assumed_poisson : Quantity, optional
-        A Poisson ratio that nobody stated, where `inputs` has none.
-    **more
-        Other attributes of `Board`.
-    """
-    inputs = {**inputs, **_means_of_fields(inputs)}
-    assumed = {} if assumed_poisson is None else {"poisson_xy": assumed_poisson}
-    stated = [
-        Parameter(key, BOARD, prior, INPUTS[key][0], words=INPUTS[key][1], assumed=assumed.get(key))
-        for key, prior in {**inputs, **assumed}.items()
-    ]
-    covered = [parameter for setup in setups for parameter in setup.clamped_parameters]
-    return Board(name, (*stated, *covered), tuple(setups), **more)
-
-
-def _means_of_fields(inputs: Mapping[str, Quantity]) -> dict[str, Quantity]:
-    """Sizes that were read at places with the mean over the board that their field has; an exact mean stays."""
-    read: dict[str, PlacedReadings | None] = {}
-    if "length_y" in inputs and inputs["length_y"].has_profile:
-        read["length_y"] = width_readings(inputs["length_y"], inputs["length_x"])
-    if "thickness" in inputs and inputs["thickness"].has_profile:
-        read["thickness"] = thickness_readings(inputs["thickness"], inputs["length_x"], inputs["length_y"])
-    found = {name: conditioned(one) for name, one in read.items() if one is not None and not inputs[name].is_exact}
-    return {name: replace(inputs[name], mean=field.mean, sd=field.sd) for name, field in found.items()}
+    """A board from quantities in SI units, without a card; `more` are other attributes of `Board`."""
+    return Board(name, parameters_of(inputs, setups, assumed_poisson), tuple(setups), **more)
 
 
 def density(values: Values) -> NDArray[np.float64]:

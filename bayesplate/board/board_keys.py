@@ -4,33 +4,30 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
-from bayesplate.board.card_file import CardFile
 from bayesplate.board.fragment import merged
 from bayesplate.board.measures import DENSITY, POISSON, QuantityReader
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.repeated import CALIPER, FEELER, FURTHEST_SIZES, RULE, SCALES
-from bayesplate.board.schema import Section, place, validated
+from bayesplate.board.schema import Card, Section, place, validated
 from bayesplate.board.setup_keys import SetupKeys
-from bayesplate.board.shelf import CAMPAIGN_REMEDY
+from bayesplate.board.shelf import CAMPAIGN_REMEDY, CardFile
 from bayesplate.board.values import (
     Complaint,
     Key,
     Number,
+    Reference,
     Refusal,
+    Text,
+    one_or_more,
     read_effects,
-    read_format,
-    read_list,
-    read_name,
-    read_reference,
     read_switch,
     read_table,
-    read_text,
 )
 from bayesplate.board.words import quoted, shown
 from bayesplate.errors import Fault, InputError
@@ -99,28 +96,18 @@ class MaterialKeys(Section):
     shear_xz: Annotated[Quantity | None, _SHEAR] = Field(default=None, alias="shear_xz_gpa")
     shear_yz: Annotated[Quantity | None, _SHEAR] = Field(default=None, alias="shear_yz_gpa")
     isotropic: Annotated[bool, Key(read_switch)] = False
-    prior: Annotated[str, Key(read_reference)] = DEFAULT_PRIOR
+    prior: Reference = DEFAULT_PRIOR
 
 
-def _as_list(value: object) -> list[Any]:
-    """One [setup] is a list of one; the tables themselves are read by SetupKeys."""
-    if isinstance(value, dict):
-        return [value]
-    return read_list(value, "[[setup]] tables", MOST_SETUPS)
-
-
-class BoardKeys(Section):
+class BoardKeys(Card):
     """A board card, in SI units. `read_board` makes one; a `Board` is made from it."""
 
-    format: Annotated[Literal[1], Key(read_format)] = Field(description="1")
-    name: Annotated[str, Key(read_name)] = Field(description="the name of the file without .toml")
-    title: Annotated[str, Key(read_text)] = ""
-    source: Annotated[str, Key(read_text)] = ""
-    notes: Annotated[str, Key(read_text)] = ""
+    source: Text = ""
+    notes: Text = ""
     effects: Annotated[tuple[str, ...] | None, Key(read_effects, list)] = None
     plate: PlateKeys = Field(description="a [plate] table")
     material: MaterialKeys = MaterialKeys()
-    setups: Annotated[tuple[SetupKeys, ...], BeforeValidator(_as_list)] = Field(
+    setups: Annotated[tuple[SetupKeys, ...], one_or_more("[[setup]] tables", MOST_SETUPS)] = Field(
         alias="setup", description="a [setup] table, or several [[setup]]"
     )
 
@@ -128,20 +115,7 @@ class BoardKeys(Section):
 def read_board(
     card: CardFile, may_lack_frequencies: bool = False, setup: str | os.PathLike[str] | None = None
 ) -> tuple[BoardKeys, CardFile]:
-    """The keys of a card, and the card with a fragment that completes it.
-
-    Parameters
-    ----------
-    may_lack_frequencies : bool
-        Whether a board that was not measured yet will do.
-    setup : str or path, optional
-        A file with a table [setup] that takes the place of the card's, key by key.
-
-    Raises
-    ------
-    InputError
-        With every fault of the card at once.
-    """
+    """The keys of a card, and the card with the fragment that completes it; InputError has every fault at once."""
     table, file = card.table, card.shown
     if {*table} == {"setup"} and isinstance(table["setup"], dict):
         remedy = f"it completes a card: CARD --setup {file}"
@@ -155,35 +129,22 @@ def read_board(
     return validated(BoardKeys, card, _faults_beside, context, file), card
 
 
-def _faults_beside(table: Mapping[str, Any], file: str) -> list[Fault]:
-    return [*_mass_faults(table, file), *_setup_name_faults(table, file)]
-
-
-def _mass_faults(table: Mapping[str, Any], file: str) -> list[Fault]:
-    plate = table.get("plate")
-    if not isinstance(plate, dict):
-        return []
-    given = [key for key in ("mass_g", "density_kg_m3") if key in plate]
-    if len(given) == 1:
-        return []
-    got = f"both, {shown(plate['mass_g'])} and {shown(plate['density_kg_m3'])}" if given else "neither"
-    return [Fault(place(file, table, ("plate",)), "exactly one of mass_g and density_kg_m3", got)]
-
-
-def _setup_name_faults(table: Mapping[str, Any], file: str) -> list[Fault]:
-    setups = table.get("setup")
-    if not isinstance(setups, list) or len(setups) < 2 or len(setups) > MOST_SETUPS:
-        return []
-    faults = []
+def _faults_beside(table: Mapping[str, Any], file: str) -> Iterator[Fault]:
+    """Exactly one of mass and density; and a name of its own for each of several setups."""
+    plate, setups = table.get("plate"), table.get("setup")
+    given = [key for key in ("mass_g", "density_kg_m3") if isinstance(plate, dict) and key in plate]
+    if isinstance(plate, dict) and len(given) != 1:
+        got = f"both, {shown(plate['mass_g'])} and {shown(plate['density_kg_m3'])}" if given else "neither"
+        yield Fault(place(file, table, ("plate",)), "exactly one of mass_g and density_kg_m3", got)
+    if not isinstance(setups, list) or not 2 <= len(setups) <= MOST_SETUPS:
+        return
     seen: set[str] = set()
     for index, setup in enumerate(setups):
         if not isinstance(setup, dict):
             continue
-        name = setup.get("name")
-        where = place(file, table, ("setup", index, "name"))
+        name, where = setup.get("name"), place(file, table, ("setup", index, "name"))
         if name is None:
-            faults.append(Fault(where, "a name, because there are several setups", "nothing"))
+            yield Fault(where, "a name, because there are several setups", "nothing")
         elif isinstance(name, str) and name.casefold() in seen:
-            faults.append(Fault(where, "a name of its own", f"{quoted(name)} again"))
+            yield Fault(where, "a name of its own", f"{quoted(name)} again")
         seen.add(str(name).casefold())
-    return faults

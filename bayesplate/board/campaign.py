@@ -5,35 +5,33 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeGuard, get_args
 
-from pydantic import BeforeValidator, Field, PrivateAttr
+from pydantic import Field, PrivateAttr
 
-from bayesplate.board.card_file import CardFile
-from bayesplate.board.schema import Section, place, validated
-from bayesplate.board.shelf import card_names
+from bayesplate.board.schema import Card, Section, place, validated
+from bayesplate.board.shelf import CardFile, card_names
 from bayesplate.board.toml import read_file, read_table
 from bayesplate.board.values import (
     Choice,
     Complaint,
     Key,
     Number,
+    Reference,
     Refusal,
+    Text,
+    one_or_more,
     read_each,
     read_effect,
     read_effects,
-    read_format,
     read_list,
-    read_name,
     read_reference,
-    read_text,
 )
 from bayesplate.board.words import effect_named, quoted
 from bayesplate.errors import Fault, plain
 
 FEWEST_BOARDS, MOST_BOARDS = 2, 200
 MOST_SHARED = 10
-WAYS = ("value", "ratio")
 Way = Literal["value", "ratio"]
 
 
@@ -48,42 +46,28 @@ def _read_boards(value: object) -> tuple[str, ...]:
     return tuple(boards)
 
 
-def _as_list(value: object) -> list[Any]:
-    """One [shared] is a list of one."""
-    return [value] if isinstance(value, dict) else read_list(value, "[[shared]] tables", MOST_SHARED)
-
-
 class SharedSection(Section):
-    """An effect whose parameters all boards have in common: their values, or their ratios to the boards' moduli.
-
-    Attributes
-    ----------
-    scatter_percent : float
-        Scale of what the boards' own are believed to differ by from what they have in common; 0 if by nothing.
-    """
+    """An effect whose parameters all boards have in common: their values, or their ratios to the boards' moduli."""
 
     effect: Annotated[str, Key(read_effect)] = Field(description="the name of an effect")
-    way: Annotated[Way, Key(Choice(WAYS))] = Field(default="value", alias="as")
-    scatter_percent: Annotated[float, Key(Number(0.1, 100, "%"))] = 0.0
+    way: Annotated[Way, Key(Choice(get_args(Way)))] = Field(default="value", alias="as")
+    scatter_percent: Annotated[float, Key(Number(0.1, 100, "%"))] = 0.0  # scale by which a board's own may differ
 
 
 class PopulationSection(Section):
     """That the boards' constants share a distribution, and what is believed of it before measuring."""
 
-    prior: Annotated[str, Key(read_reference)] = Field(description="a card of models/priors")
+    prior: Reference = Field(description="a card of models/priors")
 
 
-class CampaignCard(Section):
+class CampaignCard(Card):
     """Boards and what they share. `load_campaign` makes one."""
 
-    format: Annotated[Literal[1], Key(read_format)] = Field(description="1")
-    name: Annotated[str, Key(read_name)] = Field(description="the name of the file without .toml")
-    title: Annotated[str, Key(read_text)] = ""
-    source: Annotated[str, Key(read_text)] = ""
-    notes: Annotated[str, Key(read_text)] = ""
+    source: Text = ""
+    notes: Text = ""
     boards: Annotated[tuple[str, ...], Key(_read_boards)] = Field(description="a list of board cards")
     effects: Annotated[tuple[str, ...], Key(read_effects)] = ()
-    shared: Annotated[tuple[SharedSection, ...], BeforeValidator(_as_list)] = ()
+    shared: Annotated[tuple[SharedSection, ...], one_or_more("[[shared]] tables", MOST_SHARED)] = ()
     population: PopulationSection | None = None
     _card: CardFile = PrivateAttr()
 
@@ -112,26 +96,12 @@ class CampaignCard(Section):
 
 
 def load_campaign(name_or_path: str | os.PathLike[str]) -> CampaignCard:
-    """Read a campaign card; the cards of its boards are not read.
-
-    Parameters
-    ----------
-    name_or_path : str or path
-        Name of a shipped card, or a path: it contains a separator or ends in .toml.
-
-    Raises
-    ------
-    InputError
-        If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at once.
-    """
+    """Read a campaign card, a shipped one by its name or a path; raises InputError with every fault at once."""
     return validated(CampaignCard, CardFile.load("campaigns", name_or_path), _twice)
 
 
-def is_campaign(name_or_path: object) -> bool:
-    """Whether what a command was given is a campaign: the name of one, or a card that lists boards.
-
-    A file that cannot be read is none: whoever reads it as a board says what is wrong with it.
-    """
+def is_campaign(name_or_path: object) -> TypeGuard[str | os.PathLike[str]]:
+    """Whether it is the name of a campaign, or a card that lists boards; a file that cannot be read is none."""
     if not isinstance(name_or_path, str | os.PathLike):
         return False
     text = os.fspath(name_or_path)

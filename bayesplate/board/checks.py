@@ -7,7 +7,8 @@ import itertools
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
-from bayesplate.board.board import INPUTS, Board, density
+from bayesplate.board.board import Board, density
+from bayesplate.board.inputs import INPUTS
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.repeated import CALIPER, FEELER, RULE, SCALES, are_alike
 from bayesplate.board.setup import Setup
@@ -45,14 +46,7 @@ _STEPS = {
 
 
 def physical_faults(board: Board) -> list[Fault]:
-    """Every physical fault of a board.
-
-    Returns
-    -------
-    list of Fault
-        Empty if there is none. Cards that it names and that cannot be read are found where they are read, labels that
-        no mode of the board has where modes are computed, effects that cannot act where effects are known, not here.
-    """
+    """Physical faults of a board; those of its labels, effects and named cards are found elsewhere."""
     rows = [*_plate(board), *_isotropic(board)]
     for setup, where in zip(board.setups, setup_places(board.file, [one.name for one in board.setups]), strict=True):
         rows += [
@@ -66,18 +60,12 @@ def physical_faults(board: Board) -> list[Fault]:
 
 
 def faults_of(rows: Collection[Row] | Iterator[Row]) -> list[Fault]:
-    """The rows that do not hold."""
+    """A fault for each row that does not hold."""
     return [Fault(where, wanted, got, remedy) for where, holds, wanted, got, remedy in rows if not holds]
 
 
 def remarks(board: Board, effects: Collection[str]) -> tuple[str, ...]:
-    """What the user of a board should know before its numbers.
-
-    Parameters
-    ----------
-    effects : collection of str
-        Names of the declared effects.
-    """
+    """Remarks for the user of a board with these declared effects."""
     rows = [*_assumed(board)]
     for setup in board.setups:
         rows += [_thick(board, setup, effects), *_vague(setup), _finer_than_said(setup), *_twice(setup)]
@@ -85,7 +73,7 @@ def remarks(board: Board, effects: Collection[str]) -> tuple[str, ...]:
 
 
 def readings_sha256(board: Board) -> str:
-    """Hash of the sizes, the mass and the frequencies of a board: boards that have the same are one, or a copy."""
+    """Hash of the sizes, the mass and the frequencies of a board, by which a copy is known."""
     sizes = [(name, board.inputs[name]) for name in INPUTS if name != "poisson_xy" and name in board.inputs]
     read = [(one.name, sorted((r.label, r.frequency) for r in one.readings), one.peaks) for one in board.setups]
     return hashlib.sha256(repr((sizes, board.warp, read)).encode()).hexdigest()
@@ -98,7 +86,7 @@ def board_mass(board: Board) -> float:
 
 
 def _reach(quantity: Quantity) -> float:
-    """The largest value that the card itself holds possible."""
+    """Largest value that the card allows."""
     return max(quantity.mean + 3 * quantity.sd, *quantity.readings, quantity.mean)
 
 
@@ -137,7 +125,7 @@ def _plate(board: Board) -> Iterator[Row]:
 
 
 def _in_other_units(inputs: Mapping[str, Quantity], heaviness: float) -> Iterator[str]:
-    """What the mass would be in g, or the sides in mm, had they another unit, as far as a board can weigh that."""
+    """The mass in g, or the sides in mm, if they had another unit in which the board would be possible."""
     mass = 1e3 * inputs["mass"].mean
     for unit, grams in (("kg", 1000.0), ("oz", 28.3495)):
         if _LIGHT <= heaviness * grams <= _HEAVY:
@@ -148,7 +136,7 @@ def _in_other_units(inputs: Mapping[str, Quantity], heaviness: float) -> Iterato
 
 
 def _sides_in_inches(inputs: Mapping[str, Quantity]) -> str:
-    """What the sides would be in mm, had they been written in inches; empty where the board would be too long."""
+    """The sides in mm if they had been written in inches; empty where the board would be too long."""
     x, y = (1e3 * inputs[f"length_{axis}"].mean for axis in "xy")
     told = f"sides of {x:g} and {y:g} inches would be {_INCH * x:.4g} and {_INCH * y:.4g} mm"
     return told if max(x, y) <= _LONGEST_IN_INCHES else ""

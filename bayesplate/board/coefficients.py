@@ -6,27 +6,16 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
-from bayesplate.board.card_file import CardFile
 from bayesplate.board.measures import FIRST_LABEL, LARGEST_POISSON, by_label
 from bayesplate.board.reading import NO_OFFSET
-from bayesplate.board.schema import Section, validated
+from bayesplate.board.schema import Card, Section, validated
 from bayesplate.board.setup_keys import Edges
-from bayesplate.board.values import (
-    Complaint,
-    Key,
-    Number,
-    Refusal,
-    read_each,
-    read_format,
-    read_list,
-    read_name,
-    read_table,
-    read_text,
-)
+from bayesplate.board.shelf import CardFile
+from bayesplate.board.values import Complaint, Key, Number, Refusal, Text, read_each, read_list, read_table
 from bayesplate.board.words import shown
 from bayesplate.labels import Label
 
@@ -97,13 +86,10 @@ class TrainingSection(Section):
     steps: Annotated[tuple[float, ...], Key(_read_steps)] = ()
 
 
-class CoefficientCard(Section):
+class CoefficientCard(Card):
     """A printed or computed table of a, b, c. `load_coefficients` makes one."""
 
-    format: Annotated[Literal[1], Key(read_format)] = Field(description="1")
-    name: Annotated[str, Key(read_name)] = Field(description="the name of the file without .toml")
-    title: Annotated[str, Key(read_text)] = ""
-    source: Annotated[str, Key(read_text)] = Field(description="where the numbers come from")
+    source: Text = Field(description="where the numbers come from")
     aspect_ratio: Annotated[float, Key(_read_aspect)] = Field(description="[L_x, L_y] or their ratio")
     first_label: Annotated[Label, FIRST_LABEL] = NO_OFFSET
     edges: Edges = Field(description="how the four edges are held")
@@ -124,18 +110,5 @@ class CoefficientCard(Section):
 
 
 def load_coefficients(name_or_path: str | os.PathLike[str], beside: Path | None = None) -> CoefficientCard:
-    """Read a coefficient table.
-
-    Parameters
-    ----------
-    name_or_path : str or path
-        Name of a shipped card, or a path: it contains a separator or ends in .toml.
-    beside : Path, optional
-        Folder that a relative path starts from: that of the board card which names the table.
-
-    Raises
-    ------
-    InputError
-        If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at once.
-    """
+    """Read a coefficient table, shipped or a path from the folder `beside`; InputError names every fault at once."""
     return validated(CoefficientCard, CardFile.load("coefficients", name_or_path, beside))

@@ -16,23 +16,7 @@ _FIRST_HALF, _SECOND_HALF = re.compile(r"\s*(?:\S+ )?\(\d{1,3}"), re.compile(r"\
 
 
 def csv_table(data: bytes, file: str) -> tuple[list[str], list[list[str]]]:
-    """Header and rows of a CSV file in UTF-8.
-
-    Parameters
-    ----------
-    file : str
-        As messages show it.
-
-    Returns
-    -------
-    list of str, list of list of str
-        The first line that is not empty, and every line below it, empty ones included.
-
-    Raises
-    ------
-    InputError
-        If it is no such text, is separated by something else, or its labels are not in double quotes.
-    """
+    """Header and rows of a CSV file in UTF-8, empty rows included; raises InputError for anything else."""
     rows = _rows(data, file)
     header = next((row for row in rows if any(map(str.strip, row))), None)
     if header is None:

@@ -18,22 +18,9 @@ _READINGS = ("frequencies_hz", "signs", "label_confidence", "unlabelled_hz", "pe
 
 
 def merged(table: Mapping[str, Any], file: str, fragment: str | os.PathLike[str]) -> tuple[dict[str, Any], str]:
-    """The table of a card with the keys of a fragment in one of its setups, and what to call it in messages.
+    """The table of a card with the [setup] of a fragment in it, and what to call it in messages; raises InputError.
 
-    Parameters
-    ----------
-    table : dict
-        Of the card.
-    file : str
-        Its name.
-    fragment : str or path
-        A TOML file with a table [setup]. It takes the place of the card's setup of its name, or of the only one, key by
-        key; one with a new name and its edges joins them.
-
-    Raises
-    ------
-    InputError
-        With everything that the fragment holds and may not, or if no setup is meant.
+    It replaces the setup of its name, or the only one, key by key; one with a new name and edges joins them.
     """
     path = Path(fragment)
     named = plain(path.name)

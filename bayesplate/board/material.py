@@ -37,20 +37,11 @@ class Symmetry:
 
     A fit moves the logarithms of the free rigidities. Those of D_x, D_y, D_s move along `along` of a unit step, from
     places that depend on nu_xy alone, so that they follow an uncertain nu_xy draw by draw.
-
-    Attributes
-    ----------
-    free : tuple of str
-        Names of the free rigidities.
-    moduli : tuple of str
-        The modulus that each of them is told as.
-    follows : tuple of int
-        Which of the free ones each of D_x, D_y, D_s is proportional to.
     """
 
     free: tuple[str, ...]
-    moduli: tuple[str, ...]
-    follows: tuple[int, ...]
+    moduli: tuple[str, ...]  # that each free rigidity is told as
+    follows: tuple[int, ...]  # the free rigidity that each of D_x, D_y, D_s is proportional to
 
     @property
     def n(self) -> int:
@@ -63,14 +54,7 @@ class Symmetry:
         return self.n == 1
 
     def rigidities(self, free: Sequence[Floats] | Floats, nu_xy: Floats) -> dict[str, Floats]:
-        """D_x, D_y, D_s by name, N m.
-
-        Parameters
-        ----------
-        free : (n, ...) array or n arrays, N m
-            The free rigidities.
-        nu_xy : number or array
-        """
+        """D_x, D_y, D_s by name from the free rigidities: n arrays, N m."""
         found = {name: free[i] for name, i in zip(RIGIDITIES, self.follows, strict=True)}
         if self.is_isotropic:
             found["D_s"] = np.asarray(2.0 * (1.0 - nu_xy) * found["D_s"])
@@ -97,23 +81,9 @@ ISOTROPIC = Symmetry(("D",), ("E",), (0, 0, 0))
 
 
 def rigidities(E_x: ArrayLike, E_y: ArrayLike, G_xy: ArrayLike, thickness: ArrayLike, nu_xy: ArrayLike) -> Rigidities:
-    """Rigidities of a plate from its elastic moduli.
+    """Rigidities, N m, from moduli in Pa and a thickness in m: Ducceschi et al., eq. (3) and (4).
 
-    Parameters
-    ----------
-    E_x, E_y, G_xy : array_like, Pa
-    thickness : array_like, m
-    nu_xy : array_like
-        Major Poisson ratio; nu_yx = nu_xy E_y / E_x.
-
-    Returns
-    -------
-    Rigidities
-        N m. Not a number where nu_xy nu_yx >= 1, which no material reaches.
-
-    References
-    ----------
-    Ducceschi et al., eq. (3) and (4).
+    Not a number where nu_xy nu_yx >= 1, nu_yx = nu_xy E_y / E_x, which no material reaches.
     """
     E_x, E_y, G_xy, h = (np.asarray(v, dtype=float) for v in (E_x, E_y, G_xy, thickness))
     remainder = 1.0 - np.asarray(nu_xy) ** 2 * E_y / E_x
@@ -122,27 +92,10 @@ def rigidities(E_x: ArrayLike, E_y: ArrayLike, G_xy: ArrayLike, thickness: Array
 
 
 def moduli(D_x: ArrayLike, D_y: ArrayLike, D_s: ArrayLike, thickness: ArrayLike, nu_xy: ArrayLike) -> Moduli:
-    """Elastic moduli of a plate from its rigidities; the inverse of `rigidities`.
+    """Moduli, Pa, from rigidities in N m and a thickness in m: Ducceschi et al., eq. (14), the inverse of `rigidities`.
 
-    Parameters
-    ----------
-    D_x, D_y, D_s : array_like, N m
-    thickness : array_like, m
-    nu_xy : array_like
-
-    Returns
-    -------
-    Moduli
-        Pa. Not a number where nu_xy nu_yx >= 1.
-
-    Notes
-    -----
-    The map (ln D_x, ln D_y, ln D_s) -> (ln E_x, ln E_y, ln G_xy) at fixed thickness and nu_xy has Jacobian determinant
-    1, so a density of one set of logarithms is a density of the other.
-
-    References
-    ----------
-    Ducceschi et al., eq. (14).
+    The map of (ln D_x, ln D_y, ln D_s) to (ln E_x, ln E_y, ln G_xy) at fixed thickness and nu_xy has determinant 1,
+    so that a density of one set of logarithms is a density of the other.
     """
     D_x, D_y, D_s, h = (np.asarray(v, dtype=float) for v in (D_x, D_y, D_s, thickness))
     remainder = 1.0 - np.asarray(nu_xy) ** 2 * D_y / D_x
@@ -164,18 +117,7 @@ class Derived(NamedTuple):
 
 
 def derived_quantities(constants: Moduli, density: ArrayLike) -> dict[str, Derived]:
-    """Wave speeds, radiation ratios, impedances, specific stiffnesses and ratios of the constants.
-
-    Parameters
-    ----------
-    density : array_like, kg m^-3
-
-    Returns
-    -------
-    dict of Derived
-        Wave speed c = sqrt(E / rho), radiation ratio c / rho, impedance c rho and specific stiffness E / rho along (x)
-        and across (y) the grain; anisotropy E_x / E_y; E_x / G_xy.
-    """
+    """Wave speeds, radiation ratios, impedances, specific stiffnesses along x and y, and ratios; density in kg/m^3."""
     rho = np.asarray(density, dtype=float)
     result = {}
     for axis, modulus in (("x", constants.E_x), ("y", constants.E_y)):

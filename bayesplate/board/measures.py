@@ -8,7 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from bayesplate.board.quantity import Kind, Quantity
+from bayesplate.board.density import Kind
+from bayesplate.board.quantity import Quantity
 from bayesplate.board.repeated import are_alike, comma_complaint, scatter_complaint
 from bayesplate.board.units import SI, in_unit, median_and_factor
 from bayesplate.board.values import (
@@ -39,23 +40,18 @@ _ROUNDING = "the number alone if it is exact; a reading rounded to r has sd = r 
 
 @dataclass(frozen=True)
 class QuantityReader:
-    """Reads a quantity: a number, { mean, sd }, a list of readings, or a table of readings with what is said of them.
+    """Reads a quantity into SI units: a number, { mean, sd }, a list of readings, or a table of readings.
 
-    That table is { readings, resolution, at_x_mm, at_y_mm, place_sd_mm }. The quantity is in SI units.
-
-    `places` names the coordinates that readings of this quantity may (and then must) have, and with them an uncertainty
-    of the places; `furthest` is the ratio up
-    to which readings without places may lie apart; `resolution` is assumed where all readings are alike and none is
-    stated. A normal quantity has a standard deviation of at most `widest`, and is cut off at `lower`.
+    That table is { readings, resolution, at_x_mm, at_y_mm, place_sd_mm }.
     """
 
     number: Number
     kind: Kind = "log-normal"
-    places: tuple[str, ...] = ()
-    furthest: float = math.inf
-    resolution: float = 0.0
-    widest: float = 1.0
-    lower: float = -math.inf
+    places: tuple[str, ...] = ()  # coordinates that readings may, and then must, have
+    furthest: float = math.inf  # ratio up to which readings without places may lie apart
+    resolution: float = 0.0  # assumed where all readings are alike and none is stated
+    widest: float = 1.0  # the largest standard deviation of a normal quantity
+    lower: float = -math.inf  # where a normal quantity is cut off
 
     @property
     def key(self) -> Key:

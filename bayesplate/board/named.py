@@ -18,35 +18,17 @@ Card = TypeVar("Card", PriorCard, CoefficientCard)
 
 @dataclass(frozen=True)
 class NamedCards:
-    """What a board card names, each read once; a relative path starts from the folder of the board card.
+    """What a board card names, each read once; a relative path starts from the folder of the board card."""
 
-    Attributes
-    ----------
-    prior : PriorCard or None
-        None if it cannot be read.
-    tables : dict of CoefficientCard
-        By setup, those that can be read.
-    faults : tuple of Fault
-        Of the cards that cannot, with the place where each was named.
-    """
-
-    prior: PriorCard | None
-    tables: Mapping[str, CoefficientCard]
-    faults: tuple[Fault, ...]
+    prior: PriorCard | None  # None if it cannot be read
+    tables: Mapping[str, CoefficientCard]  # by setup, as far as they can be read
+    faults: tuple[Fault, ...]  # of the others, with the place where each was named
 
 
 def load_named(
     board: Board, prior: PriorCard | None = None, tables: Mapping[str, CoefficientCard] | None = None
 ) -> NamedCards:
-    """Read every card that a board card names and that is not given.
-
-    Parameters
-    ----------
-    prior : PriorCard, optional
-        In place of the one that the card names.
-    tables : dict of CoefficientCard, optional
-        By setup, in place of those that the card names.
-    """
+    """Read every card that a board card names and that is not given; tables are by setup."""
     file, beside = board.file, board.folder
     faults: list[Fault] = []
     where = f"{file} [material] prior"
@@ -67,7 +49,7 @@ def load_named(
 
 
 def _of_another_symmetry(place: str, name: str, is_isotropic: bool) -> Fault:
-    """That a prior card does not state what the board has: one modulus, or three."""
+    """The fault of a prior that states one modulus for a board of three, or three for a board of one."""
     if not is_isotropic:
         return Fault(place, "a prior of three constants", f"{name}, which states E alone", "or isotropic = true?")
     remedy = "weakly-informative states one, or a card of your own with [E]"
@@ -77,7 +59,7 @@ def _of_another_symmetry(place: str, name: str, is_isotropic: bool) -> Fault:
 def _read(
     load: Callable[[str, Path | None], Card], name: str, beside: Path | None, place: str, faults: list[Fault]
 ) -> Card | None:
-    """One card; if it cannot be read its faults join the others."""
+    """Read one card; its faults join the others."""
     try:
         return load(name, beside)
     except InputError as error:

@@ -6,23 +6,13 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from bayesplate.board.quantity import Quantity
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Owner:
-    """What a parameter belongs to: the board, one of its setups, or a group of boards or setups that share it.
-
-    Attributes
-    ----------
-    kind : "board", "setup" or "group"
-    name : str
-        Of the setup or the group; empty for the board.
-    """
+    """What a parameter belongs to: the board, one of its setups, or a group of boards or setups that share it."""
 
     kind: Literal["board", "setup", "group"] = "board"
     name: str = ""
@@ -37,10 +27,7 @@ BOARD = Owner()
 
 
 def shown_name(key: str, owner: Owner, effect: str = "") -> str:
-    """The name of a parameter wherever it is shown or looked up: "clamp_rotation.compliance[cantilever]".
-
-    The only place where such names are made; nothing takes them apart.
-    """
+    """The name of a parameter wherever it is shown: "clamp_rotation.compliance[cantilever]"; nothing takes it apart."""
     of_effect = f"{effect}." if effect else ""
     of_owner = f"[{owner.name}]" if owner.name else ""
     return f"{of_effect}{key}{of_owner}"
@@ -48,45 +35,19 @@ def shown_name(key: str, owner: Owner, effect: str = "") -> str:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A quantity that a model takes: an input of the board, the noise of a setup, a constant, or the size of an effect.
+    """A quantity that a model takes: an input of the board, the noise of a setup, a constant, the size of an effect."""
 
-    Attributes
-    ----------
-    key : str
-        What it is called among its owner's own parameters, or among those of its effect.
-    prior : Quantity
-        In SI units; sign and range are its bounds. An exact quantity fixes the parameter.
-    unit : str
-        SI.
-    null : float or None
-        The value at which it changes nothing: the zero size of an effect. None for what every board has.
-    effect : str
-        The effect it belongs to; empty for the board's inputs, constants and noise.
-    replaces : str
-        Name of the board's own input whose place it takes; empty if it stands beside them.
-    source : str
-        Where the prior comes from; empty if the card states it.
-    words : str
-        What people call it; empty where that is its key.
-    look : str
-        What it does to the board if it is one of an effect's components, in words; empty for what has a meaning alone.
-    usual : float or None
-        A representative size where one standard deviation above the mean is none: the place of something.
-    assumed : Quantity or None
-        What was taken for the prior because nobody stated one; see `is_assumed`.
-    """
-
-    key: str
+    key: str  # its name among its owner's own parameters, or among those of its effect
     owner: Owner
-    prior: Quantity
-    unit: str
-    null: float | None = None
-    effect: str = ""
-    replaces: str = ""
-    source: str = ""
-    words: str = ""
-    look: str = ""
-    usual: float | None = None
+    prior: Quantity  # SI; sign and range are its bounds, and an exact quantity fixes the parameter
+    unit: str  # SI
+    null: float | None = None  # the value at which it changes nothing; None for what every board has
+    effect: str = ""  # empty for the board's inputs, constants and noise
+    replaces: str = ""  # name of the board's own input whose place it takes
+    source: str = ""  # of the prior; empty if the card states it
+    words: str = ""  # what people call it; empty where that is its key
+    look: str = ""  # what a component of an effect does to the board; empty for what has a meaning alone
+    usual: float | None = None  # a representative size where one standard deviation above the mean is none
     assumed: Quantity | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -111,7 +72,7 @@ class Parameter:
 
     @property
     def is_listed(self) -> bool:
-        """Whether it is told of by itself: a component that belongs to no effect means nothing alone."""
+        """Whether results list it alone: a component that belongs to no effect means nothing by itself."""
         return self.is_of_effect or not self.is_component
 
     @property
@@ -122,18 +83,6 @@ class Parameter:
         if self.prior.is_exact or self.prior.kind != "normal":
             return self.prior.median
         return float(np.clip(self.prior.value(1.0), self.prior.lower, self.prior.upper))
-
-    def log_density(self, value: ArrayLike) -> Floats:
-        """Logarithm of the prior density at values in SI units: array of the same shape, per unit."""
-        return self.prior.log_density(value)
-
-    def quantile(self, probability: ArrayLike) -> Floats:
-        """Values in SI units below which the prior has given probabilities: array of the same shape."""
-        return self.prior.quantile(probability)
-
-    def sample(self, rng: np.random.Generator, n: int) -> Floats:
-        """Draws from the prior: (n,) array, SI."""
-        return self.prior.sample(rng, n)
 
 
 _PEOPLE = {"Pa": (1e-9, "GPa"), "m": (1e3, "mm"), "kg": (1e3, "g"), "1": (1.0, ""), "rad": (180.0 / np.pi, "degrees")}

@@ -4,133 +4,44 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 from pydantic import Field
 
-from bayesplate.board.card_file import CardFile
-from bayesplate.board.measures import DENSITY, POISSON, QuantityReader, read_factor, read_noise_percent, written_noise
+from bayesplate.board.material import MODULI, RIGIDITIES
+from bayesplate.board.prior_keys import DensityPrior, ElasticPrior, NoisePrior, PoissonPrior, RigidityPrior
+from bayesplate.board.prior_keys import StatedPrior as StatedPrior
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.schema import Section, validated
+from bayesplate.board.schema import Card, validated
+from bayesplate.board.shelf import CardFile
 from bayesplate.board.stated import wrong_types
-from bayesplate.board.units import in_unit, median_and_factor
-from bayesplate.board.values import (
-    Choice,
-    Complaint,
-    Key,
-    Number,
-    Refusal,
-    read_format,
-    read_name,
-    read_table,
-    read_text,
-)
-from bayesplate.board.words import did_you_mean, shown
+from bayesplate.board.words import did_you_mean
 from bayesplate.board.writing import toml_text, write_card
 from bayesplate.errors import Fault, InputError
 
-ELASTIC = ("E_x", "E_y", "G_xy")
-RIGIDITY = ("D_x", "D_y", "D_s")
 OF_ISOTROPIC = "E"
 """The one modulus of an isotropic board, stated beside the three or alone."""
+_CONSTANTS = (*MODULI, *RIGIDITIES, OF_ISOTROPIC)
 
 
-_CONSTANTS = (*ELASTIC, *RIGIDITY, OF_ISOTROPIC)
-
-
-@dataclass(frozen=True)
-class StatedPrior:
-    """A prior of a card, in SI units or percent, and the source it was taken from."""
-
-    quantity: Quantity
-    source: str
-
-
-_DISTRIBUTIONS = ("log-normal", "log-uniform")
-
-
-@dataclass(frozen=True)
-class _Constant:
-    """Reads { distribution, median_gpa, factor, source } or { distribution, lower_gpa, upper_gpa, source }."""
-
-    unit: Literal["gpa", "n_m"]
-
-    @property
-    def number(self) -> Number:
-        """What may stand in such a key."""
-        return Number(1e-6, 1e6, "GPa") if self.unit == "gpa" else Number(1e-9, 1e9, "N m")
-
-    def read(self, value: object) -> StatedPrior:
-        if not isinstance(value, dict):
-            raise Refusal(Complaint("a table with a distribution", shown(value)))
-        if value.get("distribution") not in _DISTRIBUTIONS:
-            read_table({"distribution": value.get("distribution")}, {"distribution": Choice(_DISTRIBUTIONS)})
-        number, si = self.number, self.number.si
-        median, lower, upper = (f"{key}_{self.unit}" for key in ("median", "lower", "upper"))
-        readers: dict[str, Any] = {"distribution": Choice(_DISTRIBUTIONS), "source": read_text}
-        if value["distribution"] == "log-normal":
-            readers |= {median: number, "factor": read_factor}
-            read = read_table(value, readers, needed=readers)
-            return StatedPrior(Quantity.from_median(read[median] * si, read["factor"]), read["source"])
-        readers |= {lower: number, upper: number}
-        read = read_table(value, readers, needed=readers)
-        if not read[lower] < read[upper]:
-            both = f"{shown(value[lower])} and {shown(value[upper])}"
-            raise Refusal(Complaint(f"{lower} below {upper}", both))
-        return StatedPrior(Quantity.from_range(read[lower] * si, read[upper] * si), read["source"])
-
-    def write(self, stated: StatedPrior) -> dict[str, Any]:
-        one, si = stated.quantity, self.number.si
-        if one.kind == "log-uniform":
-            numbers = {f"lower_{self.unit}": in_unit(one.lower, si), f"upper_{self.unit}": in_unit(one.upper, si)}
-        else:
-            median, factor = median_and_factor(one, si, lambda m, f: Quantity.from_median(m * si, f))
-            numbers = {f"median_{self.unit}": median, "factor": factor}
-        return {"distribution": one.kind, **numbers, "source": stated.source}
-
-
-def _with_source(read: Callable[[Any], Quantity], write: Callable[[Quantity], dict[str, Any]]) -> Key:
-    """A key that holds a quantity in a table with its source."""
-
-    def read_both(value: object) -> StatedPrior:
-        if not isinstance(value, dict):
-            raise Refusal(Complaint("a table with a source", shown(value)))
-        if "source" not in value:
-            raise Refusal(Complaint("where the numbers come from", "nothing", inside=("source",)))
-        quantity = read({key: entry for key, entry in value.items() if key != "source"})
-        return StatedPrior(quantity, read_text(value["source"]))
-
-    return Key(read_both, lambda stated: write(stated.quantity) | {"source": stated.source})
-
-
-_ELASTIC, _RIGIDITY = (Key(one.read, one.write) for one in (_Constant("gpa"), _Constant("n_m")))
-_NOISE = _with_source(read_noise_percent, lambda one: written_noise(one, 1.0))
-_POISSON = _with_source(POISSON.read, POISSON.write)
-_DENSITY = _with_source(QuantityReader(DENSITY), QuantityReader(DENSITY).written)
-
-
-class PriorCard(Section):
+class PriorCard(Card):
     """Priors of E_x, E_y, G_xy or of D_x, D_y, D_s, of E for isotropic boards, and optionally the noise and nu_xy.
 
     `load_prior` makes one.
     """
 
-    format: Annotated[Literal[1], Key(read_format)] = Field(description="1")
-    name: Annotated[str, Key(read_name)] = Field(description="the name of the file without .toml")
-    title: Annotated[str, Key(read_text)] = ""
-    E_x: Annotated[StatedPrior | None, _ELASTIC] = None
-    E_y: Annotated[StatedPrior | None, _ELASTIC] = None
-    G_xy: Annotated[StatedPrior | None, _ELASTIC] = None
-    D_x: Annotated[StatedPrior | None, _RIGIDITY] = None
-    D_y: Annotated[StatedPrior | None, _RIGIDITY] = None
-    D_s: Annotated[StatedPrior | None, _RIGIDITY] = None
-    E: Annotated[StatedPrior | None, _ELASTIC] = None
-    stated_noise: Annotated[StatedPrior | None, _NOISE] = Field(default=None, alias="noise_percent")
-    stated_poisson: Annotated[StatedPrior | None, _POISSON] = Field(default=None, alias="poisson_xy")
-    stated_density: Annotated[StatedPrior | None, _DENSITY] = Field(default=None, alias="density_kg_m3")
+    E_x: ElasticPrior = None
+    E_y: ElasticPrior = None
+    G_xy: ElasticPrior = None
+    D_x: RigidityPrior = None
+    D_y: RigidityPrior = None
+    D_s: RigidityPrior = None
+    E: ElasticPrior = None
+    stated_noise: NoisePrior = Field(default=None, alias="noise_percent")
+    stated_poisson: PoissonPrior = Field(default=None, alias="poisson_xy")
+    stated_density: DensityPrior = Field(default=None, alias="density_kg_m3")
 
     @classmethod
     def from_quantities(
@@ -244,19 +155,19 @@ class PriorCard(Section):
 
         Of a prior of isotropic boards alone E_x, which is their E.
         """
-        found = {name: stated for name in (*ELASTIC, *RIGIDITY) if (stated := getattr(self, name)) is not None}
+        found = {name: stated for name in (*MODULI, *RIGIDITIES) if (stated := getattr(self, name)) is not None}
         return found if found or self.E is None else {"E_x": self.E}
 
     @property
     def is_of_isotropic(self) -> bool:
         """Whether it is a prior of isotropic boards alone, which states E and nothing else of the constants."""
-        return self.E is not None and not any(getattr(self, name) for name in (*ELASTIC, *RIGIDITY))
+        return self.E is not None and not any(getattr(self, name) for name in (*MODULI, *RIGIDITIES))
 
     def for_board(self, is_isotropic: bool) -> PriorCard | None:
         """The prior as a board takes it: of E alone where that is isotropic; None where it states no such constants."""
         if not is_isotropic:
             return None if self.is_of_isotropic else self
-        return None if self.E is None else self.model_copy(update=dict.fromkeys((*ELASTIC, *RIGIDITY)))
+        return None if self.E is None else self.model_copy(update=dict.fromkeys((*MODULI, *RIGIDITIES)))
 
     @property
     def constants(self) -> dict[str, Quantity]:
@@ -290,37 +201,19 @@ class PriorCard(Section):
 
 
 def load_prior(name_or_path: str | os.PathLike[str], beside: Path | None = None) -> PriorCard:
-    """Read a prior card.
-
-    Parameters
-    ----------
-    name_or_path : str or path
-        Name of a shipped card, or a path: it contains a separator or ends in .toml.
-    beside : Path, optional
-        Folder that a relative path starts from: that of the board card which names the prior.
-
-    Raises
-    ------
-    InputError
-        If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at once.
-    """
+    """Read a prior card, a shipped one or a path from the folder `beside`; InputError names every fault at once."""
     return validated(PriorCard, CardFile.load("priors", name_or_path, beside), _set_faults)
 
 
-def read_prior_text(text: str, name: str) -> PriorCard:
-    """Read a prior card from a text, as if it stood in NAME.toml; raises InputError like `load_prior`."""
-    return validated(PriorCard, CardFile.of(text, f"{name}.toml"), _set_faults)
-
-
 def _is_of_a_card(quantity: object, kinds: tuple[str, ...]) -> bool:
-    """Whether a prior card can state a density: it is of such a kind, and has no bounds but those of its kind."""
+    """Whether a prior card can state a density: of one of these kinds, without bounds but those of its kind."""
     if not isinstance(quantity, Quantity) or quantity.is_exact or quantity.kind not in kinds:
         return False
     return quantity.kind == "log-uniform" or (quantity.lower == -math.inf and quantity.upper == math.inf)
 
 
 def _source_faults(name: str, source: str | Mapping[str, str], stated: Collection[str]) -> Iterator[Fault]:
-    """Sources that are empty or lacking, and those of a name that a prior cannot have."""
+    """Faults of sources that are empty, lacking, or of an unknown name."""
     wanted = "where the numbers come from"
     if isinstance(source, str):
         if not source.strip():
@@ -336,9 +229,9 @@ def _source_faults(name: str, source: str | Mapping[str, str], stated: Collectio
 
 
 def _set_faults(table: Mapping[str, Any], file: str) -> list[Fault]:
-    """Three priors that belong together, no mixture and no gap; or that of an isotropic board alone."""
-    given = [name for name in (*ELASTIC, *RIGIDITY) if name in table]
-    if tuple(given) in (ELASTIC, RIGIDITY) or (not given and OF_ISOTROPIC in table):
+    """The constants are all moduli, all rigidities, or E alone."""
+    given = [name for name in (*MODULI, *RIGIDITIES) if name in table]
+    if tuple(given) in (MODULI, RIGIDITIES) or (not given and OF_ISOTROPIC in table):
         return []
-    wanted = f"all of {', '.join(ELASTIC)} or all of {', '.join(RIGIDITY)}"
+    wanted = f"all of {', '.join(MODULI)} or all of {', '.join(RIGIDITIES)}"
     return [Fault(file, wanted, ", ".join(given) or "none of them")]

@@ -33,18 +33,10 @@ _PASSES = 2
 
 @dataclass(frozen=True)
 class UsualSizes:
-    """Scales of the half-Cauchy priors, as fractions of the mean: half of all boards lie below, half above.
+    """Scales of the half-Cauchy priors, as fractions of the mean: half of all boards lie below, half above."""
 
-    Attributes
-    ----------
-    field : float
-        Standard deviation over the board.
-    scatter : float
-        Standard deviation of a reading besides its rounding.
-    """
-
-    field: float
-    scatter: float
+    field: float  # standard deviation over the board
+    scatter: float  # standard deviation of a reading besides its rounding
 
 
 THICKNESS = UsualSizes(field=0.015, scatter=0.005)
@@ -54,17 +46,9 @@ WIDTH = UsualSizes(field=0.01, scatter=0.001)
 
 @dataclass(frozen=True)
 class Surface:
-    """A smooth function over the board: a sum of polynomials that are orthonormal over the unit square.
+    """A smooth function over the board: a sum of polynomials that are orthonormal over the unit square."""
 
-    Attributes
-    ----------
-    degrees : tuple of (int, int)
-        Along x and y of each polynomial.
-    coefficients : tuple of float
-        The root of the sum of their squares is the root mean square of the function over the board.
-    """
-
-    degrees: Degrees
+    degrees: Degrees  # along x and y of each polynomial
     coefficients: tuple[float, ...]
 
     def __call__(self, x: Floats, y: Floats) -> Floats:
@@ -84,51 +68,25 @@ class Surface:
 
 @dataclass(frozen=True, eq=False)
 class ConditionedField:
-    """A field as its readings leave it, normal in its mean and coefficients.
+    """A field as its readings leave it, normal in its mean and its n coefficients."""
 
-    Attributes
-    ----------
-    degrees : tuple of (int, int)
-        Of the polynomials besides the constant.
-    mean, sd : float
-        Of the field's mean over the board, in the unit of the readings.
-    shape : (n,) array
-        Expected coefficients, as fractions of the mean.
-    covariance : (n, n) array
-        Of the coefficients, as fractions of the mean.
-    with_mean : (n,) array
-        What the coefficients gain, expected, where the mean is one of its standard deviations higher.
-    """
-
-    degrees: Degrees
-    mean: float
+    degrees: Degrees  # of the polynomials besides the constant
+    mean: float  # of the field's mean over the board, in the unit of the readings, and so its sd
     sd: float
-    shape: Floats
-    covariance: Floats
-    with_mean: Floats
+    shape: Floats  # (n,) expected coefficients, as fractions of the mean
+    covariance: Floats  # (n, n), as fractions of the mean
+    with_mean: Floats  # (n,) gain of the coefficients where the mean is one of its sd higher
 
 
 @dataclass(frozen=True)
 class PlacedReadings:
-    """Readings at places of a board.
-
-    Attributes
-    ----------
-    x, y : tuple of float
-        Fractions of the sides.
-    resolution : float
-        In the unit of the readings.
-    place_sd : (float, float)
-        Standard deviations of the places along x and y, fractions of the sides.
-    is_along_x_only : bool
-        Whether the field varies along x alone.
-    """
+    """Readings at places of a board."""
 
     values: tuple[float, ...]
-    x: tuple[float, ...]
+    x: tuple[float, ...]  # fractions of the sides, and so y
     y: tuple[float, ...]
-    resolution: float
-    place_sd: tuple[float, float]
+    resolution: float  # in the unit of the readings
+    place_sd: tuple[float, float]  # of the places, fractions of the sides
     usual: UsualSizes
     is_along_x_only: bool = False
 
@@ -188,15 +146,10 @@ def conditioned(read: PlacedReadings) -> ConditionedField:
 
 
 def sd_after(read: PlacedReadings, x: Floats, y: Floats) -> float:
-    """Standard deviation of the field's mean that is expected after readings at further places, in their unit.
+    """Expected standard deviation of the field's mean after readings at further places (n,), fractions of the sides.
 
     What will be read there scatters as the readings at hand do, so that amplitudes and scatters keep the probabilities
     that they have now.
-
-    Parameters
-    ----------
-    x, y : (n,) array
-        The further places, fractions of the sides.
     """
     scale = statistics.mean(read.values)
     known = conditioned(read)
@@ -227,12 +180,9 @@ def _averaged(
 
 
 def _regressed(readings: Floats, design: Floats, own: Floats, usual: UsualSizes) -> tuple[Floats, Floats, Floats]:
-    """Regression on the constant and on standard smooth functions, for each amplitude and scatter.
+    """Regression on the constant and on standard smooth functions, for each amplitude and scatter, the constant first.
 
-    Returns
-    -------
-    tuple of arrays
-        Log probability (n_a, n_s), mean (n_a, n_s, r) and covariance (n_a, n_s, r, r), the constant first.
+    Log probability (n_a, n_s), mean (n_a, n_s, r) and covariance (n_a, n_s, r, r).
     """
     amplitude, scatter = _STEPS_AMPLITUDE, _STEPS_SCATTER
     variances = own + scatter[:, None] ** 2  # (n_s, n)

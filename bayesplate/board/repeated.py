@@ -32,17 +32,7 @@ _LONGEST_DECIMALS = 999
 def comma_complaint(items: Sequence[Any], furthest: float) -> Complaint | None:
     """What is wrong with [2,8, 2,7]: TOML reads four whole numbers where two decimals were meant.
 
-    Parameters
-    ----------
-    items : sequence
-        The list as TOML read it.
-    furthest : float
-        Ratio up to which readings of this thing may lie apart.
-
-    Returns
-    -------
-    Complaint or None
-        None where the whole numbers may be the readings themselves, or the decimals would not go together either.
+    None where the whole numbers may be the readings, or the decimals would lie further apart than `furthest`.
     """
     pairs = _pairs(items)
     if not pairs or spread(items) <= _WHOLE_NUMBERS_APART:

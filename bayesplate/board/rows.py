@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 from bayesplate.board.board import Board
 from bayesplate.board.board_keys import BoardKeys
-from bayesplate.board.card_file import CardFile
 from bayesplate.board.schema import sections_of
+from bayesplate.board.shelf import CardFile
 from bayesplate.board.words import did_you_mean, quoted
 from bayesplate.errors import Fault, InputError
 
@@ -39,24 +39,11 @@ class _Column(NamedTuple):
 
 
 class Columns:
-    """The columns of a table as keys of a card.
+    """The columns of a table as keys of a card; raises InputError with every column that is no key.
 
-    Parameters
-    ----------
-    template : str or path
-        The card of what is common to all boards. It need not have frequencies, and those that it has must have a
-        column.
-    names : sequence of str
-        The header of the table: `name`, `title`, a key of [plate] or [material], or the label of a mode as "(1,1)",
-        after the name of its setup where there are several; with " sd" behind it the standard deviation of that column.
-        A column without a name is none, and its cells are empty.
-    file : str
-        The table, as messages show it.
-
-    Raises
-    ------
-    InputError
-        If the template is no table of a card, or with every column that is no key.
+    A column is `name`, `title`, a key of [plate] or [material], or the label of a mode, "(1,1)" or "SETUP (1,1)", with
+    " sd" behind it for the standard deviation. The template is the card of what is common to all boards; frequencies
+    that it has must have a column.
     """
 
     def __init__(self, template: str | PathLike[str], names: Sequence[str], file: str) -> None:
@@ -111,7 +98,7 @@ class Columns:
                 yield Fault(f"{self.file} column {i}", wanted, f"{quoted(name)} alone", remedy)
 
     def _common_readings(self) -> Iterator[Fault]:
-        """What the template has read would silently be read on every board."""
+        """Readings of the template would silently be those of every board."""
         own = {column.inside for column in self._columns if column is not None}
         stray: list[str] = []
         for setup in _setups_of(self.template.table):
@@ -129,17 +116,9 @@ class Columns:
         return (_word(row[at]) or "") if at < len(row) else ""
 
     def board(self, row: Sequence[Cell]) -> Board:
-        """The board of a row.
+        """The board of a row; raises InputError with every fault of the cells, or of the card that they would be.
 
-        Parameters
-        ----------
-        row : sequence of str, number or None
-            Empty cells say nothing: the template's entry stays, but a mode was not read.
-
-        Raises
-        ------
-        InputError
-            With every fault of the cells, or of the card that they would be.
+        Empty cells say nothing: the template's entry stays, but a mode was not read.
         """
         values, faults = self._values(row)
         name = self.name_of(row)

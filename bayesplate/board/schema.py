@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
-from typing import Any, TypeVar, get_args, get_type_hints
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 
-from bayesplate.board.card_file import CardFile
-from bayesplate.board.values import Complaint, Refusal
+from bayesplate.board.shelf import CardFile
+from bayesplate.board.values import Complaint, Key, Refusal, Text, read_format, read_name
 from bayesplate.board.words import did_you_mean, name_complaint, quoted, shown
 from bayesplate.errors import Fault, InputError
 
@@ -26,7 +26,15 @@ class Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-CardModel = TypeVar("CardModel", bound=Section)
+class Card(Section):
+    """A whole card: what the cards of all kinds have."""
+
+    format: Annotated[Literal[1], Key(read_format)] = Field(description="1")
+    name: Annotated[str, Key(read_name)] = Field(description="the name of the file without .toml")
+    title: Text = ""
+
+
+CardModel = TypeVar("CardModel", bound=Card)
 
 
 def validated(
@@ -36,22 +44,9 @@ def validated(
     context: Mapping[str, Any] | None = None,
     file: str = "",
 ) -> CardModel:
-    """A card from the table of its file.
+    """A card from the table of its file; raises InputError with every fault at once.
 
-    Parameters
-    ----------
-    faults_of : callable
-        What is wrong with keys beside one another, from the raw table and the file's name as messages show it: these
-        faults are reported together with those of single keys.
-    context : mapping, optional
-        Handed to the model.
-    file : str
-        In place of the file's name in messages.
-
-    Raises
-    ------
-    InputError
-        With every fault of the card at once, the first fifty written out.
+    `faults_of` tells what is wrong with keys beside one another, from the raw table and the file's name in messages.
     """
     table, file = card.table, file or card.shown
     found = [*_name_faults(table, file, card.stem), *faults_of(table, file)]

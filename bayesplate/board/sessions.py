@@ -64,18 +64,7 @@ def _is_held_alike(one: Setup, other: Setup) -> bool:
 
 
 def with_discrepancies(board: Board) -> Board:
-    """The board with the discrepancies that its sessions share, one for each mode that has a label in one of them.
-
-    Parameters
-    ----------
-    board : Board
-        Parameters that it has already keep their priors.
-
-    Returns
-    -------
-    Board
-        The same where it has no sessions.
-    """
+    """The board with the discrepancies that its sessions share, one for each labelled mode; own priors stay."""
     found = board
     for group in sessions(board):
         owner = Owner("group", f"{group[0].name} to {group[-1].name}")
@@ -129,7 +118,7 @@ def discrepancy_names(setup: Setup, label: Label) -> tuple[str, str] | None:
 
 
 def unknown_discrepancies(board: Board, setup: Setup) -> Floats:
-    """Variance of what modes of a setup depart from the plate by where no session has read them: (n_modes,) array.
+    """Variance of the discrepancies of a setup's modes that no session has read: (n_modes,) array.
 
     Zero of those whose discrepancy is a parameter of the board, and where sessions share nothing and the noise has it.
     """
@@ -143,24 +132,10 @@ def unknown_discrepancies(board: Board, setup: Setup) -> Floats:
 
 
 def under_prior_scales(board: Board, values: Values, slopes: Floats, inputs: Floats) -> tuple[Floats, Floats]:
-    """Slopes and places of the inputs where discrepancies have the size that is expected beforehand.
+    """Slopes (n_modes, n_inputs) and standard coordinates (n_inputs,) where discrepancies have their prior size.
 
     A fit lets their scale follow the residual. Who judges the residual must not: like noise that is left free, a scale
-    that has followed it would let any residual pass.
-
-    Parameters
-    ----------
-    values : dict of float
-        Where the slopes were taken.
-    slopes : (n_modes, n_inputs) array
-        d ln f by the standard coordinates of the board's uncertain parameters.
-    inputs : (n_inputs,) array
-        These coordinates.
-
-    Returns
-    -------
-    slopes, inputs : arrays of the same shapes
-        The discrepancies themselves are what they were; their scale moves nothing.
+    that has followed it would let any residual pass. The discrepancies stay what they were; their scale moves nothing.
     """
     slopes, inputs = slopes.copy(), inputs.copy()
     for i, one in enumerate(board.uncertain):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from numbers import Real
@@ -30,10 +30,6 @@ CLAMPED_NOISE = Quantity.from_median(0.008, np.exp(0.5))
 _ALIKE = ("name", "clamped", "first_label", "resolution", "missed", "spurious", "attached")
 """What a setup has as its table states it."""
 NOISE_WANTED = "a relative noise and how far it may be off: Quantity.from_median(0.005, 2)"
-
-
-def _is_noise(value: object) -> bool:
-    return isinstance(value, Quantity) and not value.is_exact
 
 
 def _is_number(value: object) -> bool:
@@ -177,7 +173,7 @@ class Setup:
             ("name", name, isinstance(name, str), "a text"),
             ("frequencies", frequencies, isinstance(frequencies, Mapping), "a dict of frequencies by label"),
             ("edges", edges, isinstance(edges, str | Mapping), "a word, or a dict of words by edge"),
-            ("noise", noise, noise is None or _is_noise(noise), NOISE_WANTED),
+            ("noise", noise, noise is None or (isinstance(noise, Quantity) and not noise.is_exact), NOISE_WANTED),
             ("resolution", resolution, _is_number(resolution), "a number, in Hz"),
             ("first_label", first_label, is_place(first_label), "a pair of whole numbers"),
             ("clamped", clamped, isinstance(clamped, Mapping | None), "a dict of lengths by edge"),
@@ -296,19 +292,6 @@ class Setup:
         )
         stated = keys.model_dump(by_alias=True, exclude_defaults=True)
         return {"name": self.name, **stated, **({"frequencies_hz": frequencies} if frequencies else {})}
-
-    def uncertain_keys(self) -> Iterator[tuple[str, Quantity]]:
-        """Every log-normal quantity that a card states of the setup, with its place."""
-        yield "noise", self.noise
-        yield from ((str(reading.label), reading.frequency) for reading in self.readings)
-        yield from ((f"peak {i}", peak.frequency) for i, peak in enumerate(self.peaks, start=1))
-        for i, item in enumerate(self.attached, start=1):
-            stated = (item.mass, item.coil, item.suspension, item.resonance)
-            yield from ((f"attached {i}", one) for one in stated if one is not None)
-        if self.fluid is not None and self.fluid.density is not None:
-            yield "fluid", self.fluid.density
-        if self.bounce is not None:
-            yield "bounce", self.bounce
 
     def assuming_noise(self, prior: PriorCard | None = None) -> Setup:
         """The setup with the noise of a prior, or else of its edges, in place of any that it has."""

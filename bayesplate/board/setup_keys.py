@@ -27,13 +27,13 @@ from bayesplate.board.values import (
     Complaint,
     Key,
     Number,
+    Reference,
     Refusal,
+    Text,
     read_each,
     read_list,
     read_name,
-    read_reference,
     read_table,
-    read_text,
     refuse,
 )
 from bayesplate.board.words import EDGE_WORDS, EDGES, shown
@@ -66,12 +66,7 @@ class Edges(Section):
     @property
     def words(self) -> dict[str, End]:
         """Edge name to word, in the order x0, x1, y0, y1."""
-        return {"x0": self.x0, "x1": self.x1, "y0": self.y0, "y1": self.y1}
-
-    @property
-    def letters(self) -> str:
-        """The paper's four letters, "CFFF", in its order x0, y0, x1, y1."""
-        return edge_letters(self.words)
+        return dict(self)
 
 
 def edge_letters(words: Mapping[str, str]) -> str:
@@ -145,12 +140,12 @@ class SetupKeys(Section):
     """A [setup] of a board card, in SI units, keyed by label or by edge, never by position."""
 
     name: Annotated[str, Key(_read_setup_name)] = DEFAULT_SETUP_NAME
-    notes: Annotated[str, Key(read_text)] = ""
+    notes: Text = ""
     edges: Annotated[Edges, BeforeValidator(_edges_table)] = Field(description=_EDGE_WANTED)
     clamped: Annotated[Mapping[str, Quantity], _CLAMPS] = Field(default={}, alias="clamped_mm")
     first_label: Annotated[Label, FIRST_LABEL] = NO_OFFSET
     resolution: Annotated[float, Number(1e-6, 1000, "Hz").key] = Field(default=0.0, alias="resolution_hz")
-    published_coefficients: Annotated[str, Key(read_reference)] = ""
+    published_coefficients: Reference = ""
     noise: Annotated[Quantity | None, NOISE] = Field(default=None, alias="noise_percent")
     unlabelled: Annotated[tuple[Quantity, ...], _UNLABELLED] = Field(default=(), alias="unlabelled_hz")
     peaks: tuple[Peak, ...] = Field(default=(), max_length=MOST_MODES)

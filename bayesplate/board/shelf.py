@@ -1,12 +1,18 @@
-"""Where cards stand: a path if it looks like one, otherwise the shelf of cards that comes with the package."""
+"""Files of cards: their place, a path or a name on the shelf that comes with the package, and the table they hold."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
+from bayesplate.board.toml import read_file, read_table
 from bayesplate.board.words import did_you_mean, quoted
+from bayesplate.board.writing import toml_text
 from bayesplate.errors import Fault, InputError, plain
 
 CardKind = Literal["boards", "priors", "coefficients", "campaigns"]
@@ -18,15 +24,7 @@ _CHECKOUT = _PACKAGE.parent / "models"
 
 
 def shelf_folder(kind: CardKind) -> Path:
-    """The folder of the shipped cards of one kind.
-
-    An installed package carries its cards in `bayesplate/models`; an editable install reads `models/` of the checkout.
-
-    Raises
-    ------
-    InputError
-        If neither folder exists; names both.
-    """
+    """The folder of the shipped cards of one kind, in the package or the checkout; InputError if there is none."""
     for shelf in (_INSTALLED, _CHECKOUT):
         if (shelf / kind).is_dir():
             return shelf / kind
@@ -40,20 +38,9 @@ def card_names(kind: CardKind) -> tuple[str, ...]:
 
 
 def find(kind: CardKind, name_or_path: str | os.PathLike[str], beside: Path | None = None) -> Path:
-    """The file of a card.
+    """The file of a card: a path, from the folder `beside`, if it looks like one, otherwise a name on the shelf.
 
-    Parameters
-    ----------
-    kind : {"boards", "priors", "coefficients", "campaigns"}
-    name_or_path : str or path
-        A path if it contains a separator, ends in .toml or is a path object; otherwise the name of a shipped card.
-    beside : Path, optional
-        Folder that a relative path starts from; the working directory if not given.
-
-    Raises
-    ------
-    InputError
-        If a name is not on the shelf; names the shelf, the nearest card, and how to write a path.
+    Raises InputError if a name is not on the shelf, with the nearest card and how to write a path.
     """
     text = os.fspath(name_or_path)
     if isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or any(mark in text for mark in "/\\"):
@@ -74,3 +61,49 @@ def find(kind: CardKind, name_or_path: str | os.PathLike[str], beside: Path | No
     else:
         remedy = did_you_mean(text, names) or f"a card in {plain(os.getcwd())} is given as a path"
     raise InputError(Fault(quoted(text), wanted, got, remedy))
+
+
+@dataclass(frozen=True)
+class CardFile:
+    """The table of a card, as its file states it, or would state it where there is none."""
+
+    table: Mapping[str, Any]
+    name: str
+    folder: Path | None = None  # where the cards stand that it names by a relative path
+    read: str = ""  # the text of the file; empty where the table was made otherwise
+
+    @classmethod
+    def load(cls, kind: CardKind, name_or_path: str | os.PathLike[str], beside: Path | None = None) -> CardFile:
+        """A card of the shelf by its name, or of a path; raises InputError if it is no table."""
+        path = find(kind, name_or_path, beside)
+        return cls.of(read_file(path), path.name, path.parent)
+
+    @classmethod
+    def of(cls, content: bytes | str, name: str, folder: Path | None = None) -> CardFile:
+        """A card from the content of a file; raises InputError if it is no table."""
+        data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
+        return cls(read_table(data, plain(name)), name, folder, data.decode("utf-8"))
+
+    @property
+    def shown(self) -> str:
+        """Its name as messages show it."""
+        return plain(self.name)
+
+    @property
+    def stem(self) -> str:
+        """The name that the card must have."""
+        return os.path.splitext(self.name)[0]
+
+    @property
+    def path(self) -> Path:
+        return (self.folder or Path()) / self.name
+
+    @cached_property
+    def text(self) -> str:
+        """The text of the file as it was read, or the table as TOML; `sha256` is that of its bytes in UTF-8."""
+        return self.read or toml_text(self.table)
+
+    @cached_property
+    def sha256(self) -> str:
+        """Hexadecimal SHA-256 of the file's bytes."""
+        return sha256(self.text.encode("utf-8")).hexdigest()

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 
 from bayesplate.board.repeated import CALIPER
 from bayesplate.board.words import EDGES
+from bayesplate.board.writing import toml_value
 from bayesplate.labels import Label
 
 _EXAMPLE = "# an example: put yours here"
@@ -23,74 +22,47 @@ _AIR = (
 )
 
 
-@dataclass(frozen=True)
-class Starter:
-    """What somebody knows of a board before its first card.
-
-    Attributes
-    ----------
-    sizes : dict of float
-        Any of length_x, length_y, thickness (mm), mass (g).
-    edges : dict of str
-        Condition of x0, x1, y0 and y1.
-    frequencies : dict of float
-        Label to Hz.
-    """
-
-    name: str
-    title: str = ""
-    notes: str = ""
-    sizes: Mapping[str, float] = field(default_factory=dict)
-    edges: Mapping[str, str] = field(default_factory=lambda: dict.fromkeys(EDGES, "free"))
-    prior: str = "weakly-informative"
-    frequencies: Mapping[str, float] = field(default_factory=dict)
-
-
-def starter_text(starter: Starter, examples: Sequence[Label]) -> str:
-    """A board card in TOML.
-
-    Parameters
-    ----------
-    examples : sequence of Label
-        Modes that a board with these edges has; those without a frequency become lines to be filled in.
-    """
-    edges = ", ".join(f"{edge} = {_quoted(starter.edges[edge])}" for edge in EDGES)
-    free_texts = {"title": starter.title, "notes": starter.notes}
+def starter_text(
+    name: str,
+    sizes: Mapping[str, float],  # any of length_x, length_y, thickness, mm; mass, g
+    edges: Mapping[str, str],
+    prior: str,
+    frequencies: Mapping[str, float],  # label to Hz
+    examples: Sequence[Label],  # modes of such a board: lines to be filled in where they were not measured
+    **texts: str,
+) -> str:
+    """A board card in TOML; `texts` stand above its tables."""
+    words = ", ".join(f"{edge} = {toml_value(edges[edge])}" for edge in EDGES)
     lines = [
         "format = 1",
-        f"name = {_quoted(starter.name)}",
-        *(f"{key} = {_quoted(text)}" for key, text in free_texts.items() if text),
+        f"name = {toml_value(name)}",
+        *(f"{key} = {toml_value(text)}" for key, text in texts.items() if text),
         "",
         "[plate]  # the whole board; x is along the grain",
-        _size(starter, "length_x", "length_x_mm = {:g}"),
-        _size(starter, "length_y", "length_y_mm = {:g}"),
-        _size(starter, "thickness", f"thickness_mm = {{{{ mean = {{:g}}, sd = {CALIPER:g} }}}}"),
-        f"mass_g = {starter.sizes['mass']:g}"
-        if "mass" in starter.sizes
+        _size(sizes, "length_x", "length_x_mm = {:g}"),
+        _size(sizes, "length_y", "length_y_mm = {:g}"),
+        _size(sizes, "thickness", f"thickness_mm = {{{{ mean = {{:g}}, sd = {CALIPER:g} }}}}"),
+        f"mass_g = {sizes['mass']:g}"
+        if "mass" in sizes
         else f"density_kg_m3 = {SPRUCE_DENSITY:g}  # an example: put mass_g here in its place",
         "",
         "[material]",
-        f"prior = {_quoted(starter.prior)}",
+        f"prior = {toml_value(prior)}",
         "",
         "[setup]",
-        f"edges = {{ {edges} }}",
+        f"edges = {{ {words} }}",
     ]
-    if "clamped" in starter.edges.values():
+    if "clamped" in edges.values():
         lines.append("# clamped_mm = { x0 = 30 }  # what the clamp covers, where the plate's length includes it")
     lines.append("# unlabelled_hz = [404, 448.8]  # peaks of which you cannot tell the mode")
     lines += ["", *_AIR]
     lines += ["", '[setup.frequencies_hz]  # "(m,n)": m nodal lines crossed along x, n along y']
-    lines += [f"{_quoted(label)} = {hz:g}" for label, hz in starter.frequencies.items()]
-    lines += [f'# "{label}" = ' for label in examples if str(label) not in starter.frequencies]
+    lines += [f"{toml_value(label)} = {hz:g}" for label, hz in frequencies.items()]
+    lines += [f'# "{label}" = ' for label in examples if str(label) not in frequencies]
     return "\n".join(lines) + "\n"
 
 
-def _size(starter: Starter, name: str, form: str) -> str:
-    if name in starter.sizes:
-        return form.format(starter.sizes[name])
+def _size(sizes: Mapping[str, float], name: str, form: str) -> str:
+    if name in sizes:
+        return form.format(sizes[name])
     return f"{form.format(HALF_TOP[name])}  {_EXAMPLE}"
-
-
-def _quoted(text: str) -> str:
-    """A text as TOML writes it, which for these characters is as JSON does."""
-    return json.dumps(text, ensure_ascii=False)

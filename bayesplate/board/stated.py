@@ -1,8 +1,7 @@
-"""What is stated in Python instead of on a card, held to its kind: quantities, places, arguments of other types."""
+"""Values stated in Python instead of on a card: quantities, places, types of arguments."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import TypeVar
@@ -10,7 +9,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bayesplate.board.quantity import Kind, Quantity
+from bayesplate.board.density import Kind
+from bayesplate.board.quantity import Quantity
 from bayesplate.errors import Fault, InputError
 
 Name = TypeVar("Name", str, int)
@@ -18,7 +18,7 @@ _LONGEST = 100
 
 
 def quantity_of(value: Quantity | ArrayLike | None, place: str, unit: str, kind: Kind = "log-normal") -> Quantity:
-    """What was stated as a quantity, as `Quantity.of` takes it; raises InputError with the place and the unit."""
+    """A stated value as a quantity, see `Quantity.of`; raises InputError with the place and the unit."""
     try:
         return Quantity.of(value, kind)
     except InputError as error:
@@ -34,7 +34,7 @@ def quantity_of(value: Quantity | ArrayLike | None, place: str, unit: str, kind:
 def quantities_of(
     stated: Mapping[Name, Quantity | ArrayLike | None], place: str, unit: str, kinds: Mapping[Name, Kind] | None = None
 ) -> tuple[dict[Name, Quantity], list[Fault]]:
-    """Quantities by name from what was stated of them, log-normal unless said otherwise, and what cannot be one."""
+    """Stated values as quantities by name, log-normal unless `kinds` says otherwise, and faults."""
     found: dict[Name, Quantity] = {}
     faults: list[Fault] = []
     for name, value in stated.items():
@@ -46,7 +46,7 @@ def quantities_of(
 
 
 def wrong_types(place: str, given: Iterable[tuple[str, object, bool, str]]) -> Iterator[Fault]:
-    """A fault for every argument of another type: its name, its value, whether it will do, and what was wanted."""
+    """A fault for every argument of a wrong type, from its name, its value, whether it will do, and what was wanted."""
     for name, value, will_do, wanted in given:
         if not will_do:
             got = repr(value)
@@ -65,13 +65,3 @@ def is_place(value: object) -> bool:
     except ValueError:
         return False
     return pair.shape == (2,) and pair.dtype.kind in "iuf"
-
-
-def unstatable(place: str, one: Quantity, kind: Kind = "log-normal", lower: float = -math.inf) -> list[Fault]:
-    """What a card cannot say of a quantity whose key takes a density of one kind, without bounds but a lower one."""
-    if one.is_exact or (one.kind == kind and (one.lower, one.upper) == (lower, math.inf)):
-        return []
-    is_bounded = math.isfinite(one.lower) or math.isfinite(one.upper)
-    got = f"a {one.kind} one" + (" with bounds" if is_bounded else "")
-    bounds = f"from {lower:g} on" if math.isfinite(lower) else "without bounds"
-    return [Fault(place, f"a {kind} quantity {bounds}, as cards state it", got)]

@@ -28,13 +28,7 @@ _QUOTED = re.compile(r"\"[^\"]*\"|'[^']*'|#.*")
 
 
 def read_file(path: str | Path) -> bytes:
-    """The bytes of a card file.
-
-    Raises
-    ------
-    InputError
-        If it is missing, not a regular file, unreadable or too large. A FIFO or a device is refused without waiting.
-    """
+    """The bytes of a small regular file; InputError for all else, a FIFO or a device without waiting."""
     asked = plain(str(path))
     try:
         if not stat.S_ISREG(os.stat(path).st_mode):
@@ -56,18 +50,7 @@ def read_file(path: str | Path) -> bytes:
 
 
 def read_table(data: bytes, file: str) -> dict[str, Any]:
-    """The table that a TOML file holds.
-
-    Parameters
-    ----------
-    file : str
-        The file's name, as messages show it.
-
-    Raises
-    ------
-    InputError
-        If it is empty, not UTF-8 text, not TOML, or nested deeper than twenty levels.
-    """
+    """The table that a TOML file holds; raises InputError if it is none, or nested deeper than twenty levels."""
     text = _text(data, file)
     long_key = _LONG_KEY.search(text)
     if long_key:

@@ -6,8 +6,9 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
+from pydantic import BeforeValidator
 from pydantic_core import core_schema
 
 from bayesplate.board.units import OTHER_UNITS, SI, in_unit
@@ -39,24 +40,12 @@ class Refusal(ValueError):
         return [replace(one, inside=(*keys, *one.inside)) for one in self.complaints]
 
 
-def _same(value: Any) -> Any:
-    return value
-
-
 @dataclass(frozen=True)
 class Key:
-    """How a value of a card is read into SI units, and how it is written again: the annotation of a field.
+    """How a value of a card is read into SI units, and how it is written again: the annotation of a field."""
 
-    Attributes
-    ----------
-    read : callable
-        From what the TOML reader returned to the value; raises Refusal.
-    write : callable
-        From the value to what the TOML writer takes.
-    """
-
-    read: Callable[[Any], Any]
-    write: Callable[[Any], Any] = _same
+    read: Callable[[Any], Any]  # from what the TOML reader returned; raises Refusal
+    write: Callable[[Any], Any] = lambda value: value  # to what the TOML writer takes
 
     def __get_pydantic_core_schema__(self, source: object, handler: object) -> core_schema.CoreSchema:
         writing = core_schema.plain_serializer_function_ser_schema(self.write)
@@ -113,6 +102,11 @@ def read_list(value: object, what: str, most: int, why: str = "") -> list[Any]:
     if len(value) > most:
         raise Refusal(Complaint(f"at most {most} {what}", str(len(value)), why))
     return value
+
+
+def one_or_more(tables: str, most: int) -> BeforeValidator:
+    """A table alone is a list of one; the tables are read by their model."""
+    return BeforeValidator(lambda value: [value] if isinstance(value, dict) else read_list(value, tables, most))
 
 
 @dataclass(frozen=True)
@@ -276,3 +270,7 @@ def read_effects(value: object) -> tuple[str, ...]:
     if twice:
         raise Refusal(Complaint("each name once", f"{listed(twice)} twice"))
     return tuple(read)
+
+
+Text = Annotated[str, Key(read_text)]
+Reference = Annotated[str, Key(read_reference)]

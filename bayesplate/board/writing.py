@@ -19,11 +19,6 @@ def toml_text(content: Mapping[str, Any]) -> str:
     """A whole table as TOML, as the reader of TOML would return it again.
 
     A table within a section stands on one line if it is short, { mean = 3.0, sd = 0.05 }, otherwise below a header.
-
-    Parameters
-    ----------
-    content : mapping
-        Of texts, numbers, truth values, dates, lists and tables.
     """
     return "\n".join(_lines(content, ())).lstrip("\n") + "\n"
 
@@ -69,13 +64,7 @@ def _key(key: str) -> str:
 
 
 def write_card(path: Any, name: str, content: str, *, force: bool) -> None:
-    """Write a card to a file of its name, completely or not at all.
-
-    Raises
-    ------
-    InputError
-        If the file has another name than the card, is there already and `force` is not given, or cannot be written.
-    """
+    """Write a card to NAME.toml, completely or not at all; raises InputError where it may not or cannot be."""
     path = Path(path)
     shown = plain(str(path))
     if path.name != f"{name}.toml":

@@ -32,17 +32,8 @@ Rule = Callable[[Mapping[str, Any]], Iterable[Fault]]
 def checked(*rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """A function whose arguments are read by the `Key` of their annotations, and which runs in one thread.
 
-    Thousands of small matrices in several threads of linear algebra would only wait for one another.
-
-    Parameters
-    ----------
-    *rules
-        Held against several arguments together.
-
-    Raises
-    ------
-    InputError
-        When it is called: with every argument that cannot be used, and with those that contradict each other.
+    Thousands of small matrices in several threads of linear algebra would only wait for one another. A call raises
+    InputError with every argument that cannot be used, and with those that contradict each other by a rule.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
@@ -113,7 +104,7 @@ def contradictions(given: Mapping[str, Any]) -> Iterator[Fault]:
 
 
 def refused(wanted: str, value: object, remedy: str = "") -> Refusal:
-    """What is wrong with an argument: to be raised."""
+    """The refusal of an argument, to be raised."""
     return Refusal(Complaint(wanted, value_shown(value), remedy))
 
 
@@ -123,12 +114,11 @@ def value_shown(value: object) -> str:
 
 
 def or_none(read: Read) -> Read:
-    """A reader that lets None through."""
     return lambda value: None if value is None else read(value)
 
 
 def instance_of(kind: type) -> Read:
-    """A reader of what Python made of a class."""
+    """A reader of instances of a class."""
 
     def read(value: object) -> object:
         if not isinstance(value, kind):
@@ -150,7 +140,7 @@ def read_path(value: object, wanted: str = "a name or a path") -> Any:
 
 
 def read_card(value: object) -> object:
-    """A card, or what was made of one."""
+    """A name or a path, a Board, or a Problem or Campaign."""
     is_made = isinstance(getattr(value, "prepared", None), Prepared) or isinstance(
         getattr(value, "card", None), CampaignCard
     )
@@ -158,7 +148,6 @@ def read_card(value: object) -> object:
 
 
 def read_prior(value: object) -> object:
-    """A prior card, or where it is."""
     return value if isinstance(value, PriorCard) else read_path(value, "a name, a path or a PriorCard")
 
 
@@ -174,7 +163,7 @@ def whole(least: int) -> Read:
 
 
 def read_switch(value: object) -> bool:
-    """True or False, and nothing that Python takes for it."""
+    """True or False alone."""
     if not isinstance(value, bool):
         raise refused("True or False", value)
     return value
@@ -193,7 +182,6 @@ def word(*words: str) -> Read:
 
 
 def read_function(value: object) -> object:
-    """A function, or None."""
     if value is not None and not callable(value):
         raise refused("a function or None", value)
     return value
@@ -230,5 +218,4 @@ def is_number(value: object) -> TypeGuard[float]:
 
 
 def is_positive(value: object) -> TypeGuard[float]:
-    """Whether it is a finite number above zero."""
     return is_number(value) and value > 0.0

@@ -39,26 +39,23 @@ class MostlyKnown:
 
     @classmethod
     def of(cls, way: Way, bare: Board) -> MostlyKnown:
-        """About the constants of a way to label some of the peaks of `bare`."""
+        """The modes about the constants of a way to label some peaks of `bare`."""
         estimate = weighted_least_squares(way.board)
         model = with_others(setup_model(system_of(bare, bare.setups[0]), estimate.values), estimate.values)
         return cls(bare, model, guess_of(bare, estimate))
 
     def with_peaks(self, board: Board) -> MostlyKnown:
-        """The same with other peaks of the same setup: signs joined to the same frequencies."""
+        """The same with other peaks of the setup: signs joined to the same frequencies."""
         system = replace(self.model.system, setup=board.setups[0])
         return replace(self, board=board, model=replace(self.model, system=system))
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the modes, as labels."""
+        """Labels of the modes."""
         return tuple("cannot tell" if label is None else str(label) for label in self._likelihood.labels)
 
     def probabilities(self, evidence: Floats | None) -> Floats:
-        """Of each peak to be each mode: (n_peaks, n_modes) array, the peaks in the order of the setup.
-
-        `evidence` is ln of what else speaks for each pair.
-        """
+        """Probability of each peak to be each mode, with further `evidence` in ln: (n_peaks, n_modes) array."""
         result = np.empty(self._likelihood.log_prior.shape)
         result[self._likelihood.bare] = self._with(evidence).probabilities(*self._draws)
         return result
@@ -85,7 +82,7 @@ class MostlyKnown:
         return np.asarray(np.max(np.abs(self.shapes(_GRID)), axis=(1, 2)) ** 2)
 
     def deflections(self, place: Place) -> Floats:
-        """Of each mode at a place, m from the corner of the whole board: (n_modes,) array."""
+        """Deflection of each mode at a place, m from the corner of the whole board: (n_modes,) array."""
         x, y = fractions_of(self.model.setup, place, self.guess.values)
         return np.asarray(self._modes.displacement(np.array([x]), np.array([y]))[self._columns, 0, 0])
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from bayesplate.board.board import Board
-from bayesplate.board.card_file import CardFile
 from bayesplate.board.csv_table import csv_table
 from bayesplate.board.rows import Cell, Columns, is_empty
+from bayesplate.board.shelf import CardFile
 from bayesplate.board.toml import read_file, read_table
 from bayesplate.errors import Fault, InputError, plain
 from bayesplate.grading.storage import parquet_library
@@ -28,34 +28,18 @@ _OF_OTHER_CARDS = {"boards", "coefficients", "E_x", "D_x", "noise_percent"}
 
 @dataclass(frozen=True)
 class Entry:
-    """A board of a batch that is read when its turn comes, for there may be very many.
-
-    Attributes
-    ----------
-    card : callable
-        Reads it; raises InputError with all its faults.
-    place : str
-        Where it stands, as messages show it; empty where its own file says so.
-    alike : tuple of str
-        What it has in common with boards that share its matrices: they are fitted one after another.
-    """
+    """A board of a batch that is read when its turn comes, for there may be very many."""
 
     name: str
-    card: Callable[[], Board]
-    place: str = ""
-    alike: tuple[str, ...] = ()
+    card: Callable[[], Board]  # raises InputError with all its faults
+    place: str = ""  # where it stands, as messages show it; empty where its own file says so
+    alike: tuple[str, ...] = ()  # in common with boards that share its matrices, which are fitted one after another
 
 
 def boards_of(
     source: str | os.PathLike[str], template: str | os.PathLike[str] | None
 ) -> tuple[list[Entry], tuple[str, ...]]:
-    """The boards of a folder or of a table by name, and the files of the folder that are cards of another kind.
-
-    Raises
-    ------
-    InputError
-        If there are none, the table cannot be read, or a template is given with a folder or lacks with a table.
-    """
+    """The boards of a folder or a table by name, and files that are other cards; InputError if there are none."""
     path = Path(source)
     if os.path.isdir(path):
         if template is not None:
@@ -104,7 +88,7 @@ def _card_in(folder: Path, file: str) -> Board:
 
 
 def _content_of(folder: Path, file: str) -> Mapping[str, Any]:
-    """What a card holds; nothing where it cannot be read, which is told when the board's turn comes."""
+    """Content of a card; empty where it cannot be read, which is reported when the board's turn comes."""
     try:
         return read_table(read_file(os.path.join(folder, file)), plain(file)) if _is_inside(folder, file) else {}
     except InputError:

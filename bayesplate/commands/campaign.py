@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 from bayesplate.board.campaign import CampaignCard, is_campaign, load_campaign
 from bayesplate.board.checks import readings_sha256
@@ -21,6 +21,8 @@ from bayesplate.errors import Fault, InputError
 from bayesplate.frequencies.laws import LawName
 
 CampaignPath = str | os.PathLike[str]
+OfBoard = TypeVar("OfBoard")
+OfCampaign = TypeVar("OfCampaign")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -83,7 +85,7 @@ class Campaign:
 
     @property
     def name(self) -> str:
-        """Of the campaign."""
+        """Name of the campaign."""
         return self.card.name
 
     def pose(self) -> None:
@@ -101,34 +103,34 @@ class Campaign:
         return f"<Campaign {self.name}: {len(self.problems)} boards; {shared}>"
 
 
-def problem_or_campaign(
+def by_kind(
     given: Problem | Card | Campaign,
+    of_board: Callable[[Problem], OfBoard],
+    of_campaign: Callable[[Campaign], OfCampaign],
     *,
     effects: Sequence[str] | None = None,
     law: LawName | None = None,
     robust: bool = False,
     setup: str | os.PathLike[str] | None = None,
     may_lack_frequencies: bool = False,
-) -> Problem | Campaign:
-    """What a command was given, as a problem or as a campaign; the options are those of `as_problem`.
+) -> OfBoard | OfCampaign:
+    """What a command makes of a board or of a campaign: the one place that tells them apart; options as `as_problem`.
 
-    Raises
-    ------
-    InputError
-        As `Problem.from_card` and `Campaign.from_card`; also if a campaign is given beside what it states itself.
+    Raises InputError as `Problem.from_card` and `Campaign.from_card`; also for a Campaign beside what it states itself.
     """
-    is_card = isinstance(given, str | os.PathLike) and is_campaign(given)
-    if setup is not None and (is_card or isinstance(given, Campaign)):
-        raise InputError(Fault("setup", "a board, whose setup it completes", "a campaign", "give it to each board"))
-    if isinstance(given, Campaign):
+    if isinstance(given, Campaign) or is_campaign(given):
+        if setup is not None:
+            raise InputError(Fault("setup", "a board, whose setup it completes", "a campaign", "give it to each board"))
+        if not isinstance(given, Campaign):
+            return of_campaign(Campaign.from_card(given, effects, law, robust))
         if effects is not None or law is not None or robust:
             wanted, remedy = "nothing beside a Campaign", "Campaign.from_card takes it"
             raise InputError(Fault("effects, law, robust", wanted, "a value", remedy))
-        return given
-    if is_card and isinstance(given, str | os.PathLike):
-        return Campaign.from_card(given, effects, law, robust)
-    return as_problem(
-        given, effects=effects, law=law, robust=robust, setup=setup, may_lack_frequencies=may_lack_frequencies
+        return of_campaign(given)
+    return of_board(
+        as_problem(
+            given, effects=effects, law=law, robust=robust, setup=setup, may_lack_frequencies=may_lack_frequencies
+        )
     )
 
 

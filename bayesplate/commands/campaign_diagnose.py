@@ -36,7 +36,7 @@ from bayesplate.commands.campaign_fit import (
     summed_up,
 )
 from bayesplate.commands.fitting import FIT, FitResult, Run, Stages
-from bayesplate.commands.shown import show_diagnosis
+from bayesplate.commands.shown import Shown, show_campaign_diagnosis
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.forms import forms
 from bayesplate.effects import EFFECTS
@@ -89,9 +89,12 @@ class CampaignDiagnoseResult:
         content: dict[str, Any] = as_json(self.diagnosis)
         return content
 
+    def shown(self) -> Shown:
+        """Tables and sentences for a person."""
+        return show_campaign_diagnosis(self.diagnosis)
+
     def _repr_html_(self) -> str:
-        """The verdict and its tables as a notebook shows them."""
-        return show_diagnosis(self.diagnosis).html(self.diagnosis.name)
+        return self.shown().html(self.diagnosis.name)
 
     def __repr__(self) -> str:
         one = self.diagnosis
@@ -122,7 +125,7 @@ def diagnose_campaign(campaign: Campaign, run: Run, *, report: bool) -> Campaign
 
 
 def _diagnosed(campaign: Campaign, alone: Campaign, run: Run) -> CampaignDiagnoseResult:
-    """The diagnosis of a campaign whose boards can be fitted, nothing written but checkpoints."""
+    """The diagnosis of a campaign whose boards can be fitted; nothing is written but checkpoints."""
     could_share = () if campaign.shared else shareable(campaign)
     before = fit_boards(alone, run, f"{BEFORE}/")
     if campaign.shared:
@@ -149,7 +152,7 @@ def _diagnosed(campaign: Campaign, alone: Campaign, run: Run) -> CampaignDiagnos
 
 
 def _without_shared(campaign: Campaign) -> Campaign:
-    """The same boards side by side, without what they share."""
+    """The boards side by side, without the shared effects."""
     names = {one.effect for one in campaign.shared}
     if not names:
         return campaign
@@ -161,7 +164,7 @@ def _without_shared(campaign: Campaign) -> Campaign:
 
 
 def _sharing(campaign: Campaign, effects: Sequence[str]) -> Campaign:
-    """The same boards with effects that they share: as ratios where an effect has such a thing."""
+    """The boards with effects that they share, as ratios where an effect has ratios."""
     if not effects:
         return campaign
     problems = tuple(
@@ -175,10 +178,7 @@ def _sharing(campaign: Campaign, effects: Sequence[str]) -> Campaign:
 
 
 def shareable(campaign: Campaign) -> tuple[tuple[str, ...], ...]:
-    """Effects that all boards may have, of one size each, and that boards of one rig, day or species may have alike.
-
-    Single ones, then pairs.
-    """
+    """Effects, single and in pairs, that all boards may have, of one size each, alike on one rig, day or species."""
     can_act = set.intersection(*(set(forms(one.prepared.board)) for one in campaign.problems))
     able = [name for name, effect in EFFECTS.items() if effect.is_of_campaign and name in can_act]
     single = [name for name in able if _has_one_size(campaign, (name,))]
@@ -199,7 +199,7 @@ def _has_one_size(campaign: Campaign, effects: Sequence[str]) -> bool:
 def _searched(
     before: Mapping[str, FitResult], effects: Sequence[tuple[str, ...]], stages: Stages
 ) -> tuple[Explanation, ...]:
-    """What every board's tables say together."""
+    """Explanations by the tables of all boards together."""
     if not effects:
         return ()
     tried = [name for name, *others in effects if not others]

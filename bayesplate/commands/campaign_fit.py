@@ -31,7 +31,7 @@ from bayesplate.campaign.summary import (
 )
 from bayesplate.commands.campaign import Campaign
 from bayesplate.commands.fitting import FIT, FitResult, Run, Stages, not_converged
-from bayesplate.commands.shown import show_fit
+from bayesplate.commands.shown import Shown, show_campaign_fit
 from bayesplate.errors import Fault, InputError, NotConvergedError
 from bayesplate.files import write_text, writing
 from bayesplate.posterior.assessment import assess
@@ -135,9 +135,12 @@ class CampaignFitResult:
             with writing(folder / PAGE):
                 write_campaign_report(folder, self.campaign.card.title, self.summary, diagnosis)
 
+    def shown(self) -> Shown:
+        """Tables and sentences for a person."""
+        return show_campaign_fit(self.summary)
+
     def _repr_html_(self) -> str:
-        """The tables as a notebook shows them."""
-        return show_fit(self.summary).html(self.campaign.card.title or self.campaign.name)
+        return self.shown().html(self.campaign.card.title or self.campaign.name)
 
     def __repr__(self) -> str:
         return repr(self.summary).replace("<CampaignSummary", "<CampaignFitResult", 1)
@@ -155,7 +158,7 @@ def fit_campaign(campaign: Campaign, run: Run, *, report: bool) -> CampaignFitRe
 
 @contextmanager
 def campaign_run(campaign: Campaign, run: Run, left: float, place: str = "") -> Iterator[None]:
-    """A run that begins with each board alone, at a place of the checkpoint; where one fails, summary.json says so."""
+    """A run that begins with each board alone, at a place of the checkpoint; summary.json tells of a failure."""
     run.open({f"{place}{BOARDS}/{one.board.name}": one for one in campaign.problems}, left)
     try:
         yield
@@ -184,7 +187,7 @@ def fit_boards(campaign: Campaign, run: Run, place: str = "") -> dict[str, FitRe
 
 
 def fitted_together(campaign: Campaign, run: Run) -> CampaignFitResult:
-    """Boards and what they share, nothing written but checkpoints."""
+    """Fit boards and what they share; nothing is written but checkpoints."""
     alone = fit_boards(campaign, run)
     run.stages.begin("what the boards share", SHARED)
     learnt, boards, warnings = _together(campaign, alone, run.seed, run.stages)
@@ -199,7 +202,7 @@ def summed_up(
     warnings: tuple[str, ...],
     seed: int,
 ) -> CampaignFitResult:
-    """The result of boards that are fitted, with the population of their constants where they share one."""
+    """The result of fitted boards, with the population of their constants where they share one."""
     population = _population(campaign, boards, learnt, seed)
     summary = _summary(campaign, boards, learnt, population, warnings, seed)
     return CampaignFitResult(None, campaign, summary, boards, alone, learnt, population)
@@ -208,7 +211,7 @@ def summed_up(
 def _together(
     campaign: Campaign, alone: Mapping[str, FitResult], seed: int, stages: Stages
 ) -> tuple[Learnt | None, Mapping[str, FitResult], tuple[str, ...]]:
-    """What is shared, every board under what all teach, and what a reader must know of it."""
+    """What is shared, every board under what all boards teach, and warnings."""
     if not campaign.shared:
         return None, alone, ()
     members = [Member(one.inference, one.draws, campaign.shared) for one in alone.values()]
@@ -272,5 +275,4 @@ def _summary(
 
 
 def boards_of(found: Mapping[str, FitResult]) -> dict[str, Board]:
-    """The boards that were fitted, by name."""
     return {name: one.inference.problem.board for name, one in found.items()}

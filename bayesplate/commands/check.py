@@ -15,11 +15,11 @@ from bayesplate.campaign.pulls import Pull, moments_before
 from bayesplate.campaign.scatter import expected_width
 from bayesplate.campaign.shared import Shared
 from bayesplate.commands.arguments import checked
-from bayesplate.commands.campaign import Campaign, problem_or_campaign
+from bayesplate.commands.campaign import Campaign, by_kind
 from bayesplate.commands.options import CARD, Effects, SetupFile
 from bayesplate.commands.prepare import Card
 from bayesplate.commands.problem import Problem
-from bayesplate.commands.shown import show_check
+from bayesplate.commands.shown import Shown, show_campaign_check, show_check
 from bayesplate.diagnosis.signatures import INVISIBLE, Signature, look_alikes, signatures
 from bayesplate.diagnosis.terms import normalised
 from bayesplate.estimates.identifiability import remarks
@@ -59,9 +59,23 @@ class CheckResult(CheckReport):
     def __repr__(self) -> str:
         return super().__repr__().replace("<CheckReport", "<CheckResult", 1)
 
+    def shown(self) -> Shown:
+        """Tables and sentences for a person."""
+        return show_check(self)
+
     def _repr_html_(self) -> str:
-        """The tables as a notebook shows them."""
-        return show_check(self).html(self.title or self.name)
+        return self.shown().html(self.title or self.name)
+
+
+class CampaignCheckResult(CampaignCheck):
+    """What a check of a campaign leaves: all of `CampaignCheck`."""
+
+    def shown(self) -> Shown:
+        """Tables and sentences for a person."""
+        return show_campaign_check(self)
+
+    def _repr_html_(self) -> str:
+        return self.shown().html(self.title or self.name)
 
 
 @checked()
@@ -91,12 +105,11 @@ def check(
     InputError, NotIdentifiableError
         As `fit` would.
     """
-    given = problem_or_campaign(card, effects=effects, setup=setup)
-    return _check_campaign(given) if isinstance(given, Campaign) else _check_board(given)
+    return by_kind(card, _check_board, _check_campaign, effects=effects, setup=setup)
 
 
 def _check_board(given: Problem, *, candidates: bool = True) -> CheckResult:
-    """Check one board; without candidates, what effects that are not declared would do is not computed."""
+    """Check one board, without signatures of effects that are not declared if there are to be no candidates."""
     problem = given.posed
     board = problem.board
     estimate, found = problem.estimate, problem.identifiability
@@ -144,7 +157,7 @@ def _check_board(given: Problem, *, candidates: bool = True) -> CheckResult:
 
 
 def _of_poisson(problem: PosedProblem) -> list[str]:
-    """What the modes tell of an uncertain Poisson ratio of an isotropic board, beside its one modulus."""
+    """A sentence on how well the modes tell an uncertain Poisson ratio of an isotropic board."""
     names = problem.parameters.inputs
     if not problem.board.isotropic or "poisson_xy" not in names:
         return []
@@ -180,11 +193,11 @@ def expected_sd(problem: PosedProblem) -> dict[str, float]:
     return {name: float(np.nanstd(np.log(v))) for name, v in zip(MODULI, constants, strict=True)}
 
 
-def _check_campaign(campaign: Campaign) -> CampaignCheck:
-    """What each board and all together would tell."""
+def _check_campaign(campaign: Campaign) -> CampaignCheckResult:
+    """Check each board, and what all together would tell of shared numbers."""
     campaign.pose()
     population = campaign.population
-    return CampaignCheck(
+    return CampaignCheckResult(
         name=campaign.name,
         title=campaign.card.title,
         shared=_shared(campaign) if campaign.shared else {},
@@ -194,7 +207,7 @@ def _check_campaign(campaign: Campaign) -> CampaignCheck:
 
 
 def _shared(campaign: Campaign) -> dict[str, CheckedShared]:
-    """What normal approximations of the boards' posteriors say of the shared numbers."""
+    """Shared numbers by normal approximations of the boards' posteriors."""
     pulls = {one.board.name: _pull(one.posed, campaign) for one in campaign.problems}
     width = expected_width(campaign.shared)
     alone = {name: expected_sds(campaign.shared, [pull]) for name, pull in pulls.items()}
@@ -213,7 +226,7 @@ def _shared(campaign: Campaign) -> dict[str, CheckedShared]:
 
 
 def expected_sds(shared: Sequence[Shared], pulls: Sequence[Pull]) -> list[float]:
-    """Standard deviation of each shared number after what some boards say, over that of its prior, bounds kept."""
+    """Expected sd of each shared number over that of its prior, from the pulls of some boards, bounds kept."""
     before = np.array([moments_before(one.prior)[1] for one in shared])
     precision = np.diag(1.0 / before) + np.sum([one.precision for one in pulls], axis=0)
     return [float(sd) for sd in np.sqrt(np.diagonal(np.linalg.inv(precision)) / before)]

@@ -13,7 +13,7 @@ from bayesplate.commands.fitting import not_converged
 from bayesplate.commands.options import CARD, Coefficients, Effects, Force, OnProgress, OutOfComparison, Seed
 from bayesplate.commands.prepare import Card
 from bayesplate.commands.problem import Problem, as_problem
-from bayesplate.commands.shown import show_compare
+from bayesplate.commands.shown import Shown, show_compare
 from bayesplate.effects import EFFECTS
 from bayesplate.estimates.coefficients import named_table
 from bayesplate.estimates.leave_one_out import CarryingMode, united
@@ -81,9 +81,12 @@ class CompareResult(Comparison):
     def __repr__(self) -> str:
         return super().__repr__().replace("<Comparison", "<CompareResult", 1)
 
+    def shown(self) -> Shown:
+        """Tables and sentences for a person."""
+        return show_compare(self)
+
     def _repr_html_(self) -> str:
-        """The tables as a notebook shows them."""
-        return show_compare(self).html(f"{self.name}: every method side by side")
+        return self.shown().html(f"{self.name}: every method side by side")
 
 
 @checked()
@@ -179,9 +182,9 @@ def compare(
 def _posteriors(
     problem: PosedProblem, settings: SamplerSettings, progress: OnProgress
 ) -> tuple[list[Method], Inference, Draws]:
-    """The posteriors of both laws: the wider, exact one sampled, the linear one by weights where these leave enough.
+    """The posteriors of both laws, of the problem as the exact draws label its peaks.
 
-    Of the problem as the exact draws label its peaks.
+    The wider, exact one is sampled; the linear one has its draws by weights, where these leave enough.
     """
     inference, draws = _sampled(problem, settings, progress)
     problem = inference.problem

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,12 +16,13 @@ from bayesplate.board.material import MODULI
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.values import Key
 from bayesplate.commands.arguments import checked, whole
-from bayesplate.commands.campaign import Campaign, problem_or_campaign
+from bayesplate.commands.campaign import Campaign, by_kind
 from bayesplate.commands.campaign_diagnose import CampaignDiagnoseResult, diagnose_campaign
 from bayesplate.commands.fitting import FIT, FitResult, Run, with_board
 from bayesplate.commands.options import CARD, Effects, Force, OnProgress, Out, Report, Resume, Seed, SetupFile
 from bayesplate.commands.prepare import Card
 from bayesplate.commands.problem import Problem
+from bayesplate.commands.shown import Shown, show_diagnosis
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.claim import Claim, judge_claim, named_in_part, nested_of
 from bayesplate.diagnosis.findings import Case, Side, diagnosis_of
@@ -34,7 +36,7 @@ from bayesplate.diagnosis.search import Found
 from bayesplate.diagnosis.sizes import refit_board
 from bayesplate.diagnosis.stated import stated_claims
 from bayesplate.diagnosis.told import relabelled_sentence
-from bayesplate.diagnosis.verdict import Verdict, answer_words, decide
+from bayesplate.diagnosis.verdict import Answer, Verdict, answer_words, decide
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
 from bayesplate.estimates.leave_one_out import carrying_modes, indices_of, united
 from bayesplate.files import write_text
@@ -92,11 +94,14 @@ class DiagnoseResult:
         """The content of diagnosis.json."""
         return diagnosis_json(self.diagnosis)
 
+    def shown(self) -> Shown:
+        """Tables and sentences for a person."""
+        return show_diagnosis(self.diagnosis)
+
     def __repr__(self) -> str:
         return repr(self.diagnosis).replace("<Diagnosis", "<DiagnoseResult", 1)
 
     def _repr_html_(self) -> str:
-        """The verdict and its tables as a notebook shows them."""
         return self.diagnosis._repr_html_()
 
 
@@ -151,36 +156,52 @@ def diagnose(
     InputError, NotIdentifiableError, NotConvergedError, CheckpointError
         As `bayesplate.fit`, of the fit without further effects; also if a problem asks for robust noise.
     """
-    problem = problem_or_campaign(card, effects=effects, setup=setup)
     run = Run(seed, out, force=force, resume=resume, progress=progress)
-    if isinstance(problem, Campaign):
-        return diagnose_campaign(problem, run, report=report)
+    return by_kind(
+        card,
+        lambda problem: _diagnose_board(problem, run, n_null, report=report),
+        lambda campaign: diagnose_campaign(campaign, run, report=report),
+        effects=effects,
+        setup=setup,
+    )
+
+
+def _diagnose_board(problem: Problem, run: Run, n_null: int, *, report: bool) -> DiagnoseResult:
+    """Fit one board, diagnose the fit, and write what was found."""
     if problem.robust:
         wanted = "a problem with normal noise, which the search for an effect assumes"
         raise InputError(Fault("robust", wanted, "Student's distribution"))
     run.open({BEFORE: problem}, 2.0 * FIT + _SEARCH + _KNOWN + _CONTROL + _CHOICE)
-    stages = run.stages
     before = run.fit(problem, BEFORE, "fit without further effects", tells_failure=True)
-    posed = before.inference.problem
+    diagnosis, after = _diagnosed(problem, before, run, n_null)
+    if run.folder is not None:
+        path = run.folder.path
+        if after is not before:
+            before.write(path / BEFORE)
+        after.write(path)
+        write_text(path / DIAGNOSIS, json_text(diagnosis_json(diagnosis)))
+        if report:
+            after.write_page(path, diagnosis)
+        run.folder.close()
+    return DiagnoseResult(run.path, diagnosis, before, after)
+
+
+def _diagnosed(problem: Problem, before: FitResult, run: Run, n_null: int) -> tuple[Diagnosis, FitResult]:
+    """Search, null control, verdict and refits of a fitted board; nothing is written but checkpoints."""
+    posed, stages = before.inference.problem, run.stages
     stages.begin("search for effects", _SEARCH)
     ground, found = full_search(baseline_of(posed), tell=stages.reached)
     stages.begin("effects that are known", _KNOWN)
     known = known_fits(posed, stages.reached)
     stages.begin("the same search on simulated boards", _CONTROL)
-    control = null_control(ground, np.random.default_rng([seed, _NULL_LINE]), n_null, found.against_none)
+    control = null_control(ground, np.random.default_rng([run.seed, _NULL_LINE]), n_null, found.against_none)
     verdict = decide(found, control)
     folded = nested_of(found, control, verdict.tried)
     in_part = named_in_part(found, verdict, folded)
     finals = verdict.fitted_again[:_MOST_FINALISTS]
     stages.left = FIT * len(finals) + (_CHOICE if verdict.index else 0.0)
-    fits, failures = {0: before}, []
-    for answer in finals:
-        try:
-            name = "-".join((*answer.members, str(answer.index)))
-            stage = f"fit with {answer_words(found, answer)}"
-            fits[answer.index] = run.fit(with_board(problem, refit_board(found, answer.index)), name, stage)
-        except (NotIdentifiableError, NotConvergedError) as error:
-            failures.append(f"the model could not be fitted again with {' and '.join(answer.members)}: {error}")
+    again, failures = _fitted_again(problem, run, found, finals)
+    fits = {0: before, **again}
     last = verdict.tried if (verdict.index or in_part) and verdict.tried in fits else 0
     after = fits[last]
     known_carrying = (carrying_modes(posed.board, one.errors.leverages, MODULI) for one in known)
@@ -205,7 +226,7 @@ def diagnose(
             before=sides[0],
             after=sides[last],
             claim=judge_claim(found, verdict, control, folded) if last else Claim(),
-            recommendation=advice(found, verdict, before.problem.prior, seed),
+            recommendation=advice(found, verdict, before.problem.prior, run.seed),
             known=known,
             stated_claims=stated_claims(posed, known) if known else (),
             finalists=[(one, sides[one.index]) for one in finals if one.index in sides],
@@ -215,16 +236,22 @@ def diagnose(
             carrying=carrying_any,
         )
     )
-    if run.folder is not None:
-        path = run.folder.path
-        if last:
-            before.write(path / BEFORE)
-        after.write(path)
-        write_text(path / DIAGNOSIS, json_text(diagnosis_json(diagnosis)))
-        if report:
-            after.write_page(path, diagnosis)
-        run.folder.close()
-    return DiagnoseResult(run.path, diagnosis, before, after)
+    return diagnosis, after
+
+
+def _fitted_again(
+    problem: Problem, run: Run, found: Found, finals: Sequence[Answer]
+) -> tuple[dict[int, FitResult], list[str]]:
+    """The fits with the finalists among the answers, by index, and a sentence for each that failed."""
+    fits, failures = {}, []
+    for answer in finals:
+        try:
+            name = "-".join((*answer.members, str(answer.index)))
+            stage = f"fit with {answer_words(found, answer)}"
+            fits[answer.index] = run.fit(with_board(problem, refit_board(found, answer.index)), name, stage)
+        except (NotIdentifiableError, NotConvergedError) as error:
+            failures.append(f"the model could not be fitted again with {' and '.join(answer.members)}: {error}")
+    return fits, failures
 
 
 def _measured(one: FitResult) -> NDArray[np.float64]:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Annotated
 
 from bayesplate.commands.arguments import checked
-from bayesplate.commands.campaign import Campaign, problem_or_campaign
+from bayesplate.commands.campaign import Campaign, by_kind
 from bayesplate.commands.campaign_fit import CampaignFitResult, fit_campaign
-from bayesplate.commands.fitting import FitResult, Run
+from bayesplate.commands.fitting import FitResult, Run, fit_problem
 from bayesplate.commands.options import (
     CARD,
     Effects,
@@ -86,15 +85,13 @@ def fit(
     CheckpointError
         If a run cannot be resumed.
     """
-    given = problem_or_campaign(card, effects=effects, law=law, robust=robust, setup=setup)
     run = Run(seed, out, force=force, resume=resume, progress=progress)
-    if isinstance(given, Campaign):
-        return fit_campaign(given, run, report=report)
-    run.open({"": given})
-    result = replace(run.fit(given, tells_failure=True), folder=run.path)
-    if run.folder is not None:
-        result.write(run.folder.path)
-        if report:
-            result.write_page(run.folder.path)
-        run.folder.close()
-    return result
+    return by_kind(
+        card,
+        lambda problem: fit_problem(problem, run, report=report),
+        lambda campaign: fit_campaign(campaign, run, report=report),
+        effects=effects,
+        law=law,
+        robust=robust,
+        setup=setup,
+    )

@@ -51,7 +51,7 @@ _ASKED = {"seed": whole(0), "effects": effect_list("effects"), "law": word(*get_
 
 
 def _read_request(value: object) -> object:
-    """What a fit is asked for: its entries are read as the arguments of that name are."""
+    """A FitRequest, whose entries are read as the arguments of that name are."""
     if value is not None and not all(hasattr(value, key) for key in _ASKED):
         raise refused("a FitRequest", value)
     if value is not None:
@@ -90,7 +90,7 @@ def fit_board(
 
 
 def fit_board_into(folder: Path, report: bool, board: Board, prior: PriorCard, request: FitRequest) -> Summary:
-    """The same with the files of a fit in a folder, in place of what is there; raises as `fit`."""
+    """`fit_board` with the files of a fit in a folder, in place of those that are there."""
     done = fit(_problem(board, prior, request), out=folder, report=report, seed=request.seed, force=True)
     return done.summary  # type: ignore[return-value]  # a problem is no campaign
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from bayesplate.board.board import Board
 from bayesplate.commands.problem import Problem, pose_all
-from bayesplate.commands.shown import show_fit
+from bayesplate.commands.shown import Shown, show_fit
 from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.errors import CheckpointError, NotConvergedError
 from bayesplate.files import make_folder, write_text, writing
@@ -68,7 +68,7 @@ class FitResult:
     @cached_property
     def tree(self) -> Any:
         """The draws as posterior.nc holds them: an xarray.DataTree."""
-        attributes = attributes_of(self.inference, self.summary, self.problem.prepared.card_text)
+        attributes = attributes_of(self.inference, self.summary, self.problem.prepared.card.text)
         return posterior_tree(self.inference, self.draws, attributes)
 
     def to_arviz(self) -> Any:
@@ -102,23 +102,20 @@ class FitResult:
     def __repr__(self) -> str:
         return repr(self.summary).replace("<Summary", "<FitResult", 1)
 
+    def shown(self) -> Shown:
+        """Tables and sentences for a person."""
+        return show_fit(self.summary)
+
     def _repr_html_(self) -> str:
-        """The tables as a notebook shows them."""
-        return show_fit(self.summary).html(self.problem.board.title or self.summary.name)
+        return self.shown().html(self.problem.board.title or self.summary.name)
 
 
 @dataclass
 class Stages:
-    """The progress of a run of several parts: tells each part and the share of the whole, which never falls.
-
-    Attributes
-    ----------
-    left : float
-        How long the parts that are still to come take, begun ones not counted, in any unit of time.
-    """
+    """The progress of a run of several parts: tells each part and the share of the whole, which never falls."""
 
     tell: Callable[[Progress], None] | None
-    left: float
+    left: float  # how long the parts to come take, begun ones not counted, in any unit of time
     _stage: str = ""
     _past: float = 0.0
     _length: float = 0.0
@@ -144,17 +141,7 @@ class Stages:
 
 
 class Run:
-    """A run of one fit or several: its seed, its progress, and its output folder.
-
-    Parameters
-    ----------
-    out : path or None
-        Output folder; None writes nothing.
-    force, resume : bool
-        Replace the results in the folder, or continue an interrupted run.
-    progress : callable, optional
-        Told of the parts of the run and of its sampling.
-    """
+    """A run of one fit or several: its seed, its progress, and its output folder; without `out` nothing is written."""
 
     def __init__(
         self,
@@ -175,23 +162,9 @@ class Run:
         return None if self.folder is None else self.folder.path
 
     def open(self, first: Mapping[str, Problem], left: float = 0.0) -> None:
-        """Pose problems and open the folder; whatever is refused is refused before that, and nothing is written.
+        """Pose what is fitted first, by its place in the checkpoint, and open the folder for parts that take `left`.
 
-        Parameters
-        ----------
-        first : dict of Problem
-            What is fitted first, by the subfolders of the checkpoint.
-        left : float
-            How long the parts of the run take.
-
-        Raises
-        ------
-        InputError
-            If the folder may not be used.
-        NotIdentifiableError
-            If the data leave a constant open.
-        CheckpointError
-            If there is nothing to resume.
+        Raises InputError, NotIdentifiableError or CheckpointError; whatever is refused is so before a file is written.
         """
         self.stages.left = left
         if self.folder is not None:
@@ -210,25 +183,25 @@ class Run:
     def fit(
         self, problem: Problem, place: str = "", stage: str = "", *, of: str = "", tells_failure: bool = False
     ) -> FitResult:
-        """Fit one problem of the run.
-
-        Parameters
-        ----------
-        place : str
-            Subfolder of its checkpoint.
-        stage : str
-            What the progress says; without it that of the sampler alone is told.
-        of : str
-            What is fitted, for the message where it does not converge.
-        tells_failure : bool
-            Whether summary.json then says so.
-        """
+        """Fit one problem of the run; see `fitted`. Without a `stage` the progress of the sampler alone is told."""
         if stage:
             self.stages.begin(stage, FIT)
         checkpoints = None if self.folder is None else self.folder.checkpoint / place
         progress = self.stages.sampled if stage else self.stages.tell
         failure = self.path if tells_failure else None
         return fitted(problem, self.seed, checkpoints, progress, of=of, failure=failure)
+
+
+def fit_problem(problem: Problem, run: Run, *, report: bool) -> FitResult:
+    """The whole run of one fit; `bayesplate.fit` says what is raised."""
+    run.open({"": problem})
+    result = replace(run.fit(problem, tells_failure=True), folder=run.path)
+    if run.folder is not None:
+        result.write(run.folder.path)
+        if report:
+            result.write_page(run.folder.path)
+        run.folder.close()
+    return result
 
 
 def with_board(problem: Problem, board: Board) -> Problem:
@@ -239,23 +212,13 @@ def with_board(problem: Problem, board: Board) -> Problem:
 def fitted(
     problem: Problem,
     seed: int,
-    checkpoints: Path | None = None,
+    checkpoints: Path | None = None,  # one subfolder per law
     progress: Callable[[Progress], None] | None = None,
     *,
-    of: str = "",
-    failure: Path | None = None,
+    of: str = "",  # what is fitted, for the error of a run that fits more than one board
+    failure: Path | None = None,  # where summary.json says that the sampler did not converge
 ) -> FitResult:
-    """Sample a problem, and once more under the exact law if the draws show that the linear one does not serve.
-
-    Parameters
-    ----------
-    checkpoints : Path or None
-        Folder of the unfinished run's chunks, one subfolder per law; None keeps none.
-    of : str
-        What is fitted, for the message of the error, where a run fits more than one board.
-    failure : Path or None
-        Where summary.json says that the sampler did not converge.
-    """
+    """Sample a problem, and once more under the exact law if the draws show that the linear one does not serve."""
 
     def sampled(under: PosedProblem) -> tuple[Inference, Draws]:
         checkpoint = None if checkpoints is None else checkpoint_in(checkpoints, problem, under)

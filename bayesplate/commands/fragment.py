@@ -33,19 +33,9 @@ def fragment_text(
     *,
     files: Sequence[str],
     name: str = "",
-    sensor_mass: tuple[float, float] | None = None,
+    sensor_mass: tuple[float, float] | None = None,  # kg, with its standard deviation
 ) -> str:
-    """A [setup] with the likely ones of all peaks.
-
-    Parameters
-    ----------
-    labelled : mapping
-        Number of a peak to the label that is stated, and the confidence in it.
-    name : str
-        Of the card's setup; empty if it has none.
-    sensor_mass : (float, float), optional, kg
-        Of the accelerometer, and its standard deviation.
-    """
+    """A [setup] with the likely ones of all peaks; `labelled`: stated label and confidence by number of the peak."""
     told = ", ".join([*files[:_MOST_FILES], *(["..."] if len(files) > _MOST_FILES else [])])
     lines = [f"# Picked from {told}. Use it with: bayesplate fit CARD --setup THIS_FILE", "[setup]"]
     if name:

@@ -9,12 +9,12 @@ from typing import Annotated
 
 import numpy as np
 
-from bayesplate.board.board import Board, Values
+from bayesplate.board.board import Values
 from bayesplate.commands.arguments import checked
 from bayesplate.commands.options import CARD, Effects, Force, Out, Seed, SetupFile
 from bayesplate.commands.prepare import Card, Prepared
 from bayesplate.commands.problem import Problem, as_problem
-from bayesplate.commands.shown import show_modes
+from bayesplate.commands.shown import Shown, show_modes
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.identifiability import identifiability, require_identifiable, require_labels
 from bayesplate.estimates.least_squares import weighted_least_squares
@@ -59,9 +59,12 @@ class ModesResult:
     def __repr__(self) -> str:
         return repr(self.summary).replace("<ModesReport", "<ModesResult", 1)
 
+    def shown(self) -> Shown:
+        """Tables and sentences for a person."""
+        return show_modes(self.summary)
+
     def _repr_html_(self) -> str:
-        """The table as a notebook shows it."""
-        return show_modes(self.summary).html(self.summary.title or self.summary.name)
+        return self.shown().html(self.summary.title or self.summary.name)
 
 
 @checked()
@@ -138,16 +141,12 @@ def _constants(prepared: Prepared) -> tuple[Values, Precision | None, list[str]]
         estimate = weighted_least_squares(board)
         require_identifiable(board, identifiability(estimate.sensitivities, estimate.scales, board.symmetry))
     except NotIdentifiableError as error:
-        return prior_medians(board, prepared.prior), None, [str(error)] if _has_labels(board) else []
+        return prior_medians(board, prepared.prior), None, [str(error)] * any(setup.readings for setup in board.setups)
     widenings = noise_widenings(board, estimate.residuals)
     scales = estimate.scales * np.repeat(widenings, [len(setup.readings) for setup in board.setups])
     noise = {setup.name: setup.noise.median * w for setup, w in zip(board.setups, widenings.tolist(), strict=True)}
     found = identifiability(estimate.sensitivities, scales, board.symmetry)
     return estimate.values, Precision(found.of_rigidities, noise), []
-
-
-def _has_labels(board: Board) -> bool:
-    return any(setup.readings for setup in board.setups)
 
 
 def _sheets(

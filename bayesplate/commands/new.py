@@ -13,7 +13,7 @@ from bayesplate.board.board import Board
 from bayesplate.board.checks import physical_faults
 from bayesplate.board.prior import load_prior
 from bayesplate.board.setup_keys import End, edge_words
-from bayesplate.board.starter import HALF_TOP, Starter, starter_text
+from bayesplate.board.starter import HALF_TOP, starter_text
 from bayesplate.board.values import Complaint, Key, Number, Refusal
 from bayesplate.board.words import EDGES, did_you_mean, name_complaint, shown
 from bayesplate.commands.arguments import checked
@@ -125,16 +125,8 @@ def new(
     if words is None:
         faults.append(Fault("edges", _EDGES_WANTED, shown(edges)))
         words = dict.fromkeys(EDGES, "free")
-    starter = Starter(
-        name=card.stem,
-        title=title,
-        notes=notes,
-        sizes=_numbers(sizes or {}, faults),
-        edges=words,
-        prior=prior,
-        frequencies=_numbers(frequencies or {}, faults),
-    )
-    text = starter_text(starter, _examples(words))
+    known, read = _numbers(sizes or {}, faults), _numbers(frequencies or {}, faults)
+    text = starter_text(card.stem, known, words, prior, read, _examples(words), title=title, notes=notes)
     faults += _faults(text, card.stem)
     if faults:
         raise InputError(faults)

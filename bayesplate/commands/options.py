@@ -33,23 +33,13 @@ from bayesplate.posterior.sampling import Progress
 
 
 class Option:
-    """An option of the command line, or what stands there without a name, that gives an argument of a function.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Words of the command line, as click takes them.
-    otherwise : callable or None
-        Of the first argument of the command, where the option is not given.
-    settings : dict
-        Of `click.Option` or `click.Argument`; a default that is shown is that of the function.
-    """
+    """An option or an argument of the command line that gives an argument of a function."""
 
     def __init__(self, *names: str, otherwise: Callable[[str], Any] | None = None, **settings: Any) -> None:
         self.names, self.otherwise, self.settings = names, otherwise, settings
 
     def parameters(self, name: str, default: object) -> Iterator[click.Parameter]:
-        """For click, from the name of the argument and its default."""
+        """Parameters of click, from the name and the default of the argument."""
         settings = {"default": default, **self.settings} if self.settings.get("show_default") else self.settings
         if self.names[0].startswith("-"):
             yield click.Option([*self.names, name], **settings)
@@ -57,31 +47,21 @@ class Option:
             yield click.Argument([name], **settings)
 
     def value(self, name: str, told: Mapping[str, Any], about: Any) -> Any:
-        """The argument, from all that was given; None where the function's own default holds."""
+        """The argument, from all that was given; `otherwise` makes it of the command's first argument."""
         return self.otherwise(about) if told[name] is None and self.otherwise is not None else told[name]
 
 
 class Joined:
-    """Several options that give one argument.
-
-    Attributes
-    ----------
-    options : dict of Option
-        By the names under which they are joined.
-    join : callable
-        Of the values by name; raises click.UsageError where they exclude each other.
-    """
+    """Several options that give one argument; `join` raises click.UsageError where they exclude each other."""
 
     def __init__(self, join: Callable[..., Any], **options: Option) -> None:
         self.options, self.join = options, join
 
     def parameters(self, name: str, default: object) -> Iterator[click.Parameter]:
-        """For click."""
         for own, option in self.options.items():
             yield from option.parameters(own, None)
 
     def value(self, name: str, told: Mapping[str, Any], about: Any) -> Any:
-        """The argument, from all that was given."""
         return self.join(**{own: told[own] for own in self.options})
 
 
@@ -98,7 +78,7 @@ def options_of(function: Callable[..., Any]) -> dict[str, Option | Joined]:
 
 
 def path_option(*names: str, **settings: Any) -> Option:
-    """A path as it is given: what cannot be read is invalid input, told by those who read it, and no fault of usage."""
+    """A path that click does not check: a file that cannot be read is invalid input and no fault of usage."""
     return Option(*names, type=click.Path(readable=False), **settings)
 
 

@@ -34,6 +34,7 @@ from bayesplate.commands.pick_options import (
 )
 from bayesplate.commands.pick_words import moved_between_hits, show_pick
 from bayesplate.commands.prepare import Prepared, prepare
+from bayesplate.commands.shown import Shown
 from bayesplate.errors import Fault, InputError, NotIdentifiableError, plain
 from bayesplate.files import make_folder, require_new, write_text
 from bayesplate.recordings.contract import LabelChance, PickedRow, PickReport
@@ -78,9 +79,12 @@ class PickResult:
         found = ", ".join(f"{peak.hz:.1f}" for peak in self.summary.likely[:8])
         return f"<PickResult of {', '.join(self.summary.files[:3])}: {len(self.summary.likely)} modes, Hz: {found}>"
 
+    def shown(self) -> Shown:
+        """Tables and sentences for a person."""
+        return show_pick(self.summary)
+
     def _repr_html_(self) -> str:
-        """The table as a notebook shows it."""
-        return show_pick(self.summary).html("Picked modes")
+        return self.shown().html("Picked modes")
 
 
 @checked(places_beside_files, lambda given: band(given, LOWEST, HIGHEST))

@@ -52,31 +52,18 @@ _MOST_COMPLEX = 45.0
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """Labels of the likely peaks.
+    """Labels of the likely peaks."""
 
-    Attributes
-    ----------
-    probabilities : tuple of dict of float
-        Of each likely peak: its labels, the most probable first.
-    by_evidence : tuple of dict of float
-        The same from sand and residues alone, among the modes nearby; empty where neither tells anything.
-    flips : bool or None
-        Whether force and response have opposite polarity; None if that does not show.
-    doubts : tuple of str
-        Pictures that show another mode than their frequency says.
-    """
-
-    probabilities: tuple[dict[str, float], ...]
-    by_evidence: tuple[dict[str, float], ...]
-    flips: bool | None
-    doubts: tuple[str, ...] = ()
+    probabilities: tuple[dict[str, float], ...]  # of each likely peak: its labels, the most probable first
+    by_evidence: tuple[dict[str, float], ...]  # from sand and residues alone; empty where neither tells anything
+    flips: bool | None  # whether force and response have opposite polarity; None if that does not show
+    doubts: tuple[str, ...] = ()  # pictures that show another mode than their frequency says
 
     def stated(self, peak: int) -> tuple[str, float] | None:
         """The label that a card may state, and the confidence in it; None where it is left to the fit.
 
-        It is the most probable by all that is known. Sand and residues are not known to the fit: where they say the
-        same, theirs is the confidence. What the frequencies alone say the fit finds out by itself, and would use twice,
-        unless it is beyond doubt: then it is where the fit can begin.
+        Sand and residues are not known to the fit: where they say the same, theirs is the confidence. What frequencies
+        say the fit finds out by itself, and would use twice, unless it is beyond doubt: then the fit can begin there.
         """
         name, share = next(iter(self.probabilities[peak].items()), ("", 0.0))
         other, by_evidence = next(iter(self.by_evidence[peak].items()), ("", 0.0))
@@ -92,17 +79,7 @@ def label_peaks(
 ) -> Labels:
     """Labels of the likely peaks, from a board with one setup of which sizes and edges are known.
 
-    Parameters
-    ----------
-    flips : bool or None
-        Whether force and response have opposite polarity; None if that is to be found.
-    pictures : mapping
-        Number of a likely peak to straightened pictures of sand at its frequency.
-
-    Raises
-    ------
-    NotIdentifiableError
-        If there are too few peaks for constants to begin with.
+    `pictures` are straightened ones of sand, by number of the peak. Raises NotIdentifiableError for too few peaks.
     """
     likely = picked.likely
     if len(likely) < FEWEST_PEAKS:
@@ -227,10 +204,7 @@ def _alone(evidence: Floats, known: MostlyKnown, likely: Sequence[PickedRow]) ->
 def pictures_of(
     board: Board, likely: Sequence[PickedRow], pictures: Mapping[float, Floats]
 ) -> tuple[dict[int, list[Floats]], list[str]]:
-    """Straightened pictures by the number of the likely peak nearest to them; and what is told of those left out.
-
-    They are left out where no peak is near, and where they are oblong the other way than their board.
-    """
+    """Straightened pictures by the number of the likely peak nearest to them; and why others were left out."""
     nominal = board.nominal()
     x, y = (1e3 * nominal[side] for side in ("length_x", "length_y"))
     form = "higher than wide" if x > y else "wider than high"

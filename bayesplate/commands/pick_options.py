@@ -11,15 +11,7 @@ import click
 from bayesplate.board.board import Board
 from bayesplate.board.checks import board_mass, faults_of, lighter_than_the_board, on_the_board
 from bayesplate.board.values import Key, Refusal, read_each
-from bayesplate.commands.arguments import (
-    is_number,
-    is_positive,
-    or_none,
-    read_path,
-    refused,
-    value_shown,
-    word,
-)
+from bayesplate.commands.arguments import is_number, is_positive, or_none, read_path, refused, value_shown, word
 from bayesplate.commands.options import FilePath, Option, path_option
 from bayesplate.effects.attached_mass import HEAVIEST_ROVING
 from bayesplate.errors import Fault, InputError

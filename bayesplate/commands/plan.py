@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
-
-import numpy as np
 
 from bayesplate.board.board import Board
 from bayesplate.board.campaign import CampaignCard
 from bayesplate.board.words import EFFECT_NAMES
+from bayesplate.campaign.shared import Shared
 from bayesplate.commands.arguments import checked
-from bayesplate.commands.campaign import Campaign, problem_or_campaign
+from bayesplate.commands.campaign import Campaign, by_kind
 from bayesplate.commands.fitting import Stages
 from bayesplate.commands.options import CARD, Between, Effects, Force, Goal, Minutes, OnProgress, Out, Seed
 from bayesplate.commands.prepare import Card, Prepared
 from bayesplate.commands.problem import Problem
-from bayesplate.commands.shown import show_plan
+from bayesplate.commands.shown import Shown, show_plan
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.hypotheses import RELABELLING
 from bayesplate.diagnosis.joint import full_search
@@ -74,9 +74,12 @@ class PlanResult:
     def __repr__(self) -> str:
         return repr(self.summary).replace("<Plan", "<PlanResult", 1)
 
+    def shown(self) -> Shown:
+        """Tables and sentences for a person."""
+        return show_plan(self.summary)
+
     def _repr_html_(self) -> str:
-        """The tables as a notebook shows them."""
-        return show_plan(self.summary).html(self.summary.title or self.summary.name)
+        return self.shown().html(self.summary.title or self.summary.name)
 
 
 @checked()
@@ -130,22 +133,35 @@ def plan(
     NotIdentifiableError
         If explanations are to be told apart on a board whose frequencies do not even tell the constants.
     """
-    given = problem_or_campaign(card, effects=effects, may_lack_frequencies=True)
-    files = () if out is None else require_new(Path(out), _names(), force=force)
-    named: Board | CampaignCard
-    if isinstance(given, Campaign):
-        named, problems, shared = given.card, given.problems, given.shared
-        beliefs = _of_campaign(given, goal, between, progress)
-    else:
-        named, problems, shared = given.board, (given,), ()
-        folder = None if out is None else Path(out)
-        beliefs = _of_board(given.prepared, goal, between, stream(seed, BELIEFS), folder, progress)
-    planner = Planner(beliefs, seed, goal, Costs(**(costs or {})))
-    priors = [one.prior for one in problems]
-    made, drawn = drawn_up(planner, named.name, named.title, named.sha256, priors, shared)
-    if out is not None:
-        _write(made, drawn, Path(out), files)
+    folder = None if out is None else Path(out)
+    asked = by_kind(
+        card,
+        lambda problem: _Asked(
+            problem.board, (problem,), (), partial(_of_board, problem, goal, between, seed, folder, progress)
+        ),
+        lambda campaign: _Asked(
+            campaign.card, campaign.problems, campaign.shared, partial(_of_campaign, campaign, goal, between, progress)
+        ),
+        effects=effects,
+        may_lack_frequencies=True,
+    )
+    files = () if folder is None else require_new(folder, _names(), force=force)
+    planner = Planner(asked.believed(), seed, goal, Costs(**(costs or {})))
+    named, priors = asked.card, [one.prior for one in asked.problems]
+    made, drawn = drawn_up(planner, named.name, named.title, named.sha256, priors, asked.shared)
+    if folder is not None:
+        _write(made, drawn, folder, files)
     return PlanResult(made, drawn, tuple(path for path in files if path.exists()))
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A board or a campaign that is planned, and the function that makes its beliefs."""
+
+    card: Board | CampaignCard
+    problems: Sequence[Problem]
+    shared: Sequence[Shared]
+    believed: Callable[[], Beliefs]
 
 
 def _names() -> list[str]:
@@ -154,14 +170,15 @@ def _names() -> list[str]:
 
 
 def _of_board(
-    prepared: Prepared,
+    given: Problem,
     goal: str | None,
     between: Sequence[str] | None,
-    rng: np.random.Generator,
+    seed: int,
     folder: Path | None,
     progress: OnProgress,
 ) -> Beliefs:
-    """What is believed of a board: from a search, from a finished one, or from the prior."""
+    """Beliefs of a board: from a search, from a finished diagnosis, or from the prior."""
+    prepared, rng = given.prepared, stream(seed, BELIEFS)
     board, prior = prepared.board, prepared.prior
     if between is not None:
         _require_possible(board, between)
@@ -192,7 +209,7 @@ def _of_board(
 
 
 def _of_campaign(campaign: Campaign, goal: str | None, between: Sequence[str] | None, progress: OnProgress) -> Beliefs:
-    """What is believed of several boards and of what their card shares: effects are not searched for."""
+    """Beliefs of several boards and of what they share: effects are not searched for."""
     if between is not None:
         raise InputError(_untold("between", "a campaign"))
     if goal == EXPLANATIONS:
@@ -208,7 +225,7 @@ def _of_campaign(campaign: Campaign, goal: str | None, between: Sequence[str] | 
 
 
 def _untold(place: str, got: str) -> Fault:
-    """Why explanations cannot be told apart."""
+    """The fault that explanations cannot be told apart."""
     return Fault(place, "the frequencies of a board, by which effects are told apart", got)
 
 
@@ -223,7 +240,7 @@ def _require_possible(board: Board, between: Sequence[str]) -> None:
 
 @dataclass(frozen=True)
 class _Finished:
-    """What a finished diagnosis says: probabilities of the answers that may survive, and that of no effect."""
+    """Probabilities of the answers of a finished diagnosis that may survive, and that of no effect."""
 
     support: Mapping[tuple[str, ...], float]
     none: float

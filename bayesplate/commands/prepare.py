@@ -11,12 +11,11 @@ import numpy as np
 
 from bayesplate.board.board import Board, assumed_notes
 from bayesplate.board.campaign import is_campaign
-from bayesplate.board.card_file import CardFile
 from bayesplate.board.checks import physical_faults, remarks
 from bayesplate.board.named import NamedCards, load_named
 from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.board.sessions import notes as session_notes
-from bayesplate.board.shelf import find
+from bayesplate.board.shelf import CardFile, find
 from bayesplate.board.words import effect_named
 from bayesplate.effects import declare, effect_faults, implied_effects, notes
 from bayesplate.errors import Fault, InputError
@@ -30,31 +29,20 @@ Card = str | os.PathLike[str] | Board
 
 @dataclass(frozen=True)
 class Prepared:
-    """The cards that a board names, the board as stated, and the board with the parameters of its declared effects."""
+    """A board as its card states it, the cards that it names, and the board with its declared effects' parameters."""
 
     named: NamedCards
-    stated: Board
+    card: Board
     board: Board
 
     @property
-    def card(self) -> Board:
-        """The board with its card."""
-        return self.stated
-
-    @property
     def prior(self) -> PriorCard:
-        """The prior, which was read."""
         assert self.named.prior is not None
         return self.named.prior
 
-    @property
-    def card_text(self) -> str:
-        """The card as it was read."""
-        return self.stated.text
-
     def with_effects(self, effects: Sequence[str]) -> Prepared:
         """The same cards, not read again, with other declared effects; raises InputError as `prepare`."""
-        return prepared_card(self.stated, self.named, effects)
+        return prepared_card(self.card, self.named, effects)
 
 
 def default_folder(card: str | os.PathLike[str]) -> Path:
@@ -70,24 +58,10 @@ def prepare(
     may_lack_frequencies: bool = False,
     setup: str | os.PathLike[str] | None = None,
 ) -> Prepared:
-    """Read a board card and everything it names.
+    """Read a board card and everything it names; raises InputError with every schema fault, else every physical one.
 
-    A board made in Python goes through its own card: what would be refused there is refused here, with the same places.
-
-    Parameters
-    ----------
-    effects, prior, setup
-        In place of what the card says: see `Problem.from_card`.
-    may_lack_frequencies : bool
-        Whether a board that was not measured yet will do.
-
-    Raises
-    ------
-    InputError
-        Every schema fault at once; if there is none, every physical fault at once; if there is none, what all
-        frequencies together say of their unit.
-    NotIdentifiableError
-        If the sides or the orders of the labels seem to be exchanged.
+    Else with what all frequencies together say of their unit; NotIdentifiableError if sides or orders seem exchanged. A
+    board made in Python goes through its own card: what would be refused there is refused here, with the same places.
     """
     _require_card(card)
     given = prior if prior is None or isinstance(prior, PriorCard) else load_prior(prior)
@@ -112,7 +86,7 @@ def _require_card(card: object) -> None:
 
 
 def prepared_card(read: Board, named: NamedCards, effects: Sequence[str] | None = None) -> Prepared:
-    """The same of cards that were read already: no file is looked at; raises as `prepare`."""
+    """Prepare cards that were read already: no file is looked at; raises as `prepare`."""
     stated = read.assuming(named.prior, named.tables)
     implied = implied_effects(stated)
     listed = (*stated.effects, *implied) if effects is None else map(effect_named, effects)
@@ -130,7 +104,7 @@ def prepared_card(read: Board, named: NamedCards, effects: Sequence[str] | None 
 
 
 def _lost(given: Board, prepared: Board) -> Iterator[Fault]:
-    """What a board holds of its effects that its card cannot say: it must not be put aside unsaid."""
+    """Faults of effects whose priors or forms a card cannot state: they must not be dropped silently."""
     again = prepared.inputs
     remedy = "a card states an effect by its name, and the effect's own prior holds: vary Problem.board, which has none"
     for one in given.parameters:

@@ -101,7 +101,7 @@ class Problem:
     @property
     def board(self) -> Board:
         """The board as its card states it; `dataclasses.replace` makes another one of it."""
-        return self.prepared.stated
+        return self.prepared.card
 
     @property
     def prior(self) -> PriorCard:
@@ -271,13 +271,7 @@ class Problem:
 
 
 def pose_all(problems: Sequence[Problem]) -> None:
-    """Solve boards around their estimates, so that what cannot be fitted is known before anything is sampled.
-
-    Raises
-    ------
-    NotIdentifiableError
-        With every board that leaves a constant open.
-    """
+    """Solve boards around their estimates before anything is sampled; NotIdentifiableError names all that fail."""
     told = []
     for problem in problems:
         try:
@@ -299,13 +293,7 @@ def as_problem(
     setup: str | os.PathLike[str] | None = None,
     may_lack_frequencies: bool = False,
 ) -> Problem:
-    """What a command was given, as a problem; the options are those of `Problem.from_card` and of `prepare`.
-
-    Raises
-    ------
-    InputError
-        If the card cannot be used, or a problem is given together with what it states itself.
-    """
+    """What a command was given, as a problem; raises InputError for a Problem beside what it states itself."""
     if not isinstance(given, Problem):
         prepared = prepare(given, effects, setup=setup, may_lack_frequencies=may_lack_frequencies)
         return Problem(prepared, law, robust)

@@ -10,13 +10,7 @@ from bayesplate.campaign.summary import CampaignSummary
 from bayesplate.campaign.tables import campaign_check_tables, campaign_tables, diagnosis_tables
 from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.diagnosis.tables import every_table
-from bayesplate.diagnosis.told import (
-    alike_sentence,
-    carrying_words,
-    known_sentences,
-    verdict_sentence,
-    warnings,
-)
+from bayesplate.diagnosis.told import alike_sentence, carrying_words, known_sentences, verdict_sentence, warnings
 from bayesplate.effects.words import effect_names
 from bayesplate.estimates.leave_one_out import carrying_sentence
 from bayesplate.grading.boards import BatchSummary
@@ -71,13 +65,16 @@ class Shown:
         return "".join(render(one, "terminal", width=width, styled=styled) for one in parts)
 
 
-def show_check(report: CheckReport | CampaignCheck) -> Shown:
-    """The report of `bayesplate.commands.check.check` for a person."""
-    if isinstance(report, CampaignCheck):
-        notes = tuple(f"{name}: {note}" for name, one in report.boards.items() for note in one.notes)
-        n_doubts = sum(one.n_doubts for one in report.boards.values())
-        closing = f"nothing was sampled. bayesplate check tells more of each board. {_next_after_check(n_doubts)}"
-        return Shown(campaign_check_tables(report), (), notes, closing)
+def show_campaign_check(report: CampaignCheck) -> Shown:
+    """What `check` finds of a campaign."""
+    notes = tuple(f"{name}: {note}" for name, one in report.boards.items() for note in one.notes)
+    n_doubts = sum(one.n_doubts for one in report.boards.values())
+    closing = f"nothing was sampled. bayesplate check tells more of each board. {_next_after_check(n_doubts)}"
+    return Shown(campaign_check_tables(report), (), notes, closing)
+
+
+def show_check(report: CheckReport) -> Shown:
+    """What `check` finds of a board."""
     closing = f"{report.law} law; nothing was sampled. {_next_after_check(report.n_doubts)}"
     return Shown(check_tables(report), (*report.identifiability, report.invisible), report.notes, closing)
 
@@ -88,10 +85,8 @@ def _next_after_check(n_doubts: int) -> str:
     return f"Next: settle what is in doubt above; then {fit}" if n_doubts else f"Next: {fit}"
 
 
-def show_fit(summary: Summary | CampaignSummary) -> Shown:
-    """The summary of `bayesplate.commands.fit.fit` for a person."""
-    if isinstance(summary, CampaignSummary):
-        return _show_campaign_fit(summary)
+def show_fit(summary: Summary) -> Shown:
+    """The summary of a fitted board."""
     peaks = peaks_table(summary)
     tables = (fitted_constants(summary), modes_table(summary), *([peaks] if peaks else []))
     error, model = summary.error, summary.model
@@ -109,7 +104,8 @@ def show_fit(summary: Summary | CampaignSummary) -> Shown:
     return Shown(tables, summary.identifiability, summary.warnings, closing)
 
 
-def _show_campaign_fit(summary: CampaignSummary) -> Shown:
+def show_campaign_fit(summary: CampaignSummary) -> Shown:
+    """The summary of a fitted campaign."""
     told = tuple(f"{name}: {note}" for name, one in summary.boards.items() for note in one.warnings)
     errors = [one.error.in_sample_rms_cents for one in summary.boards.values()]
     pooled = (sum(error**2 for error in errors) / len(errors)) ** 0.5
@@ -118,7 +114,7 @@ def _show_campaign_fit(summary: CampaignSummary) -> Shown:
 
 
 def show_batch(summary: BatchSummary, grading: Grading) -> Shown:
-    """The result of `bayesplate.commands.batch.batch` for a person."""
+    """The result of `batch`."""
     aside = tuple(f"{file} is a card of another kind and was left aside" for file in summary.aside)
     closing = f"{summary.n_fitted} of {summary.n_boards} boards fitted."
     tables = tuple(table for name, table in grading_tables(grading, MOST_ON_TERMINAL).items() if name != "makers")
@@ -127,7 +123,7 @@ def show_batch(summary: BatchSummary, grading: Grading) -> Shown:
 
 
 def show_compare(comparison: Comparison) -> Shown:
-    """The result of `bayesplate.commands.compare.compare` for a person."""
+    """The result of `compare`."""
     theories = comparison.theories
     tables = [table for one in theories for table in (methods_table(comparison.name, one), forward_table(one))]
     told: dict[str, list[str]] = {}
@@ -141,11 +137,14 @@ def show_compare(comparison: Comparison) -> Shown:
     return Shown(tuple(tables), (*remarks, *told_last), (), comparison.verdict.sentence)
 
 
-def show_diagnosis(diagnosis: Diagnosis | CampaignDiagnosis) -> Shown:
-    """The result of `bayesplate.commands.diagnose.diagnose` for a person."""
-    if isinstance(diagnosis, CampaignDiagnosis):
-        told = tuple(one for one in (diagnosis.reason, diagnosis.recommendation) if one)
-        return Shown(diagnosis_tables(diagnosis), told, diagnosis.notes, claim_sentence(diagnosis))
+def show_campaign_diagnosis(diagnosis: CampaignDiagnosis) -> Shown:
+    """The diagnosis of a campaign."""
+    told = tuple(one for one in (diagnosis.reason, diagnosis.recommendation) if one)
+    return Shown(diagnosis_tables(diagnosis), told, diagnosis.notes, claim_sentence(diagnosis))
+
+
+def show_diagnosis(diagnosis: Diagnosis) -> Shown:
+    """The diagnosis of a board."""
     told = (
         *known_sentences(diagnosis),
         carrying_words(diagnosis),
@@ -158,13 +157,13 @@ def show_diagnosis(diagnosis: Diagnosis | CampaignDiagnosis) -> Shown:
 
 
 def show_modes(report: ModesReport) -> Shown:
-    """The report of `bayesplate.commands.modes.modes` for a person."""
+    """The report of `modes`."""
     files = f"; sheet to print: {', '.join(report.files)}" if report.files else ""
     return Shown(sheet_tables(report), proposal_remarks(report), report.notes, f"Frequencies {report.basis}{files}")
 
 
 def show_plan(plan: Plan) -> Shown:
-    """The result of `bayesplate.commands.plan.plan` for a person."""
+    """The result of `plan`."""
     remarks = (PLAN_REMARK, SEEN_REMARK) if plan.bench else (PLAN_REMARK,) if plan.proposals else ()
     return Shown(plan_tables(plan), remarks, plan.notes, plan.first or NOTHING_HELPS)
 

@@ -29,13 +29,7 @@ class WorkerDied(Exception):
 
 
 def computed(free: list[Executor], calls: Iterable[tuple[Key, Call]]) -> Iterator[tuple[Key, Future[Any]]]:
-    """Compute calls, and give each with its key as it is done; the death of a worker is that of its one call.
-
-    Parameters
-    ----------
-    free : list of Executor
-        Each has one call at a time.
-    """
+    """Compute calls, one at a time in each executor, each given with its key when done; a worker's death costs one."""
     under_way: dict[Future[Any], tuple[Key, Executor]] = {}
 
     def answers() -> Iterator[tuple[Key, Future[Any]]]:
@@ -109,13 +103,7 @@ def _without_script() -> Iterator[None]:
 
 @contextmanager
 def dask_cluster(address: str) -> Iterator[list[Executor]]:
-    """A cluster of Dask that is at work already, by the address of its scheduler: "tcp://127.0.0.1:8786".
-
-    Raises
-    ------
-    InputError
-        If the library is not there, or no scheduler answers, or it has no workers.
-    """
+    """A cluster of Dask that is at work, by the address of its scheduler; raises InputError where none answers."""
     place = f"--dask {address}"
     try:
         from distributed import Client

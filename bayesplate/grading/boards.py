@@ -40,35 +40,17 @@ NUMBERS = (
 
 @dataclass(frozen=True)
 class BoardRow:
-    """What became of one board of many.
+    """What became of one board of many."""
 
-    Attributes
-    ----------
-    name : str
-        Of the board; of a card that could not be read that of its file.
-    outcome : str
-        "fitted", or why there are no constants, in two or three words.
-    message : str
-        Of the error; empty for a fitted board.
-    doubt : str
-        Why the constants of a fitted board are not to be trusted; empty where nothing speaks against them.
-    told, numbers
-        By the names of `WORDS` and `NUMBERS`, of a fitted board.
-    joint : Joint or None
-        How its constants vary together.
-    readings_sha256 : str
-        Of what was measured on a fitted board.
-    """
-
-    name: str
-    outcome: str
-    message: str = ""
-    doubt: str = ""
+    name: str  # of a card that could not be read that of its file
+    outcome: str  # "fitted", or why there are no constants, in two or three words
+    message: str = ""  # of the error
+    doubt: str = ""  # why the constants of a fitted board are not to be trusted
     card_sha256: str = ""
     seed: int | None = None
-    told: Mapping[str, str] | None = None
-    numbers: Mapping[str, float | None] | None = None
-    joint: Joint | None = None
+    told: Mapping[str, str] | None = None  # of a fitted board, by the names of `WORDS`
+    numbers: Mapping[str, float | None] | None = None  # likewise of `NUMBERS`
+    joint: Joint | None = None  # how its constants vary together
     readings_sha256: str = ""
 
     @property
@@ -168,29 +150,17 @@ class Doubt:
 
 @dataclass(frozen=True)
 class BatchSummary:
-    """What became of the boards of a batch.
-
-    Attributes
-    ----------
-    seed : int
-        From which each board's own follows.
-    failed : tuple of Failure
-        In the order of their names.
-    doubts : tuple of Doubt
-        Of the boards that were fitted, in the order of their names.
-    aside : tuple of str
-        Files beside the cards that are cards of another kind.
-    """
+    """What became of the boards of a batch; tuples are in the order of the names."""
 
     format: int
-    seed: int
+    seed: int  # from which each board's own follows
     versions: Mapping[str, str]
     n_boards: int
     n_fitted: int
     n_failed: int
     failed: tuple[Failure, ...]
     doubts: tuple[Doubt, ...]
-    aside: tuple[str, ...]
+    aside: tuple[str, ...]  # files that are cards of another kind
 
     def failures_text(self, table: str) -> str:
         """The boards that were not fitted, the first ten with their reasons, and where the others stand."""

@@ -15,20 +15,12 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LogFigure:
-    """A factor times powers of constants and density, by their names in `JOINT`.
-
-    Attributes
-    ----------
-    unit : str
-        As people write it.
-    per_unit : float
-        That unit in SI.
-    """
+    """A factor times powers of constants and density, by their names in `JOINT`."""
 
     words: str
     powers: Mapping[str, float]
-    unit: str
-    per_unit: float = 1.0
+    unit: str  # as people write it
+    per_unit: float = 1.0  # that unit in SI
     factor: float = 1.0
 
     @property
@@ -99,24 +91,10 @@ _RIDGE = 1e-12
 
 
 def box_probability(mean: Floats, covariance: Floats, low: Floats, high: Floats) -> Floats:
-    """Probability of low <= x <= high in every component of a normal distribution, to 1e-3 with three components.
+    """Probability (n,) that low <= x <= high, (k,) limits, for normals of mean (n, k) and covariance (n, k, k).
 
-    The components are taken one after the other, each given those before it, at Sobol points of the unit cube.
-
-    Parameters
-    ----------
-    mean : (n, k) array
-    covariance : (n, k, k) array
-    low, high : (k,) arrays
-        May be infinite.
-
-    Returns
-    -------
-    (n,) array
-
-    References
-    ----------
-    Genz, "Numerical computation of multivariate normal probabilities", J. Comp. Graph. Stat. 1, 1992, 141.
+    To 1e-3 with three components, each given those before it, at Sobol points of the unit cube: Genz, "Numerical
+    computation of multivariate normal probabilities", J. Comp. Graph. Stat. 1, 1992, 141.
     """
     starts = range(0, len(mean), _AT_ONCE)
     parts = (slice(start, start + _AT_ONCE) for start in starts)

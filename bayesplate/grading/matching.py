@@ -114,11 +114,7 @@ class Grading:
 
 
 def grade(rows: Sequence[BoardRow], request: GradingRequest) -> Grading:
-    """Grade the boards that were fitted.
-
-    Constants and density of a board are taken to be log-normal together, with the means and the covariance of the
-    logarithms of its draws.
-    """
+    """Grade fitted boards, constants and density log-normal together with the moments of the logs of the draws."""
     fitted = [(row, row.joint) for row in rows if row.joint is not None]
     log_mean = np.array([joint.log_mean for _, joint in fitted]).reshape(-1, 7)
     covariance = np.array([joint.log_covariance for _, joint in fitted]).reshape(-1, 7, 7)

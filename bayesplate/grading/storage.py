@@ -21,13 +21,7 @@ _ROW = TypeAdapter(BoardRow)
 
 
 class Journal:
-    """Rows of the boards that are done, by keys, each on disk before the next board.
-
-    Parameters
-    ----------
-    path : Path
-        Made if it is not there; what it holds is read.
-    """
+    """Rows of the boards that are done, by keys, each on disk before the next board; an existing file is read."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

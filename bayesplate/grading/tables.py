@@ -19,10 +19,7 @@ _MARK = "?"
 
 
 def best_first(graded: Grading) -> list[int]:
-    """Places of the boards: by the probability of meeting the limits, otherwise by E_x, the greatest first.
-
-    Those in doubt are the last.
-    """
+    """Places of the boards by the probability of meeting the limits, otherwise by E_x; those in doubt are last."""
     by = graded.log_mean[:, 0] if graded.meets_all is None else graded.meets_all
     return sorted(range(len(graded.names)), key=lambda i: (bool(graded.doubts[i]), -float(by[i]), graded.names[i]))
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from bayesplate.board.coefficients import load_coefficients
+from bayesplate.board.setup_keys import edge_letters
 from bayesplate.errors import InputError
 from bayesplate.labels import Label
 
@@ -40,7 +41,7 @@ def test_the_cantilever_table_as_printed() -> None:
     a, b, c = (3.21, 3.99, 117, 14.4, 124, 134), (0, 0.94, 41.9, 1720, 15.6, 1910), (0, 40.5, 13.6, 155, 328, 1260)
     assert card.table == dict(zip(labels, zip(a, b, c, strict=True), strict=True))
     assert list(card.r_squared.values()) == [1.00, 1.00, 0.999, 0.999, 1.00, 1.00]
-    assert card.edges.letters == "CFFF"
+    assert edge_letters(card.edges.words) == "CFFF"
     assert card.first_label == (1, 0)
     assert card.aspect_ratio == pytest.approx(223 / 114)
     assert (card.training.E_x_gpa, card.training.E_y_gpa, card.training.G_xy_gpa) == (10.7, 0.716, 0.50)
@@ -55,7 +56,7 @@ def test_the_clamped_table_as_printed() -> None:
     b = (1214, 8589, 1652, 31910, 10180, 35250)
     c = (146.9, 552.3, 534.9, 1196, 2051, 4469)
     assert card.table == dict(zip(labels, zip(a, b, c, strict=True), strict=True))
-    assert card.edges.letters == "CCCC"
+    assert edge_letters(card.edges.words) == "CCCC"
     assert card.first_label == (0, 0)
     assert card.aspect_ratio == pytest.approx(600 / 412)
 

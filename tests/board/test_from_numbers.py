@@ -110,7 +110,7 @@ def test_what_nobody_stated_is_that_of_the_prior_which_is_given_in_the_end():
     noise, ratio = Q.from_median(0.02, 1.3), Q.from_mean(0.3, 0.01, "normal")
     mine = prior(noise=noise, poisson_xy=ratio)
     fewer = replace(board(), setups=tuple(replace(one, readings=one.readings[:3]) for one in board().setups))
-    for one in (board(), fewer, board(prior=mine), prepare("spruce-free-2R").stated):
+    for one in (board(), fewer, board(prior=mine), prepare("spruce-free-2R").card):
         text = one.to_toml()
         assert not any(key in text for key in ("noise_percent", "poisson_xy"))
         found = prepare(one, prior=mine).board

@@ -9,9 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bayesplate.board.board import Board
-from bayesplate.board.card_file import CardFile
 from bayesplate.board.checks import physical_faults
-from bayesplate.board.shelf import shelf_folder
+from bayesplate.board.shelf import CardFile, shelf_folder
 from bayesplate.board.toml import read_table
 from bayesplate.errors import Fault, InputError
 

@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 
 from bayesplate.board.board import Board
 from bayesplate.board.campaign import load_campaign
-from bayesplate.board.card_file import CardFile
 from bayesplate.board.fragment import merged
-from bayesplate.board.shelf import shelf_folder
+from bayesplate.board.shelf import CardFile, shelf_folder
 from bayesplate.board.toml import read_table
 from bayesplate.board.writing import toml_text, write_card
 from bayesplate.commands.batch_boards import boards_of

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from made_isotropic import sheet
 
 import bayesplate
 from bayesplate.board.board import Board
-from bayesplate.board.prior import load_prior, read_prior_text
+from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.campaign.population import require_moduli
 from bayesplate.errors import InputError
@@ -55,8 +57,15 @@ def test_a_prior_of_wood_is_refused_with_what_would_do():
     assert "a card of your own with [E]" in str(told.value)
 
 
-def test_a_prior_of_one_modulus_serves_isotropic_boards_alone():
-    prior = read_prior_text(OF_E, "metals")
+def prior_of(folder: Path, text: str, name: str) -> PriorCard:
+    """The prior of a card in a folder."""
+    path = folder / f"{name}.toml"
+    path.write_text(text)
+    return load_prior(path)
+
+
+def test_a_prior_of_one_modulus_serves_isotropic_boards_alone(tmp_path):
+    prior = prior_of(tmp_path, OF_E, "metals")
 
     assert list(bayesplate.Problem.from_card(sheet(HZ), prior=prior).prior.constants) == ["E_x"]
     with pytest.raises(InputError, match="wanted a prior of three constants, got metals, which states E alone"):
@@ -65,13 +74,13 @@ def test_a_prior_of_one_modulus_serves_isotropic_boards_alone():
         require_moduli(prior, "[population] prior")
 
 
-def test_a_prior_of_one_modulus_comes_back_from_its_card():
+def test_a_prior_of_one_modulus_comes_back_from_its_card(tmp_path):
     made = bayesplate.PriorCard.from_quantities("metals", {"E": Quantity.from_median(70e9, 2.0)}, source="a test")
 
-    assert made == read_prior_text(OF_E, "metals")
-    assert read_prior_text(made.to_toml(), "metals") == made
+    assert made == prior_of(tmp_path, OF_E, "metals")
+    assert prior_of(tmp_path, made.to_toml(), "metals") == made
     whole = load_prior("weakly-informative")
-    assert read_prior_text(whole.to_toml(), whole.name) == whole
+    assert prior_of(tmp_path, whole.to_toml(), whole.name) == whole
 
 
 def test_the_prior_that_a_problem_has_may_be_given_again():

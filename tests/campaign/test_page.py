@@ -14,7 +14,7 @@ from bayesplate.campaign.claim import SharedClaim, TaughtBoard
 from bayesplate.campaign.diagnosis import CampaignDiagnosis, PooledErrors, claim_sentence
 from bayesplate.campaign.search import Explanation
 from bayesplate.campaign.tables import shared_table
-from bayesplate.commands.shown import show_diagnosis, show_fit
+from bayesplate.commands.shown import show_campaign_diagnosis, show_campaign_fit
 from bayesplate.errors import InputError
 from bayesplate.report import campaign as home
 from bayesplate.report.campaign import shared_picture, write_campaign_report
@@ -118,12 +118,12 @@ def test_of_a_group_the_sentence_names_what_the_boards_were_fitted_with(diagnosi
 
 
 def test_what_the_terminal_shows(fitted_campaign, diagnosis):
-    titles = [table.title for table in show_fit(fitted_campaign.summary).tables]
+    titles = [table.title for table in show_campaign_fit(fitted_campaign.summary).tables]
 
     assert titles[0] == "Shared by all boards"
     assert any("each board alone" in title for title in titles)
     assert any(title.startswith("Population") for title in titles)
-    assert show_diagnosis(diagnosis).closing == claim_sentence(diagnosis)
+    assert show_campaign_diagnosis(diagnosis).closing == claim_sentence(diagnosis)
 
 
 def test_figures_and_draws_of_a_result(fitted_campaign):

@@ -157,7 +157,7 @@ def test_a_board_has_its_seed_from_its_card_and_only_changed_cards_are_fitted_ag
     (again / "a.toml").unlink()
     (again / "m.toml").write_text(card_text("m", 1.02), encoding="utf-8")
     submitted = []
-    monkeypatch.setattr("bayesplate.commands.batch.computed", counted(submitted))
+    monkeypatch.setattr("bayesplate.commands.batch_run.computed", counted(submitted))
 
     result = bayesplate.batch(again, out, workers=1, resume=True, report=False)
 
@@ -345,7 +345,7 @@ def computed_here(workers, calls):
 
 def test_names_of_boards_leave_no_folder_and_are_cells_that_no_sheet_executes(table, tmp_path, monkeypatch):
     """Nothing is computed here: what the good rows give is another test's."""
-    monkeypatch.setattr("bayesplate.commands.batch.computed", lambda free, calls: (one for one in list(calls)[:0]))
+    monkeypatch.setattr("bayesplate.commands.batch_run.computed", lambda free, calls: (one for one in list(calls)[:0]))
     (tmp_path / "tops.csv").write_text("\n".join(TABLE.splitlines()[:1] + TABLE.splitlines()[3:]))
     result = bayesplate.batch(table, tmp_path / "deep" / "out", template=tmp_path / "template.toml", folders=True)
 
@@ -358,7 +358,7 @@ def test_names_of_boards_leave_no_folder_and_are_cells_that_no_sheet_executes(ta
 
 def test_faults_of_rows_name_the_table_and_the_row_as_it_is_counted_there(table, tmp_path, monkeypatch):
     """Lines without a word count but are no boards; so a fault of sizes, of a card that a row names, and of a name."""
-    monkeypatch.setattr("bayesplate.commands.batch.computed", computed_here)
+    monkeypatch.setattr("bayesplate.commands.batch_run.computed", computed_here)
     header = 'name,thickness_mm,density_kg_m3,prior,"(0,0)","(0,1)","(1,0)",,'
     rows = [",,,,", header, "", "thick,3 mm,400,,57,100,130,,", ",,,,,,,,", "light,3,2,,57,100,130,,"]
     rows += ["prior,3,400,x.toml,57,100,130", "twice,3,400,,57,100,130", "", "Twice,3,400,,58,100,131"]
@@ -383,7 +383,7 @@ def test_doubts_of_a_fit_and_of_copied_rows_reach_the_table_and_the_summary_and_
             future.set_result(replace(SUMMARY, name=(name := call[1][0].name), doubts=("misread?",) * (name == "c")))
             yield key, future
 
-    monkeypatch.setattr("bayesplate.commands.batch.computed", made)
+    monkeypatch.setattr("bayesplate.commands.batch_run.computed", made)
     header, *rows = 'name,"(0,0)","(0,1)","(1,0)"', "a,57,100,130", "b,57,100,130", "c,58,100,130"
     found = []
     for some, resume in ((rows, False), (rows[1:], True)):

@@ -63,7 +63,7 @@ def test_the_fragment_is_a_setup_and_completes_the_card(bench):
     folder, found = bench
     setup = tomllib.loads((folder / "out" / "setup.toml").read_text())["setup"]
     prepared = prepare(folder / "planted.toml", setup=folder / "out" / "setup.toml")
-    (read,) = prepared.stated.setups
+    (read,) = prepared.card.setups
 
     assert setup["hammer"]["at_mm"] == [20, 20]
     assert setup["attached"] == [{"kind": "accelerometer", "at_mm": [560, 197], "mass_g": {"mean": 0.6, "sd": 0.1}}]
@@ -198,7 +198,7 @@ def test_a_fragment_of_another_name_with_edges_is_one_more_setup(tmp_path):
     edges = 'edges = { x0 = "clamped", x1 = "free", y0 = "free", y1 = "free" }\n'
     (tmp_path / "fragment.toml").write_text(f'[setup]\nname = "held"\n{edges}unlabelled_hz = [31]\n')
 
-    first, second = prepare(tmp_path / "planted.toml", setup=tmp_path / "fragment.toml").stated.setups
+    first, second = prepare(tmp_path / "planted.toml", setup=tmp_path / "fragment.toml").card.setups
 
     assert (first.name, second.name, second.ends_x) == ("setup", "held", ("clamped", "free"))
     assert [str(reading.label) for reading in first.readings] == ["(1,1)"]
@@ -209,7 +209,7 @@ def test_readings_of_a_fragment_stand_in_place_of_all_that_the_card_has(tmp_path
     (tmp_path / "planted.toml").write_text(CARD + 'unlabelled_hz = [404]\n[setup.frequencies_hz]\n"(1,1)" = 51\n')
     (tmp_path / "fragment.toml").write_text('[setup.frequencies_hz]\n"(2,0)" = 76.2\n')
 
-    (setup,) = prepare(tmp_path / "planted.toml", setup=tmp_path / "fragment.toml").stated.setups
+    (setup,) = prepare(tmp_path / "planted.toml", setup=tmp_path / "fragment.toml").card.setups
 
     assert [(str(reading.label), reading.frequency.mean) for reading in setup.readings] == [("(2,0)", 76.2)]
     assert setup.peaks == ()

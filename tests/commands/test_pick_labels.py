@@ -59,7 +59,7 @@ def test_a_picture_of_another_mode_or_crosswise_is_told(tmp_path):
     names = ["({},{})".format(*name) for name, _ in board().modes.names()[:4]]
 
     shown = [straightened(picture) for picture in sand]
-    labels = label_peaks(prepared.stated, prepared.prior, picked, None, {2: [shown[1]], 3: [shown[1]]})
+    labels = label_peaks(prepared.card, prepared.prior, picked, None, {2: [shown[1]], 3: [shown[1]]})
     kept, told = pictures_of(prepared.board, likely, {likely[2].hz: sand[0], 150.0: sand[1].T})
 
     (doubt,) = labels.doubts
@@ -82,7 +82,7 @@ def test_false_peaks_among_the_lowest_do_not_change_the_labels_of_the_others(tmp
     likely = tuple(replace(PEAK, hz=hz, sd_hz=1e-3 * hz, spurious_probability=spurious) for hz, spurious, _ in every)
     picked = heard(likely)
 
-    labels = label_peaks(prepared.stated, prepared.prior, picked, None, {})
+    labels = label_peaks(prepared.card, prepared.prior, picked, None, {})
 
     right = [labels.probabilities[i].get(name, 0.0) > 0.95 for i, (_, _, name) in enumerate(every) if name]
     assert all(right)

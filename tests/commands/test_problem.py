@@ -24,7 +24,7 @@ def problem() -> bayesplate.Problem:
 
     How stiff its support is is not stated: the effect's own prior ends at zero.
     """
-    board = bayesplate.Problem.from_card(UNCERTAIN).prepared.stated
+    board = bayesplate.Problem.from_card(UNCERTAIN).prepared.card
     lying = replace(board, setups=tuple(replace(one, bounce=None) for one in board.setups))
     return bayesplate.Problem.from_card(lying, effects=["fluid_loading", "support_stiffness"])
 

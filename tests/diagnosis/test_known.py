@@ -41,7 +41,7 @@ WITHIN = 0.02
 
 def card_of(tmp_path, *, lines=(), without=(), after=""):
     """The clamped card without its exciter, with lines of its material in place of others, and more after it."""
-    text = Problem.from_card(FIEMME).prepared.card_text.partition(EXCITER)[0]
+    text = Problem.from_card(FIEMME).prepared.card.text.partition(EXCITER)[0]
     kept = [line for line in text.splitlines() if not line.startswith((*without, "effects ="))]
     at = kept.index("[material]") + 1
     path = tmp_path / f"{FIEMME}.toml"

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from bayesplate.campaign.checking import CampaignCheck
-from bayesplate.commands.shown import show_check, show_modes
+from bayesplate.commands.shown import show_campaign_check, show_check, show_modes
 from bayesplate.results.checking import CheckedEffect, CheckedMode, CheckedSetup, CheckReport
 from bayesplate.results.command_tables import check_tables, forward_table, methods_table, sheet_tables
 from bayesplate.results.comparison import (
@@ -79,7 +79,7 @@ def test_check_shows_what_its_report_holds():
 )
 def test_of_a_campaign_one_board_in_doubt_is_enough(n_doubts, told):
     boards = {"first": REPORT, "second": replace(REPORT, n_doubts=n_doubts)}
-    assert told in show_check(CampaignCheck("made", "", {}, None, boards)).closing
+    assert told in show_campaign_check(CampaignCheck("made", "", {}, None, boards)).closing
 
 
 def test_methods_stand_beside_each_other():
