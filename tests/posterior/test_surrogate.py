@@ -225,6 +225,19 @@ def test_where_too_few_draws_count_the_law_itself_is_sampled(problem, exact, mon
         assert found.surrogate is None
         assert found.pareto_k is None
         assert found.convergence.passed
+        assert differences(found, exact).max() < FURTHEST
+
+
+def test_a_surrogate_whose_weights_do_not_stand_is_taught_at_its_draws_and_walked_on_again(
+    problem, inference, exact, monkeypatch
+):
+    answers = iter([False, True])
+    monkeypatch.setattr("bayesplate.posterior.inference.may_stand", lambda *_: next(answers))
+    taught = infer(problem, SamplerSettings(seed=6))
+    assert list(answers) == []
+    assert len(taught.surrogate.points.theta) > len(inference.surrogate.points.theta) + 1000
+    assert taught.convergence.passed
+    assert differences(taught, exact).max() < FURTHEST
 
 
 def test_a_part_of_the_posterior_that_a_surrogate_lacks_is_seen():
