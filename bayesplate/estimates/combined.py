@@ -10,26 +10,10 @@ COMBINED = ("alpha", "beta", "gamma")
 
 
 def combination(coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How much of each mode makes each combined mode: the Moore-Penrose inverse of X.
+    """How much of each mode makes each combined mode, (3, n_modes): the inverse of X = (a, b, c) by Moore and Penrose.
 
-    Parameters
-    ----------
-    coefficients : (n_modes, 3) array
-        X: columns a, b, c, of full rank.
-
-    Returns
-    -------
-    (3, n_modes) array
-        Its product with X is the unit matrix: the combined psi are d_x, d_y and d_s.
-
-    Raises
-    ------
-    ValueError
-        If the modes do not separate the three constants.
-
-    References
-    ----------
-    Ducceschi et al., section 3, "Interpretation of the results in terms of the Moore-Penrose inverse".
+    Its product with X is the unit matrix: the combined psi are d_x, d_y and d_s (Ducceschi et al., section 3).
+    ValueError if the modes do not separate the three constants.
     """
     if coefficients.shape[0] < 3 or np.linalg.matrix_rank(coefficients) < 3:
         raise ValueError(f"combined modes: wanted modes that tell three constants apart, got {len(coefficients)} modes")
@@ -37,20 +21,10 @@ def combination(coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def combined_shapes(coefficients: NDArray[np.float64], shapes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Shapes of the combined modes alpha, beta and gamma.
+    """Shapes of the combined modes alpha, beta and gamma, (3, n_x, n_y), from (n_modes, n_x, n_y) shapes on one grid.
 
     Each mode enters with unit norm, positive next to the corner of x1 and y1: the paper does not state its signs, and
     the combined shapes depend on them.
-
-    Parameters
-    ----------
-    coefficients : (n_modes, 3) array
-    shapes : (n_modes, n_x, n_y) array
-        Sampled on one grid, in the same order.
-
-    Returns
-    -------
-    (3, n_x, n_y) array
     """
     norms = np.sqrt(np.sum(shapes**2, axis=(1, 2)))
     units = shapes * (corner_signs(shapes) / norms)[:, None, None]

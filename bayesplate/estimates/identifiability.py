@@ -32,30 +32,15 @@ _HELP = {
 
 @dataclass(frozen=True, eq=False)
 class Identifiability:
-    """How well n readings determine the constants of a board, to first order at the estimate.
+    """How well n readings determine the constants of a board, to first order at the estimate."""
 
-    Attributes
-    ----------
-    condition_number : float
-        Of the weighted sensitivities d ln f / d ln D: dimensionless, free of the units of the constants.
-    covariance : (n_constants, n_constants) array
-        Of the logarithms of the free rigidities, D_x, D_y, D_s unless the board is isotropic, at the expected noise.
-    leverages : (n_modes,) array
-        Share of each reading in its own prediction, 0 to 1; they sum to the number of constants.
-    shares : (n_modes, 3) array
-        Share of D_x, D_y and D_s in each mode's energy; rows sum to 1.
-    symmetry : Symmetry
-        Of the board: which rigidities are free.
-    errors_beside_known : (n_constants,) array or None
-        Standard error of the logarithm of each free rigidity where the others are known within `OTHERS_WITHIN`: one
-        that hardly enters a mode does not spoil what the mode tells of another.
-    """
-
-    condition_number: float
-    covariance: NDArray[np.float64]
-    leverages: NDArray[np.float64]
-    shares: NDArray[np.float64]
+    condition_number: float  # of the weighted sensitivities d ln f / d ln D: free of the units of the constants
+    covariance: NDArray[np.float64]  # (n_constants, n_constants): of ln of the free rigidities, at the expected noise
+    leverages: NDArray[np.float64]  # (n_modes,): share of each reading in its own prediction; their sum is n_constants
+    shares: NDArray[np.float64]  # (n_modes, 3): of D_x, D_y, D_s in each mode's energy; rows sum to 1
     symmetry: Symmetry = ORTHOTROPIC
+    # (n_constants,) standard errors of ln D where the others are known within `OTHERS_WITHIN`: a constant that hardly
+    # enters a mode does not spoil what the mode tells of another
     errors_beside_known: NDArray[np.float64] | None = None
 
     @property
@@ -83,21 +68,9 @@ class Identifiability:
 def identifiability(
     sensitivities: NDArray[np.float64], scales: NDArray[np.float64], symmetry: Symmetry = ORTHOTROPIC
 ) -> Identifiability:
-    """First-order identifiability from sensitivities and the relative uncertainties of the readings.
+    """First-order identifiability from (n_modes, 3) d ln f / d ln D and the relative uncertainties of the readings.
 
-    Parameters
-    ----------
-    sensitivities : (n_modes, 3) array
-        d ln f / d ln D.
-    scales : (n_modes,) array
-        Relative uncertainty of each reading.
-    symmetry : Symmetry
-        Of the board.
-
-    Returns
-    -------
-    Identifiability
-        With infinite variances where the readings leave a direction open.
+    Variances are infinite where the readings leave a direction open.
     """
     n = symmetry.n
     weighted = symmetry.along(sensitivities) / scales[:, None]
@@ -126,12 +99,7 @@ def _errors_beside_known(information: NDArray[np.float64]) -> NDArray[np.float64
 
 
 def require_labels(board: Board) -> None:
-    """Refuse a board whose labelled modes are too few for its constants, or a setup without any.
-
-    Raises
-    ------
-    NotIdentifiableError
-    """
+    """Refuse (NotIdentifiableError) too few labelled modes for the constants, or a setup without any."""
     for setup in board.setups:
         if not setup.readings:
             n = len(setup.peaks)
@@ -149,12 +117,7 @@ def require_labels(board: Board) -> None:
 
 
 def require_identifiable(board: Board, found: Identifiability) -> None:
-    """Refuse readings that leave a constant open, naming it and what would help.
-
-    Raises
-    ------
-    NotIdentifiableError
-    """
+    """Refuse (NotIdentifiableError) readings that leave a constant open, naming it and what would help."""
     if not found.blind():
         return
     spread = _factors(found.standard_errors)
@@ -193,12 +156,9 @@ def _modes(board: Board) -> str:
 
 
 def remarks(board: Board, found: Identifiability, carrying: str | None = None) -> tuple[str, ...]:
-    """Sentences on what is weakly known, for the table and the summary; empty where there is nothing to say.
+    """Sentences on what is weakly known, for the table and the summary.
 
-    Parameters
-    ----------
-    carrying : str, optional
-        What a fit says of modes that alone carry something; before there is one, their leverages here say it.
+    `carrying` is what a fit says of modes that alone carry something; before there is one, their leverages here say it.
     """
     sentences = [_weakest(found)]
     names = [

@@ -24,16 +24,8 @@ LIKELY = 0.5
 def with_labels(setup: Setup, peaks: PeakLikelihood, probabilities: NDArray[np.float64], least: float) -> Setup:
     """A setup with labels for the peaks that are one mode with a probability above the least one.
 
-    Parameters
-    ----------
-    setup : Setup
-        Labels that were proposed for it before are forgotten.
-    peaks : PeakLikelihood
-        Of this setup.
-    probabilities : (n_peaks, n_modes) array
-        Of each peak to be each mode.
-    least : float
-        At least one half, so that no two peaks have the same label.
+    Labels that were proposed before are forgotten; `probabilities` is (n_peaks, n_modes), and the least one at least
+    one half, so that no two peaks have the same label.
     """
     likely = [_likely(peaks.labels, row, least) for row in probabilities]
     of_reading = {int(at): label for at, label in zip(peaks.readings, likely, strict=True) if at >= 0}

@@ -18,7 +18,8 @@ from bayesplate.board.setup import Setup
 from bayesplate.frequencies.model import SetupModel, setup_model
 from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.frequencies.system import system_of
-from bayesplate.frequencies.terms import rayleigh_coefficients, rigidity_columns
+from bayesplate.frequencies.terms import rigidity_columns
+from bayesplate.plate.beams import product_coefficients
 
 MOST_STEPS = 40
 _LONGEST_STEP = 0.7
@@ -33,31 +34,16 @@ _PULL = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """A point estimate of the rigidities, and how well the readings determine it.
+    """A point estimate of the rigidities, and how well the readings determine it."""
 
-    Attributes
-    ----------
-    rigidities : (3,) array, N m
-        D_x, D_y, D_s.
-    values : dict of float
-        The rigidities and the nominal inputs by name.
-    models : tuple of SetupModel
-        One a setup, solved at the estimate, whether the steps settled there or not.
-    sensitivities : (n_modes, 3) array
-        d ln f / d ln D of all readings, setup after setup.
-        Of an isotropic board too, whose own fit moves along their sum: `Symmetry.along`.
-    residuals : (n_modes,) array
-        ln measured - ln predicted.
-    scales : (n_modes,) array
-        Relative uncertainty of each reading that weighs it, see `reading_scales`.
-    """
-
-    rigidities: NDArray[np.float64]
-    values: Mapping[str, NDArray[np.float64]]
-    models: tuple[SetupModel, ...]
+    rigidities: NDArray[np.float64]  # (3,), N m
+    values: Mapping[str, NDArray[np.float64]]  # the rigidities and the nominal inputs
+    models: tuple[SetupModel, ...]  # one a setup, solved at the estimate, settled or not
+    # (n_modes, 3) d ln f / d ln D, setup after setup; a fit of an isotropic board moves along their sum
+    # (`Symmetry.along`)
     sensitivities: NDArray[np.float64]
-    residuals: NDArray[np.float64]
-    scales: NDArray[np.float64]
+    residuals: NDArray[np.float64]  # (n_modes,): ln measured - ln predicted
+    scales: NDArray[np.float64]  # (n_modes,): of `reading_scales`
     converged: bool
 
 
@@ -79,22 +65,9 @@ def weighted_least_squares(
 ) -> Estimate:
     """Rigidities that minimise the weighted squares of relative frequency errors over all setups.
 
-    Parameters
-    ----------
-    board : Board
-        Every setup with at least one reading.
-    most_steps : int
-        After which they end, settled or not.
-    start : (3,) array, optional
-        Rigidities to begin with, N m; by default rough ones from the readings.
-    accepted : float
-        What ln D may be off by when they end.
-
-    Returns
-    -------
-    Estimate
-        `converged` is False where the steps did not settle. Where they go round, as at a veering whose names swap back
-        and forth, it is the best of the round. A direction that the readings do not determine keeps its starting value.
+    Steps begin at `start` (N m), by default rough rigidities from the readings, and end where ln D is off by less than
+    `accepted`. Where they go round, as at a veering whose names swap back and forth, the best of the round is the
+    estimate. A direction that the readings do not determine keeps its starting value.
     """
     inputs, symmetry = board.nominal(), board.symmetry
     nu_xy = inputs["poisson_xy"]
@@ -192,6 +165,6 @@ def starting_rigidities(board: Board) -> NDArray[np.float64]:
 
 
 def _rayleigh_rows(setup: Setup, inputs: Values) -> NDArray[np.float64]:
-    products = rayleigh_coefficients(setup)
+    products = product_coefficients(setup.ends_x, setup.ends_y)
     columns = rigidity_columns(inputs, setup)
     return np.stack([products[:, i, j] for i, j in (reading.beams for reading in setup.readings)]) @ columns

@@ -16,42 +16,20 @@ from bayesplate.frequencies.columns import inverse_lambda
 
 @dataclass(frozen=True, eq=False)
 class PaperSystem:
-    """The linear system psi = X d of a board.
+    """The linear system psi = X d of a board."""
 
-    Attributes
-    ----------
-    psi : (n_modes,) array, N m
-        omega^2 / lambda of the measured frequencies, lambda = 1 / (rho h A^2), less what effects give of it.
-    coefficients : (n_modes, 3) array
-        X: columns a, b, c.
-    values : dict of float
-        Nominal inputs, for the moduli.
-    origins : tuple of CoefficientRows
-        Where the coefficients come from, one per setup.
-    """
-
+    # (n_modes,), N m: omega^2 / lambda of the measured frequencies, lambda = 1 / (rho h A^2), less what effects give of
+    # it
     psi: NDArray[np.float64]
-    coefficients: NDArray[np.float64]
-    values: Values
-    origins: tuple[CoefficientRows, ...] = ()
+    coefficients: NDArray[np.float64]  # X, (n_modes, 3): a, b, c
+    values: Values  # nominal inputs, for the moduli
+    origins: tuple[CoefficientRows, ...] = ()  # one a setup
 
     def solve(self, rows: NDArray[np.intp] | slice = slice(None)) -> NDArray[np.float64]:
-        """Unweighted least squares of some of the modes: d_x, d_y, d_s in N m.
+        """Unweighted least squares of the modes `rows`, (..., n_some) for many subsets: (..., 3) d_x, d_y, d_s in N m.
 
-        Parameters
-        ----------
-        rows : (..., n_some) array of int or slice
-            Which modes, of many subsets of one size at once if there are several; all by default.
-
-        Returns
-        -------
-        (..., 3) array
-            The shortest solution where a subset leaves something open; not a number where it has fewer modes than
-            three, as an isotropic board may.
-
-        References
-        ----------
-        Ducceschi et al., eq. (13).
+        Ducceschi et al., eq. (13). The shortest solution where a subset leaves something open; not a number where it
+        has fewer modes than three, as an isotropic board may.
         """
         coefficients, psi = self.coefficients[rows], self.psi[rows]
         if psi.shape[-1] < coefficients.shape[-1]:
@@ -60,14 +38,10 @@ class PaperSystem:
         return np.asarray((np.linalg.pinv(coefficients, cutoff) @ psi[..., None])[..., 0])
 
     def moduli(self, constants: NDArray[np.float64], nu_yx: float | None = None) -> Moduli:
-        """Elastic moduli of (..., 3) rigidities, Pa.
+        """Elastic moduli of (..., 3) rigidities, Pa; Ducceschi et al., eq. (14).
 
         With `nu_yx` given, the Poisson factor 1 - nu_xy nu_yx is fixed as the paper does; otherwise nu_yx follows from
         the estimate itself.
-
-        References
-        ----------
-        Ducceschi et al., eq. (14).
         """
         D_x, D_y, D_s = np.moveaxis(np.asarray(constants, dtype=float), -1, 0)
         h, nu_xy = self.values["thickness"], self.values["poisson_xy"]
@@ -85,27 +59,7 @@ class PaperSystem:
 def paper_system(
     board: Board, estimate: Estimate, source: CoefficientSource | None = None, *, compared: bool = True
 ) -> PaperSystem:
-    """The paper's linear system of a board.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        Where the modes' own coefficients are taken.
-    source : "sensitivity", "training" or "published", optional
-        By default the published table where a setup names one, else the modes' own coefficients.
-    compared : bool
-        Whether the origins say how far a published table lies from solved plates; see `coefficient_rows`.
-
-    Returns
-    -------
-    PaperSystem
-        Of all readings, but for peaks without a sure label that are modes which a printed table lacks.
-
-    Raises
-    ------
-    InputError
-        If a named table does not hold a label of the setup, or is of other edges or another aspect ratio.
-    """
+    """The paper's linear system of all readings of a board; of the source and `compared` see `coefficient_rows`."""
     values = board.nominal()
     origins = tuple(
         coefficient_rows(board.name, model, estimate.values, source, compared=compared) for model in estimate.models

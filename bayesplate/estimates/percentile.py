@@ -25,38 +25,21 @@ MOST_MODES = 16
 
 @dataclass(frozen=True, eq=False)
 class PercentileEstimate:
-    """Mean and spread of the trimmed estimates of each modulus.
+    """Mean and spread of the trimmed estimates of each modulus, Pa."""
 
-    Attributes
-    ----------
-    estimates : (n_subsets, 3) array, Pa
-        E_x, E_y, G_xy of every subset, before trimming.
-    kept : (n_subsets, 3) array of bool
-        What the trimming leaves.
-    mean, sd : dict of float, Pa
-    """
-
-    estimates: NDArray[np.float64]
-    kept: NDArray[np.bool_]
+    estimates: NDArray[np.float64]  # (n_subsets, 3) E_x, E_y, G_xy, before trimming
+    kept: NDArray[np.bool_]  # (n_subsets, 3)
     mean: Mapping[str, float]
     sd: Mapping[str, float]
 
     @property
     def n_subsets(self) -> int:
-        """Number of subsets of modes."""
         return int(self.estimates.shape[0])
 
 
 def percentile_estimate(system: PaperSystem) -> PercentileEstimate | None:
-    """The paper's estimate of E_x, E_y, G_xy from all subsets of the modes.
+    """E_x, E_y, G_xy from all subsets of the modes; None for fewer modes than constants, or more than `MOST_MODES`.
 
-    Returns
-    -------
-    PercentileEstimate or None
-        None for fewer modes than constants, or more than `MOST_MODES`.
-
-    References
-    ----------
     Ducceschi et al., section 5 and the table of results.
     """
     n_modes = system.psi.size

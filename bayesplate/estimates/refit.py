@@ -52,23 +52,7 @@ class Bounds:
 
 
 def refit(predict: Predict, target: Floats, scales: Floats, start: Floats, bounds: Bounds | None = None) -> Floats:
-    """Parameters that minimise the weighted squares of ln measured - ln predicted.
-
-    Parameters
-    ----------
-    predict : callable
-        See `Predict`.
-    target : (n_modes,) array
-        ln of the measured frequencies.
-    scales : (n_modes,) array
-        Relative uncertainties.
-    start : (n_free,) array
-        Within the bounds.
-
-    Returns
-    -------
-    (n_free,) array
-    """
+    """Parameters that minimise the weighted squares of ln measured - ln predicted: (n_free,) array."""
     return most_likely(predict, normal_misfit(target, scales), start, bounds)
 
 
@@ -96,25 +80,10 @@ def most_likely(
     bounds: Bounds | None = None,
     left_out: Sequence[int] = (),
 ) -> Floats:
-    """Parameters that minimise the squares of a misfit, the constants within reach of the start.
+    """Parameters, (n_free,), that minimise the squares of a misfit, the constants within reach of the start.
 
-    A step to where the law gives no frequency, or beyond reach, is refused and a shorter one tried.
-
-    Parameters
-    ----------
-    predict : callable
-        See `Predict`.
-    misfit : callable
-        See `Misfit`.
-    start : (n_free,) array
-        Within the bounds.
-    left_out : sequence of int, optional
-        Readings that are not used.
-
-    Returns
-    -------
-    (n_free,) array
-        Not numbers where the law gives no frequency at the start.
+    A step to where the law gives no frequency, or beyond reach, is refused and a shorter one tried; the result is nan
+    where the law gives no frequency at the start. The readings `left_out` are not used.
     """
     from scipy.optimize import least_squares
 
@@ -142,9 +111,8 @@ def most_likely(
 
 
 def has_come_to_rest(fitted: Floats, starts: Floats, n: int) -> NDArray[np.bool_]:
-    """Whether fits, (..., n_free) arrays of which n are constants, ended well within reach of where they began.
-
-    Where one has not, the readings do not tell the constants.
+    """Whether fits, (..., n_free) with n constants, ended well within reach of their starts: else nothing tells the
+    constants.
     """
     return np.asarray(_distance(fitted, starts, n) <= _EDGE * _REACH)
 

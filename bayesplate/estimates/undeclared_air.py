@@ -20,10 +20,10 @@ SMALLEST = 0.005
 
 
 def rise_with_air(board: Board, estimate: Estimate) -> NDArray[np.float64]:
-    """Relative rise of E_x, E_y and G_xy with open air of 1.2 kg/m3 around every setup: (3,) array.
+    """Relative rise of E_x, E_y and G_xy with open air of 1.2 kg/m3 around every setup, by weighted least squares:
+    (3,).
 
-    The board's modes in air against those without, and the weighted least squares that make up for it. Zeros where a
-    fluid is declared: whatever it is, it is in the model.
+    Zeros where a fluid is declared: whatever it is, it is in the model.
     """
     if FluidLoading.name in board.effects:
         return np.zeros(len(MODULI))

@@ -28,13 +28,7 @@ _USUAL = (0.001, 0.999)
 
 
 def unusual(board: Board, prior: PriorCard, rigidities: Floats) -> tuple[str, ...]:
-    """What is unusual about a board's density and about the constants that its readings imply, a sentence each.
-
-    Parameters
-    ----------
-    rigidities : (3,) array, N m
-        D_x, D_y, D_s, as by least squares.
-    """
+    """What is unusual about a board's density and the constants that its readings imply; rigidities in N m."""
     values = board.nominal() | dict(zip(RIGIDITIES, rigidities, strict=True))
     elastic = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
     by_name = values | elastic._asdict()

@@ -67,44 +67,29 @@ _JUMP, _JITTER = 0.7, 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """A region of the constants in which one way to take the peaks is likely.
+    """A region of the constants in which one way to take the peaks is likely."""
 
-    Attributes
-    ----------
-    values : dict of float
-        Rigidities at its middle (N m), and the nominal inputs.
-    log_rigidities : (n_draws, n_constants) array
-        ln of the free rigidities of draws from it.
-    noise : float
-        Relative, at which the peaks may be taken for modes there.
-    """
-
-    values: Values
-    log_rigidities: Floats
-    noise: float
+    values: Values  # at its middle
+    log_rigidities: Floats  # (n_draws, n_constants): ln of the free rigidities of draws from it
+    noise: float  # relative, at which the peaks may be taken for modes there
 
     @property
     def rigidities(self) -> Floats:
         """Those at its middle, N m: (3,) array."""
         return np.array([self.values[name] for name in RIGIDITIES])
 
-    def is_far_from(self, other: Guess) -> bool:
-        """Whether the constants are others altogether."""
-        return bool(np.abs(np.log(self.rigidities / other.rigidities)).max() > FAR)
+
+def are_far_apart(first: Floats, second: Floats) -> bool:
+    """Whether two sets of ln D are other constants altogether."""
+    return bool(np.abs(first - second).max() > FAR)
 
 
 def search_widely(board: Board, prior: PriorCard, rng: np.random.Generator) -> list[Guess]:
-    """Regions of the prior in which the peaks of a board are likely, the likeliest first.
+    """Regions of the prior in which the peaks of a board are likely, those under a smaller noise and the likelier ones
+    first.
 
-    Parameters
-    ----------
-    board : Board
-        Labels tell the symmetry class of their peak here, and nothing else.
-
-    Returns
-    -------
-    list of Guess
-        Those under a smaller noise first; empty where no draw has a frequency for every mode.
+    Labels tell the symmetry class of their peak here, and nothing else. Empty where no draw has a frequency for every
+    mode.
     """
     nominal = board.nominal()
     log_prior = _density(prior, nominal)
@@ -154,7 +139,9 @@ def _guesses(by_noise: Sequence[Sequence[Guess]]) -> list[Guess]:
     for ways in by_noise:
         n_regions = 0
         for at, way in enumerate(ways):
-            is_elsewhere = n_regions < MOST_REGIONS and all(way.is_far_from(other) for other in guesses)
+            is_elsewhere = n_regions < MOST_REGIONS and all(
+                are_far_apart(np.log(way.rigidities), np.log(other.rigidities)) for other in guesses
+            )
             n_regions += is_elsewhere
             if is_elsewhere or (at < MOST_FOUND and way.noise <= LOUD):
                 guesses.append(way)
@@ -202,22 +189,12 @@ def _guess(nominal: Values, members: Floats, noise: float) -> Guess:
 
 @dataclass(frozen=True, eq=False)
 class _Modes:
-    """The modes of a plate in one setup, and the peaks of the setups that are like it.
-
-    Attributes
-    ----------
-    reduced : ReducedOrderModel
-        Of the modes at some members of a population.
-    scale : float
-        ln D_s at which it is evaluated.
-    peaks : tuple of PeakLikelihood
-        Of each setup.
-    """
+    """The modes of a plate in one setup, and the peaks of the setups that are like it."""
 
     system: System
     nominal: Values
-    reduced: ReducedOrderModel
-    scale: float
+    reduced: ReducedOrderModel  # of the modes at some members of a population
+    scale: float  # ln D_s at which it is evaluated
     peaks: tuple[PeakLikelihood, ...]
 
     @classmethod
@@ -257,14 +234,9 @@ class _Modes:
 
 @dataclass(frozen=True, eq=False)
 class _Tabled:
-    """The likelihood of the peaks of all setups where a population is.
+    """The likelihood of the peaks of all setups where a population is."""
 
-    Attributes
-    ----------
-    every : tuple of (RegularGridInterpolator, tuple of PeakLikelihood)
-        Frequencies of setups that are alike, and the peaks of each.
-    """
-
+    # frequencies of setups that are alike, and the peaks of each
     every: tuple[tuple[RegularGridInterpolator, tuple[PeakLikelihood, ...]], ...]
 
     def log_likelihood(self, x: Floats, noise: float) -> Floats:

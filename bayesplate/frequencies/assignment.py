@@ -48,20 +48,12 @@ _LOG_MOST = 300.0
 
 @dataclass(frozen=True, eq=False)
 class Near:
-    """Which peaks of a row are near each mode.
-
-    Attributes
-    ----------
-    first, end : lists of n_modes int
-        The first of these peaks, and the one after the last: none where the end is not beyond the first.
-    low : list of n_modes int
-        The first of them and of those near the modes to come.
-    """
+    """Which peaks of a row are near each mode."""
 
     n_peaks: int
-    first: list[int]
-    end: list[int]
-    low: list[int]
+    first: list[int]  # of each mode: the first of these peaks
+    end: list[int]  # and the one after the last: none where it is not beyond the first
+    low: list[int]  # the first of them and of those near the modes to come
 
     @classmethod
     def of(cls, is_near: NDArray[np.bool_]) -> Near:
@@ -95,31 +87,17 @@ class Near:
 
 
 class _Passage(NamedTuple):
-    """What a mode does that peaks are near, and where in the table.
+    """What a mode does that peaks are near, and where in the table."""
 
-    Attributes
-    ----------
-    rows : list of (int, slice, slice)
-        Rows of these peaks; in each which peaks they are, and which pairs with the mode.
-    tops : (int, int)
-        The most peaks of each row of which the table had sums before.
-    window : (slice, slice)
-        The part of the table that this mode and those to come ask for.
-    log_growth : float
-        ln of the number by which the mode multiplies a sum, at most.
-    doubtful : tuple of int
-        Which peaks of unknown sign have an axis of the table, one after the other between its two and the draws.
-    opening, closing : list of int
-        Those that have it from this mode on, and up to it.
-    """
-
+    # row of these peaks; in it which peaks they are, and which pairs with the mode
     rows: list[tuple[int, slice, slice]]
-    tops: tuple[int, int]
-    window: tuple[slice, slice]
-    log_growth: float
+    tops: tuple[int, int]  # the most peaks of each row of which the table had sums before
+    window: tuple[slice, slice]  # the part of the table that this mode and those to come ask for
+    log_growth: float  # ln of the number by which the mode multiplies a sum, at most
+    # peaks of unknown sign that have an axis of the table, in order between its two and the draws
     doubtful: tuple[int, ...]
-    opening: list[int]
-    closing: list[int]
+    opening: list[int]  # those that have it from this mode on
+    closing: list[int]  # those that have it up to this mode
 
     def along(self, table: Floats, row: int) -> Floats:
         """The part of a table that is asked for, up to the most peaks of a row: these along the first axis."""
@@ -133,20 +111,11 @@ class Assignments:
     """What peaks say of modes at many draws: both in the order of frequency, the modes in that of each draw.
 
     The draws come last: a run over modes then adds whole rows of them.
-
-    Attributes
-    ----------
-    near : sequence of Near
-        One for each row.
-    ratios : sequence of (n_pairs, n_draws) array
-        r_ij of the pairs of each.
-    unsigned : tuple of (int, int)
-        The places in both rows of each peak of unknown sign.
     """
 
-    near: Sequence[Near]
-    ratios: Sequence[Floats]
-    unsigned: Sequence[tuple[int, int]] = ()
+    near: Sequence[Near]  # one for each row
+    ratios: Sequence[Floats]  # (n_pairs, n_draws): r_ij of the pairs of each row
+    unsigned: Sequence[tuple[int, int]] = ()  # places in both rows of each peak of unknown sign
 
     def log_sum(self) -> Floats:
         """ln of the sum of the products of r_ij over all assignments and all signs that peaks may have: (n_draws,)."""

@@ -14,18 +14,10 @@ from bayesplate.frequencies.system import System
 
 
 class Columns(NamedTuple):
-    """omega^2 / lambda = a D_x + b D_y + c D_s + rest, exact at the point where the modes were computed.
+    """omega^2 / lambda = a D_x + b D_y + c D_s + rest, exact at the point where the modes were computed."""
 
-    Attributes
-    ----------
-    coefficients : (n_modes, 3) array
-        Columns a, b, c.
-    rest : (n_modes,) array, N m
-        What shear and other effects give; zero for the bare thin plate.
-    """
-
-    coefficients: NDArray[np.float64]
-    rest: NDArray[np.float64]
+    coefficients: NDArray[np.float64]  # (n_modes, 3): a, b, c
+    rest: NDArray[np.float64]  # (n_modes,), N m: of shear and other effects; zero for the bare thin plate
 
     def shares(self, rigidities: NDArray[np.float64]) -> NDArray[np.float64]:
         """Share of D_x, D_y, D_s and of all the rest in each mode's energy: (n_modes, 4) array, rows sum to 1."""
@@ -34,30 +26,23 @@ class Columns(NamedTuple):
 
 
 def columns(system: System, values: Values, stiffness: NDArray[np.float64]) -> Columns:
-    """Coefficients of modes from their energies in the terms of the plate.
-
-    Parameters
-    ----------
-    values : dict of float
-        D_x, D_y, D_s (N m), the board's inputs and the effects' parameters, where the modes were computed.
-    stiffness : (n_modes, n_terms) array
-        phi' K_i phi of the mass-normalised modes.
-
-    References
-    ----------
-    Ducceschi et al., eq. (10) and (12).
-    """
+    """Coefficients of modes from their (n_modes, n_terms) energies phi' K_i phi: Ducceschi et al., eq. (10, 12)."""
     per_lambda = inverse_lambda(values, system.setup)
-    total = stiffness @ system.weights(values).stiffness[0] * per_lambda
-    found = []
-    for name in RIGIDITIES:
-        without = system.weights({**values, name: 0.0 * values[name]}).stiffness[0]
-        found.append((total - stiffness @ without * per_lambda) / float(values[name]))
-    coefficients = np.column_stack(found)
+    parts, total = (one * per_lambda for one in rigidity_parts(system, values, stiffness))
     constants = np.array([float(values[name]) for name in RIGIDITIES])
+    coefficients = parts / constants
     rest = total - coefficients @ constants
     rest[np.abs(rest) < 1e-9 * total] = 0.0
     return Columns(coefficients, rest)
+
+
+def rigidity_parts(
+    system: System, values: Values, stiffness: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What D_x, D_y and D_s give to omega^2 of modes, (n_modes, 3), and all of it, (n_modes,), s^-2."""
+    total = stiffness @ system.weights(values).stiffness[0]
+    zeroed = (system.weights({**values, name: 0.0 * values[name]}).stiffness[0] for name in RIGIDITIES)
+    return np.column_stack([total - stiffness @ without for without in zeroed]), total
 
 
 def inverse_lambda(values: Values, setup: Setup) -> float:

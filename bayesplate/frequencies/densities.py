@@ -17,33 +17,16 @@ DEGREES_OF_FREEDOM = 4
 
 @dataclass(frozen=True)
 class Density:
-    """A density of z, symmetric about zero and highest there: the normal one or Student's.
+    """A density of z, symmetric about zero and highest there: the normal one or Student's."""
 
-    Attributes
-    ----------
-    log_peak : float
-        ln p(0).
-    deviance : callable
-        2 (ln p(0) - ln p(z)); the square of z for the normal density.
-    slope : callable
-        Half the deviance's derivative, -d ln p / dz.
-    curvature : float
-        Derivative of `slope` at 0.
-    log_below : callable
-        ln of the probability below z.
-    draw : callable
-        Numbers of a shape, from a random generator.
-    """
-
-    log_peak: float
-    deviance: Callable[[Floats], Floats]
-    slope: Callable[[Floats], Floats]
-    curvature: float
-    log_below: Callable[[Floats], Floats]
+    log_peak: float  # ln p(0)
+    deviance: Callable[[Floats], Floats]  # 2 (ln p(0) - ln p(z)); z^2 for the normal density
+    slope: Callable[[Floats], Floats]  # half the deviance's derivative, -d ln p / dz
+    curvature: float  # derivative of `slope` at 0
+    log_below: Callable[[Floats], Floats]  # ln of the probability below z
     draw: Callable[[np.random.Generator, tuple[int, ...]], Floats]
 
     def log(self, z: Floats) -> Floats:
-        """ln p(z): array of the shape of z."""
         return np.asarray(self.log_peak - 0.5 * self.deviance(z))
 
     def log_between(self, low: Floats, high: Floats) -> Floats:

@@ -82,22 +82,11 @@ def in_plane(effects: Sequence[Effect], values: Values) -> Field | None:
 
 
 def over_fields(base: Weights, effects: Sequence[Effect], theory: Theory, values: Values, setup: Setup) -> Weights:
-    """Weights of the plate's own terms in the presence of effects, once for each field that they take.
+    """Weights of the plate's own terms in the presence of effects, once for each field that they take, as `layout` has
+    them.
 
-    The part of the modulus along the grain takes fields of its own, and is turned with the grain as all the rest.
-
-    Parameters
-    ----------
-    base : Weights
-        (n_draws, n_own) arrays, of the plate's own terms once each, without effects.
-    effects : sequence of Effect
-        As given to `fabric_of`.
-    values : dict of array
-
-    Returns
-    -------
-    Weights
-        In the order of `bayesplate.plate.fields.layout`.
+    `base` has each term once, without effects. The part of the modulus along the grain takes fields of its own, and is
+    turned with the grain as all the rest.
     """
     varying = _joined(tuple(effects))
     whole = _reweighed(base, effects, values, setup)

@@ -31,16 +31,10 @@ class Law(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class LinearLaw:
-    """omega^2 as a ratio of weighted energies of the modes at the estimate: the paper's law.
+    """omega^2 as a ratio of weighted energies of the modes at the estimate: the paper's law."""
 
-    Attributes
-    ----------
-    stiffness : (n_modes, n_terms) array
-    mass : (n_modes, n_masses) array
-    """
-
-    stiffness: NDArray[np.float64]
-    mass: NDArray[np.float64]
+    stiffness: NDArray[np.float64]  # (n_modes, n_terms)
+    mass: NDArray[np.float64]  # (n_modes, n_masses)
     name: LawName = "linear"
 
     def squared(self, weights: Weights) -> NDArray[np.float64]:

@@ -17,23 +17,13 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Predictor:
-    """ln f (Hz) of modes, setup after setup, as a function of the parameters of a fit.
+    """ln f (Hz) of modes, setup after setup, as a function of the (n, n_free) parameters of a fit."""
 
-    Attributes
-    ----------
-    values : callable
-        From (n, n_free) parameters to constants and sizes by name, SI.
-    rows : (n_modes,) array of int, optional
-        Which of all modes that the models have; by default all of them.
-    n_constants : int
-        How many of the parameters, the first ones, are logarithms of free rigidities: all others have priors.
-    """
-
-    values: Callable[[Floats], Values]
+    values: Callable[[Floats], Values]  # to constants and sizes by name, SI
     models: Sequence[SetupModel]
     law: LawName
-    rows: NDArray[np.intp] | None = None
-    n_constants: int = 3
+    rows: NDArray[np.intp] | None = None  # (n_modes,): which of all modes that the models have
+    n_constants: int = 3  # the first parameters, logarithms of free rigidities: all others have priors
 
     def __call__(self, x: Floats) -> Floats:
         """From (n, n_free) parameters to (n, n_modes) ln f."""
@@ -59,10 +49,6 @@ class Predictor:
         """The linear law of the modes at a point: equal to the exact one there, with the same slopes.
 
         Energies are stationary at a mode (Rayleigh's principle), so that one solution gives all slopes.
-
-        Parameters
-        ----------
-        at : (n_free,) array
         """
         if self.law == "linear":
             return self

@@ -11,9 +11,9 @@ from bayesplate.board.board import Board, Values
 from bayesplate.board.material import MODULI, RIGIDITIES, isotropic_moduli, rigidities
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.setup import Setup
-from bayesplate.frequencies.terms import rayleigh_coefficients, term_weights
+from bayesplate.frequencies.terms import term_weights
 from bayesplate.labels import Label
-from bayesplate.plate.beams import N_BEAMS
+from bayesplate.plate.beams import N_BEAMS, product_coefficients
 
 WITHIN = (1 / 6, 5 / 6)
 """Two times in three."""
@@ -30,18 +30,13 @@ def prior_medians(board: Board, prior: PriorCard) -> dict[str, NDArray[np.float6
 def prior_bands(
     board: Board, prior: PriorCard, setup: Setup, labels: Sequence[Label], rng: np.random.Generator
 ) -> dict[str, tuple[float, float]]:
-    """Factors between which the prior expects each frequency, relative to the one at its median.
+    """Factors between which the prior expects each frequency, relative to the one at its median, by label.
 
     From Rayleigh quotients of beam-function products, draw by draw: a few per cent off each frequency, which cancel in
-    the factors.
-
-    Returns
-    -------
-    dict of (float, float)
-        By label; labels beyond the beam functions are left out.
+    the factors. Labels beyond the beam functions are left out.
     """
     values = prior_draws(board, prior, rng, _N_DRAWS)
-    products = rayleigh_coefficients(setup)
+    products = product_coefficients(setup.ends_x, setup.ends_y)
     middle = term_weights(prior_medians(board, prior), setup).stiffness[0]
     weights = term_weights(values, setup).stiffness
     bands = {}

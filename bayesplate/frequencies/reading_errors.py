@@ -33,22 +33,14 @@ _NEAR = 1e-4
 class ReadingErrors:
     """How the readings of a setup err about the frequencies that a model predicts.
 
-    Attributes
-    ----------
-    frequency : (n_modes,) array, Hz
-        As read.
-    own_sd : (n_modes,) array
-        Relative standard deviation that a reading states itself; 0 if it states none.
-    resolution : (n_modes,) array, Hz
-        Step of the rounding; 0 where there is none, or where `own_sd` holds its error.
-    robust : bool
-        Student's density with four degrees of freedom in place of the normal one.
+    Predictions are ln f (Hz), (n_modes,) or (n_draws, n_modes) arrays, at a relative noise: one, or (n_draws,). Under
+    Student's density the noise is its scale.
     """
 
-    frequency: Floats
-    own_sd: Floats
-    resolution: Floats
-    robust: bool = False
+    frequency: Floats  # (n_modes,), Hz: as read
+    own_sd: Floats  # (n_modes,): relative standard deviation that a reading states itself; 0: none
+    resolution: Floats  # (n_modes,), Hz: step of the rounding; 0: none, or `own_sd` holds its error
+    robust: bool = False  # Student's density with four degrees of freedom in place of the normal one
 
     @classmethod
     def of(cls, setup: Setup, robust: bool = False) -> ReadingErrors:
@@ -93,33 +85,14 @@ class ReadingErrors:
         return np.asarray(self.own_sd**2 + (self.resolution / self.frequency) ** 2 / 12.0)
 
     def sd(self, noise: ArrayLike) -> Floats:
-        """Relative standard deviation of each reading: noise, own uncertainty and rounding together.
-
-        Parameters
-        ----------
-        noise : float or (n_draws,) array
-            Relative; under Student's density it is the scale.
-
-        Returns
-        -------
-        (n_modes,) or (n_draws, n_modes) array
-        """
+        """Relative standard deviation of each reading: noise, own uncertainty and rounding together."""
         return _join(noise, np.sqrt(self.own_variance))
 
     def log_likelihood(self, predicted: Floats, noise: ArrayLike) -> Floats:
-        """Logarithm of the probability of each reading.
+        """ln of the probability of each reading: of its rounding interval where it is rounded, else the density of ln
+        f.
 
-        Parameters
-        ----------
-        predicted : (n_modes,) or (n_draws, n_modes) array
-            ln f (Hz) of the model; not a number where it has none.
-        noise : float or (n_draws,) array
-
-        Returns
-        -------
-        (n_modes,) or (n_draws, n_modes) array
-            Of the rounding interval for rounded readings, otherwise of the density of ln f; -inf where the model has
-            no frequency.
+        Minus infinity where the model has no frequency, which is not a number.
         """
         rounded = self.rounded
         z, low, high, scale = self._standardised(predicted, noise)
@@ -129,19 +102,7 @@ class ReadingErrors:
         return np.where(np.isnan(predicted), -np.inf, result)
 
     def log_likelihood_of_pairs(self, readings: NDArray[np.intp], predicted: Floats, noise: Floats) -> Floats:
-        """Logarithm of the probability of some readings, each if it were of the mode that it is paired with.
-
-        Parameters
-        ----------
-        readings : (n_pairs,) array of int
-        predicted : (n_pairs, n_draws) array
-            ln f (Hz) of their modes.
-        noise : (n_draws,) array
-
-        Returns
-        -------
-        (n_pairs, n_draws) array
-        """
+        """The same of (n_pairs,) readings if each were of the mode whose (n_pairs, n_draws) ln f it is paired with."""
         if self.rounded.any():
             return np.ascontiguousarray(self.at(readings).log_likelihood(predicted.T, noise).T)
         scale = np.ascontiguousarray(_join(noise, self.own_sd).T)
@@ -150,16 +111,8 @@ class ReadingErrors:
         return np.asarray(self._density.log(z) - np.log(scale)[readings])
 
     def log_most(self, lowest: Floats, highest: Floats, least_noise: float, most_noise: float) -> Floats:
-        """The most that `log_likelihood_of_pairs` may be, or somewhat more, where it is known within ranges.
-
-        Parameters
-        ----------
-        lowest, highest : (n_modes,) array
-            ln f (Hz).
-
-        Returns
-        -------
-        (n_readings, n_modes) array
+        """The most that `log_likelihood_of_pairs` may be, or somewhat more, within ranges of ln f: (n_readings,
+        n_modes).
         """
         away = np.maximum(lowest - self.log_high[:, None], self.log_low[:, None] - highest)
         z = np.maximum(away, 0.0) / _join(most_noise, self.own_sd)[:, None]
@@ -169,27 +122,12 @@ class ReadingErrors:
         return np.asarray(result)
 
     def deviance_residuals(self, predicted: Floats, noise: ArrayLike) -> tuple[Floats, Floats]:
-        """Signed roots of the deviances, and how they change with the prediction.
+        """Signed roots of the deviances 2 (max ln p - ln p), and how they change with the prediction.
 
-        Their squares are 2 (max ln p - ln p): summed, twice the negative log likelihood but for a constant. For a
-        reading that is not rounded and has normal errors they are its standardised residuals.
-
-        Parameters
-        ----------
-        predicted : (n_modes,) or (n_draws, n_modes) array
-            ln f (Hz) of the model.
-        noise : float or (n_draws,) array
-
-        Returns
-        -------
-        residuals : (n_modes,) or (n_draws, n_modes) array
-            Positive where the reading lies above the prediction; for a rounded one, the middle of its interval.
-        slopes : array of the same shape
-            Derivatives by the predicted ln f: negative, and next to zero within an interval wider than the noise.
-
-        References
-        ----------
-        McCullagh and Nelder, Generalized Linear Models, 2nd ed., 1989, section 2.4.3.
+        The sum of their squares is twice the negative log likelihood but for a constant. They are positive where a
+        reading, or the middle of its interval, lies above the prediction; without rounding and with normal errors they
+        are standardised residuals. Slopes are negative, and next to zero within an interval wider than the noise.
+        (McCullagh and Nelder, Generalized Linear Models, 2nd ed., 1989, section 2.4.3.)
         """
         z, low, high, scale = self._standardised(predicted, noise)
         residuals, slopes = np.empty(z.shape), np.empty(z.shape)
@@ -199,18 +137,7 @@ class ReadingErrors:
         return residuals, -slopes / scale
 
     def simulate(self, predicted: Floats, noise: ArrayLike, rng: np.random.Generator) -> Floats:
-        """Readings that a model would give, rounded where the measured ones are.
-
-        Parameters
-        ----------
-        predicted : (n_draws, n_modes) array
-            ln f (Hz).
-        noise : float or (n_draws,) array
-
-        Returns
-        -------
-        (n_draws, n_modes) array, Hz
-        """
+        """Readings in Hz, (n_draws, n_modes), that a model would give, rounded where the measured ones are."""
         hertz = np.exp(predicted + _join(noise, self.own_sd) * self._density.draw(rng, predicted.shape))
         steps = self.resolution[self.rounded]
         whole = np.round(hertz[..., self.rounded] / steps)

@@ -27,19 +27,10 @@ _GRID = np.linspace(0.0, 1.0, 21)
 
 
 def residues_of(setup: Setup, modes: Modes, values: Values, shaped: Effect | None = None) -> NDArray[np.float64] | None:
-    """Residue of each mode over the square of its largest deflection: (n_modes,) array, -1 to 1.
+    """Residue of each mode over the square of its largest deflection, -1 to 1: (n_modes,) array.
 
-    Parameters
-    ----------
-    values : dict of float
-        The board's sizes.
-    shaped : Effect, optional
-        The effect that gives the plate its outline, where that is not the whole rectangle.
-
-    Returns
-    -------
-    array or None
-        None where the card does not state the hammer's place and that of one accelerometer.
+    None where the card does not state the hammer's place and that of one accelerometer. `shaped` is the effect that
+    gives the plate its outline, where that is not the whole rectangle.
     """
     if setup.hammer is None or setup.sensor is None:
         return None

@@ -39,13 +39,7 @@ class System:
         return "shear-flexible" if any(e.theory == "shear-flexible" for e in self.effects) else "thin"
 
     def plate(self, values: Values) -> Plate:
-        """The plate on the production mesh for these values.
-
-        Parameters
-        ----------
-        values : dict of float
-            D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
-        """
+        """The plate on the production mesh for these values."""
         is_sheared = self.theory == "shear-flexible"
         finest = max((effect.refines for effect in self.effects), default=1.0)
         per_side = SHEAR_ELEMENTS_PER_SIDE if is_sheared else round(ELEMENTS_PER_SIDE * finest)

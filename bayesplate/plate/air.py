@@ -33,28 +33,12 @@ _EDGE_SHARE = 0.25
 
 
 def air_mass(deflections: Deflections, aspect_ratio: float, is_baffled: bool, outline: Outline | None = None) -> Floats:
-    """Mass of the air on given deflections, both faces wet.
+    """Mass of the air on given deflections, both faces wet: (n_vectors, n_vectors) array.
 
-    Both methods are of second order in the panels, so two lattices are extrapolated to none.
-
-    Parameters
-    ----------
-    aspect_ratio : float
-        L_x / L_y, of the mean width.
-    is_baffled : bool
-        In a rigid wall, or in the open.
-    outline : Outline, optional
-        Where the plate ends, if not with the rectangle.
-
-    Returns
-    -------
-    (n_vectors, n_vectors) array
-        For a rectangle of unit area in air of unit density; it goes with the area to the power 3/2.
-
-    References
-    ----------
-    Korotkin, Added Masses of Ship Structures, 6.3, for the kernel 1/R; the limit of a strip of width b in the open is
-    pi rho b^2 / 4 per length.
+    For a rectangle of unit area and ratio L_x / L_y (of the mean width) in air of unit density; it goes with the area
+    to the power 3/2. Both methods are of second order in the panels, so two lattices are extrapolated to none.
+    (Korotkin, Added Masses of Ship Structures, 6.3, for the kernel 1/R; the limit of a strip of width b in the open is
+    pi rho b^2 / 4 per length.)
     """
     coarse, fine = (_on_lattice(deflections, aspect_ratio, is_baffled, outline, n) for n in (1.0, _REFINED))
     mass = fine + (fine - coarse) / (_REFINED**2 - 1.0)

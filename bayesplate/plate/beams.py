@@ -21,15 +21,10 @@ _N_ELEMENTS = 40
 
 @dataclass(frozen=True, eq=False)
 class BeamFunctions:
-    """The lowest modes of a side, lowest first, of unit mean square; rigid motions come first.
-
-    Attributes
-    ----------
-    coefficients : (n_functions, n_beams) array
-    """
+    """The lowest modes of a side, lowest first, of unit mean square; rigid motions come first."""
 
     side: Line
-    coefficients: Floats
+    coefficients: Floats  # (n_functions, n_beams)
 
     def at(self, points: Floats) -> Floats:
         """Values at points of [0, 1]: (n_points, n_beams) array."""

@@ -63,7 +63,6 @@ class SymmetryClass:
 
     @property
     def n_dof(self) -> int:
-        """Number of unknowns."""
         return self.n_on_plate + self.plate.n_beside
 
     @cached_property
@@ -197,19 +196,10 @@ class SymmetryClass:
         return found
 
     def on_span(self, pencils: Sequence[tuple[Any, Any]], weights: Weights, vectors: Floats) -> tuple[Floats, Floats]:
-        """Stiffness and mass of some draws on the span of vectors, with the terms that exist on deflections only.
+        """Stiffness and mass of n draws on the span of (n_dof, n_vectors) vectors: two (n, n_vectors, n_vectors)
+        arrays.
 
-        Parameters
-        ----------
-        pencils : sequence of n pairs of sparse arrays
-            As of `pencil`.
-        weights : Weights
-            (n, n_terms) and (n, n_masses) arrays.
-        vectors : (n_dof, n_vectors) array
-
-        Returns
-        -------
-        two (n, n_vectors, n_vectors) arrays
+        The pencils, as of `pencil`, are joined by the terms that exist on deflections only.
         """
         found = []
         for side, (terms, own) in enumerate(zip((self.plate.stiffness, self.plate.masses), weights, strict=True)):

@@ -54,13 +54,7 @@ class Elements:
 
 @dataclass(frozen=True, eq=False)
 class Forms:
-    """The terms of a plate on two sides.
-
-    Attributes
-    ----------
-    stiffness, masses : tuple of (Term, (n_x, n_y) array or None)
-        The plate's own terms first; the array weighs the Gauss points of a term over the plate.
-    """
+    """The terms of a plate on two sides, its own first; an (n_x, n_y) array weighs a term's Gauss points."""
 
     kinematics: Kinematics
     x: Line
@@ -87,7 +81,6 @@ class Forms:
 
     @property
     def n_beside(self) -> int:
-        """Number of coordinates beside the plate."""
         places = (term.n_beside for term, _ in (*self.stiffness, *self.masses) if isinstance(term, AtPlaces))
         return max(places, default=0)
 

@@ -32,21 +32,11 @@ _LAYER = (1 / 4, 1 / 16)
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """The functions of one side on [0, 1]; value and slope at node i are the unknowns 2 i and 2 i + 1.
+    """The functions of one side on [0, 1]; value and slope at node i are the unknowns 2 i and 2 i + 1."""
 
-    Attributes
-    ----------
-    ends : tuple of str
-        Condition at 0 and at 1: "clamped", "supported" or "free". They name the modes and tell the rigid motions.
-    held : tuple of str
-        What the functions themselves hold there: the same, or less where an effect has put springs in place of a clamp.
-    is_split : bool
-        Whether this is the first half alone.
-    """
-
-    ends: Ends
-    held: Holds
-    is_split: bool
+    ends: Ends  # of the board: they name the modes and tell the rigid motions
+    held: Holds  # what the functions hold: the same, or less where an effect has put springs in place of a clamp
+    is_split: bool  # the first half alone
     basis: Any
 
     @property
@@ -56,7 +46,7 @@ class Line:
 
     @property
     def n_functions(self) -> int:
-        """Number of functions, those that an end holds among them."""
+        """Those that an end holds among them."""
         return int(self.basis.N)
 
     @property
@@ -156,19 +146,12 @@ def rigid_degrees(ends: Ends) -> tuple[int, ...]:
 
 
 def graded_nodes(ends: Holds, n_elements: int) -> Floats:
-    """Equal elements, save that the one at each free end is split at a quarter and at a sixteenth of its length.
+    """Nodes of equal elements, save that the one at each free end is split at a quarter and at a sixteenth of its
+    length.
 
-    Along a free edge the twist of a shear-flexible plate dies out over about a third of the thickness times
-    sqrt(G_xy / G_xz): a layer too narrow for as many equal elements, whose frequencies lie up to 3 cents too high.
-
-    Parameters
-    ----------
-    n_elements : int
-        All elements, the split ones among them; too few to be split stay equal.
-
-    Returns
-    -------
-    (n_elements + 1,) array
+    Along a free edge the twist of a shear-flexible plate dies out over about a third of the thickness times sqrt(G_xy /
+    G_xz): a layer too narrow for as many equal elements, whose frequencies lie up to 3 cents too high. The split ones
+    count among all elements; too few to be split stay equal.
     """
     n_equal = n_elements - len(_LAYER) * ends.count("free")
     if n_equal < 3:
@@ -188,21 +171,9 @@ def line(
 ) -> Line:
     """The functions of one side; the result is shared, so it must not be changed.
 
-    Parameters
-    ----------
-    ends : tuple of str
-        Condition at 0 and at 1.
-    n_elements : int
-        Number of elements of the whole side.
-    is_sheared : bool
-        A side of a shear-flexible plate, whose elements are graded towards free ends.
-    is_split : bool
-        Whether the first half will do where both ends are alike; not so if something else on the plate tells the two
-        halves apart, or if an element lies across the middle.
-    held : tuple of str, optional
-        What the ends hold where that is less than `ends` says.
-    n_points : int
-        Gauss points per element.
+    `is_sheared`: of a shear-flexible plate, graded towards free ends. `is_split`: the first half will do where both
+    ends are alike; not so if something else on the plate tells the halves apart, or an element lies across the middle.
+    `held`: what the ends hold where that is less than `ends` says.
     """
     from skfem import Basis, ElementLineHermite, MeshLine
 

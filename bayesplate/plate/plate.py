@@ -39,14 +39,9 @@ class Plate(Forms):
 
 
 def plate_of(kinematics: Kinematics, x: Line, y: Line, fabric: Fabric = UNIFORM) -> Plate:
-    """A plate on two sides, with its own terms alone.
+    """A plate on two sides, with its own terms alone, as often as `layout` has fields for them.
 
-    Parameters
-    ----------
-    x, y : Line
-        Whole along a side along which the halves differ.
-    fabric : Fabric
-        Varying properties repeat the plate's own terms in the order of `bayesplate.plate.fields.layout`.
+    A line is whole along a side along which the halves differ.
     """
     groups = kinematics.groups(fabric.is_turned)
     weights = fabric.weights({*groups[0], *groups[1]}, x, y)

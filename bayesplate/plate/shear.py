@@ -76,27 +76,12 @@ SHEAR_FLEXIBLE = Kinematics(
 
 @lru_cache(maxsize=16)
 def shear_flexible_plate(ends_x: Ends, ends_y: Ends, n_x: int, n_y: int) -> Plate:
-    """The bare shear-flexible plate; the result is shared, so it must not be changed.
+    """The bare shear-flexible plate, its terms as `SHEAR_TERMS` and `SHEAR_MASSES`; shared, so it must not be changed.
 
     A free edge holds nothing. A supported one (a hard support) holds the deflection and the turning along the edge. A
     clamped one holds the turning across it as well, w_n = g_n: the deflection meets the clamp at the angle of the shear
-    strain.
-
-    Parameters
-    ----------
-    ends_x, ends_y : tuple of str
-        Condition at the two ends of each side: (x0, x1) and (y0, y1).
-    n_x, n_y : int
-        Numbers of elements along x and y, graded towards free edges.
-
-    Returns
-    -------
-    Plate
-        Stiffness terms in the order of `SHEAR_TERMS`, mass terms in that of `SHEAR_MASSES`.
-
-    References
-    ----------
-    Reissner (1945) and Mindlin (1951); the shear strains as unknowns in place of the turning: Endo and Kimura (2007).
+    strain. Reissner (1945) and Mindlin (1951); the shear strains as unknowns in place of the turning: Endo and Kimura
+    (2007).
     """
     x, y = (line(ends, n, is_sheared=True) for ends, n in ((ends_x, n_x), (ends_y, n_y)))
     return plate_of(SHEAR_FLEXIBLE, x, y)

@@ -28,7 +28,6 @@ class Weights(NamedTuple):
     mass: Floats
 
     def at(self, draw: int) -> Weights:
-        """The weights of one draw."""
         return Weights(self.stiffness[draw], self.mass[draw])
 
 
@@ -56,24 +55,13 @@ Pair = tuple[str, str]
 
 
 class Kinematics(NamedTuple):
-    """How a plate deforms.
+    """How a plate deforms."""
 
-    Attributes
-    ----------
-    fields : tuple of str
-        What is unknown: the deflection "w", then the shear strains if there are any.
-    strains : mapping
-        By name; "turn_x" and "turn_y" are how the cross-sections turn.
-    stiffnesses, masses : tuple of Pair
-        Of each of the plate's own terms, those that a turned grain adds last.
-    groups : callable
-        From whether the grain runs at an angle to the group of each of the plate's own stiffness and mass terms.
-    """
-
-    fields: tuple[str, ...]
-    strains: Mapping[str, Strain]
-    stiffnesses: tuple[Pair, ...]
+    fields: tuple[str, ...]  # unknowns: the deflection "w", then the shear strains if there are any
+    strains: Mapping[str, Strain]  # "turn_x" and "turn_y" are how the cross-sections turn
+    stiffnesses: tuple[Pair, ...]  # of the plate's own terms, those that a turned grain adds last
     masses: tuple[Pair, ...]
+    # from whether the grain runs at an angle to the group of each of the plate's own terms
     groups: Callable[[bool], tuple[tuple[Group, ...], tuple[Group, ...]]]
 
 
@@ -120,15 +108,9 @@ class AtPlaces:
 
 @dataclass(frozen=True)
 class OnDeflections:
-    """Terms that exist on given deflections only, for they reach all over the plate.
+    """Terms that exist on given deflections only, for they reach all over the plate."""
 
-    Attributes
-    ----------
-    project : callable
-        From `Deflections` to the terms' (n_terms, n_vectors, n_vectors) matrices.
-    """
-
-    project: Callable[[Deflections], Floats]
+    project: Callable[[Deflections], Floats]  # to (n_terms, n_vectors, n_vectors) matrices
     n_terms: int = 1
 
 
@@ -137,17 +119,12 @@ Term = OverPlate | AlongEdges | AtPlaces | OnDeflections
 
 @dataclass(frozen=True, eq=False)
 class Deflections:
-    """Deflections of one symmetry class as functions on the plate.
-
-    Attributes
-    ----------
-    coefficients : (n_vectors, n_functions_x, n_functions_y) array
-    """
+    """Deflections of one symmetry class as functions on the plate."""
 
     x: Line
     y: Line
     parity: Parity
-    coefficients: Floats
+    coefficients: Floats  # (n_vectors, n_functions_x, n_functions_y)
 
     def on(self, x: Floats, y: Floats) -> Floats:
         """On a lattice, x and y fractions of the sides: (n_vectors, n_x, n_y) array."""

@@ -55,22 +55,8 @@ THIN = Kinematics(
 
 @lru_cache(maxsize=16)
 def thin_plate(ends_x: Ends, ends_y: Ends, n_x: int, n_y: int) -> Plate:
-    """The bare thin plate; the result is shared, so it must not be changed.
+    """The bare thin plate, its terms as `THIN_TERMS`; the result is shared, so it must not be changed.
 
-    Parameters
-    ----------
-    ends_x, ends_y : tuple of str
-        Condition at the two ends of each side: (x0, x1) and (y0, y1).
-    n_x, n_y : int
-        Numbers of elements along x and y.
-
-    Returns
-    -------
-    Plate
-        Stiffness terms in the order of `THIN_TERMS`.
-
-    References
-    ----------
     Ducceschi et al., eq. (1) and (2), as energies.
     """
     return plate_of(THIN, line(ends_x, n_x), line(ends_y, n_y))

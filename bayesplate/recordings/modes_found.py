@@ -43,33 +43,17 @@ _BROADEST = 0.06
 
 @dataclass(frozen=True, eq=False)
 class Mode:
-    """A mode that was found.
-
-    Attributes
-    ----------
-    frequency, decay : float, Hz
-        The decay rate is half the width of the peak at half its power: damping ratio times frequency.
-    noise, scatter, window : (2,) array, Hz
-        Standard deviations of both: by what each record leaves after the fit, for what hits, places and files scatter
-        beyond it, and for the choice of lines.
-    residues : (n_records,) complex array
-        In units of the spectra.
-    residue_sd : (n_records,) array
-    expected : float
-        How many modes noise alone would show as clearly, in all the band.
-    seen : float
-        Share of the widths of windows in which it was found.
-    """
+    """A mode that was found."""
 
     frequency: float
-    decay: float
-    noise: Floats
-    scatter: Floats
-    window: Floats
-    residues: Complex
+    decay: float  # Hz, half the width of the peak at half its power: damping ratio times frequency
+    noise: Floats  # (2,), Hz: standard deviations of frequency and decay, by what each record leaves after the fit
+    scatter: Floats  # the same for what hits, places and files scatter beyond it
+    window: Floats  # the same for the choice of lines
+    residues: Complex  # (n_records,), in units of the spectra
     residue_sd: Floats
-    expected: float
-    seen: float
+    expected: float  # how many modes noise alone would show as clearly, in all the band
+    seen: float  # share of the widths of windows in which it was found
 
     @property
     def pole(self) -> Floats:
@@ -78,7 +62,7 @@ class Mode:
 
     @property
     def damping(self) -> float:
-        """Damping ratio, 1."""
+        """Damping ratio."""
         return self.decay / self.frequency
 
 
@@ -127,19 +111,9 @@ def joined(by_width: list[Floats], spacing: float) -> Floats:
 
 
 def fit_modes(spectra: Spectra, start: Floats, by_width: list[Floats], lowest: float, highest: float) -> list[Mode]:
-    """Fit modes to all records at once, each in its window, and leave out those that noise alone would give.
+    """Fit modes, from (n_modes, 2) starts in Hz, to all records at once, each in its window; in the order of frequency.
 
-    Parameters
-    ----------
-    start : (n_modes, 2) array, Hz
-        Frequencies and decay rates to begin with.
-    by_width : list of (n_modes, 2) array, Hz
-        What windows of each width have shown.
-
-    Returns
-    -------
-    list of Mode
-        Between two frequencies, in their order.
+    Those that noise alone would give are left out; `by_width` is what windows of each width have shown.
     """
     n_lines = int(np.sum((spectra.frequency >= lowest) & (spectra.frequency < highest)))
     parts = _parts(spectra, lowest, highest, WIDTHS[0])

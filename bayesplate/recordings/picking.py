@@ -30,28 +30,16 @@ _SAME = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Picked:
-    """What was picked from recordings.
+    """What was picked from recordings."""
 
-    Attributes
-    ----------
-    peaks : tuple of PickedRow
-        In the order of frequency, without signs and labels, those that are likely no mode included.
-    answers : tuple of Answer
-        Of each peak.
-    paths : tuple of Path
-        Of the search, for the diagram of stability.
-    lowest, highest : float, Hz
-    remarks : tuple of str
-        How recordings differ that do not show quite the same modes.
-    """
-
+    # in the order of frequency, without signs and labels, those that are likely no mode included
     peaks: tuple[PickedRow, ...]
     answers: tuple[Answer, ...]
     spectra: Spectra
-    paths: tuple[Path, ...]
+    paths: tuple[Path, ...]  # of the search, for the diagram of stability
     lowest: float
     highest: float
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # how recordings differ that do not show quite the same modes
 
     @property
     def likely(self) -> tuple[PickedRow, ...]:

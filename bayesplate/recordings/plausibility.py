@@ -203,9 +203,7 @@ def broad_odds(damping: Floats, strengths: Floats) -> Floats:
 
 def weighted_median(values: Floats, weights: Floats) -> float:
     """The value with half of the weight on either side."""
-    order = np.argsort(values)
-    total = np.cumsum(weights[order] + 1e-12)
-    return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
+    return float(np.quantile(values, 0.5, weights=weights + 1e-12, method="inverted_cdf"))
 
 
 def _unlike(alike: float, n_places: int, spare: int) -> float:

@@ -73,13 +73,8 @@ def straightened(picture: Floats) -> Floats:
 def sand_evidence(forms: Floats, shapes: Floats) -> Floats:
     """ln of how much a picture speaks for each shape, zero for the average of all: (n_modes,) array.
 
-    Parameters
-    ----------
-    forms : (n_forms, n_points) array
-        As of `straightened`, of the board from above, x from left to right and y from bottom to top; sand lighter or
-        darker than the board.
-    shapes : (n_modes, n_x, n_y) array
-        Deflections at evenly spaced points of the whole board, edges included.
+    The forms of `straightened` show the board from above, x from left to right and y from bottom to top; the shapes,
+    (n_modes, n_x, n_y), are deflections at evenly spaced points of the whole board, edges included.
     """
     scores = agreement(forms, shapes)
     log_likelihood = -0.5 * _N_CELLS * np.log(1.0 - np.clip(scores, 0.0, 0.999) ** 2)

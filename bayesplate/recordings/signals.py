@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ Place = tuple[float, float]
 """m, from the corner of the edges x0 and y0."""
 
 Motion = Literal["acceleration", "velocity", "displacement", "pressure"]
-MOTIONS: tuple[Motion, ...] = ("acceleration", "velocity", "displacement", "pressure")
+MOTIONS: tuple[Motion, ...] = get_args(Motion)
 
 
 @dataclass(frozen=True, eq=False)

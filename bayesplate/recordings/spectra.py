@@ -26,32 +26,17 @@ _MEDIAN = np.sqrt(6.0 * np.log(2.0))
 
 @dataclass(frozen=True, eq=False)
 class Spectra:
-    """Spectra of decays, or frequency responses, on one grid.
+    """Spectra of decays, or frequency responses, on one grid."""
 
-    Attributes
-    ----------
-    frequency : (n_lines,) array, Hz
-    values : (n_lines, n_records) complex array
-        From the moment on at which the board rings by itself, without a taper.
-    force : (n_lines, n_records) complex array or None
-        Spectrum of each hit's force from the same origin of time; one for frequency responses.
-    files, places : (n_records,) array of int
-        Which records are hits of one file, and which were taken between the same two places.
-    between : tuple of (Place or None, Place or None)
-        Hammer and sensor of each of `places`.
-    duration : float, s
-        Of each decay.
-    """
-
-    frequency: Floats
-    values: Complex
-    force: Complex | None
+    frequency: Floats  # (n_lines,), Hz
+    values: Complex  # (n_lines, n_records): from where the board rings by itself, without a taper
+    force: Complex | None  # (n_lines, n_records): of each hit from the same origin of time; 1 for frequency responses
     names: tuple[str, ...]
-    files: Rows
-    places: Rows
-    between: tuple[Between, ...]
+    files: Rows  # (n_records,): which records are hits of one file
+    places: Rows  # (n_records,): which were taken between the same two places
+    between: tuple[Between, ...]  # of each of `places`
     motion: Motion
-    duration: float
+    duration: float  # s, of each decay
 
     @property
     def spacing(self) -> float:

@@ -33,21 +33,14 @@ _SIGNED, _MOST_COMPLEX = 3.0, 60.0
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """How a mode answers.
+    """How a mode answers."""
 
-    Attributes
-    ----------
-    mobility : (n_places,) complex array
-        Residue of the mobility between each pair of places, in the units of the recordings; for a simple mode it is
-        real. Without a force it is known but for a factor for each place.
-    sd : (n_places,) array
-    alike : float
-        Share of the residues' power that is the same for every hit between the same places, 0 to 1; 1 where no two
-        records are of the same places.
-    """
-
+    # (n_places,): residue between each pair of places, in the units of the recordings; real for a simple mode, known
+    # but for a factor for each place without a force
     mobility: Complex
     sd: Floats
+    # share of the residues' power, 0 to 1, that is the same for every hit between the same places; 1 where there is one
+    # each
     alike: float
 
     @property

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from bayesplate.errors import Fault, InputError
-from bayesplate.recordings.axes import rate_of
 from bayesplate.recordings.signals import FrequencyResponse, Motion, Read, Recording
+from bayesplate.recordings.tables import rate_of
 
 _TIME, _RESPONSE = 1, 4
 """Kinds of function: a time response, a frequency response."""

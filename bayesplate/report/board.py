@@ -30,7 +30,8 @@ _N_POINTS = 201
 _BENT = 0.12
 """Height at which the largest rise is drawn, as a share of the shorter side."""
 _LINES = {"clamped": ("-", 1.6), "supported": ((0, (4, 3)), 1.6), "free": ("-", 0.9)}
-_MARKERS = {"accelerometer": "s", "exciter": "D", "shaker": "D", "weight": "p"}
+_MARKERS = {"accelerometer": "s", "exciter": "D", "shaker": "D", "weight": "p", "hammer": "X"}
+_MARK: Any = {"ls": "none", "ms": 7, "mec": "black", "mew": 0.8, "clip_on": False, "zorder": 6}
 
 
 def board_picture(board: Board) -> Picture:
@@ -67,11 +68,14 @@ def board_picture(board: Board) -> Picture:
             handles=list(handles.values()), loc="lower center", ncols=3, frameon=False, fontsize=SMALL,
             handletextpad=0.4,
         )  # fmt: skip
-    caption = " ".join([_SEEN, *([] if board.isotropic else [_GRAIN]), _EDGES])
-    if not all(one.is_rectangle for one in outlines):
-        caption = f"{caption} {_OUTLINE}"
-    if _is_warped(board):
-        caption = f"{caption} {_WARP}"
+    said = {
+        _SEEN: True,
+        _GRAIN: not board.isotropic,
+        _EDGES: True,
+        _OUTLINE: not all(one.is_rectangle for one in outlines),
+        _WARP: _is_warped(board),
+    }
+    caption = " ".join(text for text, holds in said.items() if holds)
     return Picture("board", "The board, drawn to scale", _alt(board, values, outlines), caption, figure)
 
 
@@ -82,8 +86,6 @@ _OUTLINE = (
     "The outline is what the readings of the width make probable. Which edge recedes they do not say: where both are "
     "free, both are drawn to recede alike."
 )
-
-
 _WARP = (
     "Dashed: how far the board is from flat where a straightedge lies along it and across it, drawn larger than it is; "
     "a filled corner lifts off the table."
@@ -92,12 +94,7 @@ _WARP = (
 
 @dataclass(frozen=True, eq=False)
 class _Outline:
-    """Where a whole board begins and ends along y at points along it, clamped parts included.
-
-    Attributes
-    ----------
-    x, low, high : (n,) array, m
-    """
+    """Where a whole board begins and ends along y, m, at points along it, clamped parts included."""
 
     x: Floats
     low: Floats
@@ -215,17 +212,17 @@ def _dimension(panel: Axes, start: tuple[float, float], end: tuple[float, float]
 def _draw_items(panel: Axes, setup: Setup, outline: _Outline) -> dict[str, Any]:
     """Hammer and attached items at their places from the corner of x0 and y0; a handle for the legend by name."""
     corner = outline.low[0]
-    style: Any = {"ls": "none", "ms": 7, "mec": "black", "mew": 0.8, "clip_on": False, "zorder": 6}
-    handles: dict[str, Any] = {}
-    for kind in dict.fromkeys(item.kind for item in setup.attached):
-        places = [(x, y + corner) for item in setup.attached if item.kind == kind for x, y in item.places]
-        if not places:
-            continue
-        handles[kind] = _points(panel, places, _MARKERS[kind], kind, mfc=VERMILLION, **style)
+    places: dict[str, list[tuple[float, float]]] = {}
+    for item in setup.attached:
+        places.setdefault(item.kind, []).extend(item.places)
     if setup.hammer is not None:
-        handles["hammer"] = _points(
-            panel, [(setup.hammer[0], setup.hammer[1] + corner)], "X", "hammer", mfc="white", **style
-        )
+        places["hammer"] = [setup.hammer]
+    handles: dict[str, Any] = {}
+    for kind, at in places.items():
+        if at:
+            x, y = np.transpose(at)
+            face = "white" if kind == "hammer" else VERMILLION
+            handles[kind] = panel.plot(x, y + corner, marker=_MARKERS[kind], label=kind, mfc=face, **_MARK)[0]
     return handles
 
 
@@ -252,14 +249,9 @@ def _draw_warp(panel: Axes, board: Board, length: float, width: float) -> dict[s
                 handles[name] = panel.plot(*lines[name], color=VERMILLION, lw=1.3, ls=style, label=told, zorder=5)[0]
     if "twist" in rises:
         told = f"twist {rises['twist'] * 1e3:.3g} mm"
-        marker: Any = {"ls": "none", "ms": 8, "mec": "black", "mew": 0.8, "clip_on": False, "zorder": 6}
-        handles["twist"] = _points(panel, [(length, width)], "^", told, mfc=VERMILLION, **marker)
+        marker = {**_MARK, "ms": 8, "marker": "^", "mfc": VERMILLION}
+        handles["twist"] = panel.plot([length], [width], label=told, **marker)[0]
     return handles
-
-
-def _points(panel: Axes, places: Sequence[tuple[float, float]], marker: str, label: str, **style: Any) -> Any:
-    x, y = zip(*places, strict=True)
-    return panel.plot(x, y, marker=marker, label=label, **style)[0]
 
 
 def _along(board: Board) -> str:

@@ -165,30 +165,11 @@ def every_picture(summary: CampaignSummary, diagnosis: CampaignDiagnosis | None 
     }
 
 
-def pooled_rms_cents(summary: CampaignSummary) -> float:
-    """Error of all labelled modes of all boards, cents."""
-    residuals = [mode.residual_cents for one in summary.boards.values() for mode in one.modes]
-    return float(np.sqrt(np.mean(np.square(residuals))))
-
-
 @drawing()
 def write_campaign_report(
     folder: Path, title: str, summary: CampaignSummary, diagnosis: CampaignDiagnosis | None = None
 ) -> Path:
-    """Write the page and its figures as PNG and SVG.
-
-    Parameters
-    ----------
-    folder : Path
-        Made if it is not there.
-    title : str
-        Of the campaign; any text.
-
-    Returns
-    -------
-    Path
-        Of report.html.
-    """
+    """Write the page and its figures as PNG and SVG into a folder, which is made; returns the path of report.html."""
     shared = summary.shared
     return save_page(
         folder / PAGE,
@@ -224,7 +205,9 @@ def sentences(summary: CampaignSummary, diagnosis: CampaignDiagnosis | None = No
         )
         if one.scatter is not None:
             told.append(f"The boards' own differ from it by {plus_minus(one.scatter, 100.0)} %.")
-    told.append(f"The fitted boards miss their labelled modes by {pooled_rms_cents(summary):.1f} cents in all.")
+    residuals = [mode.residual_cents for one in summary.boards.values() for mode in one.modes]
+    pooled = np.sqrt(np.mean(np.square(residuals)))
+    told.append(f"The fitted boards miss their labelled modes by {pooled:.1f} cents in all.")
     if diagnosis is not None and diagnosis.recommendation:
         told.append(f"What to do next: {diagnosis.recommendation}.")
     return tuple(told)

@@ -45,15 +45,7 @@ class Layout:
 
 
 def layout(n_modes: int, aspect_ratio: float, *, has_combined: bool) -> Layout:
-    """The division of the page that makes the panels largest.
-
-    Parameters
-    ----------
-    aspect_ratio : float
-        Length of a board over its width.
-    has_combined : bool
-        Whether a row of combined modes comes last.
-    """
+    """The division of the page that makes the panels largest; `aspect_ratio` is length over width."""
     width = A4[0] - 2 * _MARGIN
     height = A4[1] - _HEAD - _FOOT - (_BETWEEN if has_combined else 0.0)
     found = []
@@ -67,35 +59,16 @@ def layout(n_modes: int, aspect_ratio: float, *, has_combined: bool) -> Layout:
 
 @dataclass(frozen=True)
 class Marks:
-    """What is marked on every figure of a sheet, as fractions of the length that vibrates and of the width there.
-
-    Attributes
-    ----------
-    sensor, hammer : (float, float)
-    taps : tuple of (float, float)
-    heading : str
-        In place of the sheet's own.
-    """
+    """What is marked on every figure of a sheet, as fractions of the length that vibrates and of the width there."""
 
     sensor: tuple[float, float]
     hammer: tuple[float, float]
     taps: tuple[tuple[float, float], ...]
-    heading: str
+    heading: str  # in place of the sheet's own
 
 
 def chladni_sheet(sheet: Sheet, marks: Marks | None = None) -> Figure:
-    """Draw a sheet.
-
-    Parameters
-    ----------
-    marks : Marks, optional
-        Where sensor and hammer go.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        A4 upright, one panel a mode in the order of frequency, then the combined modes; no state of pyplot is touched.
-    """
+    """A sheet, A4 upright: one panel a mode in the order of frequency, then the combined modes."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=A4)

@@ -37,18 +37,7 @@ if TYPE_CHECKING:
 
 
 def constants_figure(summary: Summary, moduli: Mapping[str, NDArray[np.float64]]) -> Figure:
-    """Posterior of E_x, E_y and G_xy side by side, with the point estimates that people know.
-
-    Parameters
-    ----------
-    moduli : dict of array, Pa
-        Draws of each modulus.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Three panels, GPa; no state of pyplot is touched.
-    """
+    """Posterior of E_x, E_y and G_xy side by side, from draws in Pa, with the point estimates that people know."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 3.4), layout="constrained")
@@ -63,7 +52,7 @@ def constants_figure(summary: Summary, moduli: Mapping[str, NDArray[np.float64]]
 
 
 def constants_picture(summary: Summary, moduli: Mapping[str, NDArray[np.float64]]) -> Picture:
-    """The same below each other, for a page; parameters as of `constants_figure`."""
+    """The same below each other, for a page."""
     figure, panels = stacked([0.95] * 3, left=0.2, right=0.2, top=0.3, bottom=0.95, gap=0.72)
     for panel, name in zip(panels, MODULI, strict=True):
         _draw_posterior(panel, name, summary, moduli[name])
@@ -88,7 +77,8 @@ def _draw_posterior(panel: Axes, name: str, summary: Summary, moduli: NDArray[np
     """One constant: its draws, its 90 % interval, and the estimates of the older methods."""
     draws = np.asarray(moduli).ravel() * GPA
     entry = summary.elastic[name]
-    paper, weighted = (_point(one[name]) for one in (summary.least_squares, summary.weighted_least_squares))
+    estimates = (summary.least_squares[name], summary.weighted_least_squares[name])
+    paper, weighted = (None if value is None else value * GPA for value in estimates)
     band = _band(summary.percentile, name)
     ends = limits(draws, [value for value in (paper, weighted, *(band or ())) if value is not None])
     hump(panel, draws, ends)
@@ -115,10 +105,6 @@ def _mark(panel: Axes, at: float | None, ends: tuple[float, float], label: str, 
     is_low = at < ends[0]
     panel.plot([], [], label=label, **style)
     panel.plot([ends[not is_low]], [0.5], marker="<" if is_low else ">", color=style["color"], ms=7, clip_on=False)
-
-
-def _point(value: float | None) -> float | None:
-    return None if value is None else value * GPA
 
 
 def _band(percentile: Percentile | None, name: str) -> tuple[float, float] | None:

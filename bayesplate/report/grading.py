@@ -250,17 +250,7 @@ _TABLES = ("constants", "makers", "limits", "pairs", "doubts")
 
 @drawing()
 def write_grading_page(folder: Path, graded: Grading, summary: BatchSummary, *, has_pages: bool) -> Path:
-    """Write the page and its figures as PNG and SVG.
-
-    Parameters
-    ----------
-    folder : Path
-        Must be there.
-    summary : BatchSummary
-        Of the same boards.
-    has_pages : bool
-        Whether each board has a page of its own in boards/NAME.
-    """
+    """Write the page and its figures as PNG and SVG; `has_pages`: each board has a page of its own in boards/NAME."""
     tables: dict[str, Table | None] = {**dict.fromkeys(_TABLES), **grading_tables(graded)}
     pages = [(marked(graded, i), f"boards/{graded.names[i]}/{PAGE}") for i in best_first(graded)[:MOST_LISTED]]
     return save_page(

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from bayesplate.board.board import Values, vibrating_lengths
 from bayesplate.estimates.identifiability import Identifiability
-from bayesplate.estimates.shapes import N_POINTS, labelled_shapes
-from bayesplate.estimates.sheet import points
+from bayesplate.estimates.sheet import N_POINTS, labelled_shapes, points
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.posterior.draws import Draws, posterior_mean_values
@@ -137,13 +136,7 @@ def residuals_picture(summary: Summary) -> Picture:
 
 
 def predictive_picture(summary: Summary, predictive: NDArray[np.float64]) -> Picture:
-    """What the model expects to be read, beside what was read.
-
-    Parameters
-    ----------
-    predictive : (..., n_modes) array, Hz
-        Draws of the next reading.
-    """
+    """What the model expects to be read, (..., n_modes) draws of the next reading in Hz, beside what was read."""
     modes = summary.modes
     measured = np.array([mode.measured_hz for mode in modes])
     draws = cents(np.log(np.maximum(predictive.reshape(-1, len(modes)), 1e-9) / measured))

@@ -63,21 +63,10 @@ def write_report(
     summary: Summary,
     diagnosis: Diagnosis | None = None,
 ) -> Path:
-    """Write report.html, its figures as PNG and SVG, and the tables for other programs.
+    """Write report.html, its figures as PNG and SVG, and the tables for other programs; returns the path of the page.
 
-    Parameters
-    ----------
-    folder : Path
-        Made if it is not there; what it holds of an earlier report is replaced.
-    inference : Inference
-        Of a run that has converged.
-    diagnosis : Diagnosis, optional
-        Then `inference`, `draws` and `summary` are those of the refitted model.
-
-    Returns
-    -------
-    Path
-        Of report.html. It shows the SVG figures, and is there before the PNG files are.
+    What the folder holds of an earlier report is replaced. With a diagnosis, `inference`, `draws` and `summary` are
+    those of the refitted model.
     """
     title = inference.problem.board.title or summary.name
     make_folder(folder)
@@ -91,19 +80,10 @@ def write_report(
 def save_page(
     path: Path, groups: Mapping[str, Sequence[Picture]], text: Callable[[Mapping[str, Sequence[PagePicture]]], str]
 ) -> Path:
-    """Write a page and, into the folder beside it, its figures as PNG and SVG.
+    """Write a page and, into the folder beside it, its figures as PNG and SVG; pictures go by the place where they
+    stand.
 
-    Parameters
-    ----------
-    groups : dict of sequence of Picture
-        By the place where they stand.
-    text : callable
-        The page, given its pictures by their place.
-
-    Returns
-    -------
-    Path
-        Of the page. It shows the SVG figures, and is there before the PNG files are.
+    The page shows the SVG figures, and is there before the PNG files are.
     """
     make_folder(path.parent / FIGURES)
     every = [one for found in groups.values() for one in found]
@@ -163,7 +143,7 @@ def fit_page(
     shown: Mapping[str, Sequence[PagePicture]],
     diagnosis: Diagnosis | None = None,
 ) -> str:
-    """The page as text; parameters as of `write_report`, `shown` the pictures by their place."""
+    """The page as text, with its pictures by their place."""
     problem = inference.problem
     board, prior = problem.board, problem.prior
     return from_template(

@@ -63,11 +63,8 @@ class FitPlots(Plots):
     def corner(self, names: Sequence[str] = MODULI) -> Figure:
         """Every pair of quantities, by the package corner; least squares marked where there is one.
 
-        Parameters
-        ----------
-        names : sequence of str
-            One or more, each once, of moduli, rigidities and uncertain inputs; moduli are drawn in GPa, inputs in the
-            units of cards.
+        The names, each once, are of moduli, rigidities and uncertain inputs; moduli are drawn in GPa, inputs in the
+        units of cards.
         """
         known = {**self.draws.moduli, **self.draws.rigidities, **self.draws.inputs}
         if isinstance(names, str) or not len(names) or len(set(names)) < len(names):

@@ -43,22 +43,12 @@ NO_GLYPH = "\N{REPLACEMENT CHARACTER}"
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A figure of the report.
+    """A figure of the report."""
 
-    Attributes
-    ----------
-    name : str
-        Stem of its files.
-    alt : str
-        What a person who cannot see it should know.
-    caption : str
-        How to read it.
-    """
-
-    name: str
+    name: str  # stem of its files
     title: str
-    alt: str
-    caption: str
+    alt: str  # what a person who cannot see it should know
+    caption: str  # how to read it
     figure: Figure = field(repr=False)
 
 
@@ -87,17 +77,8 @@ def stacked(
     bottom: float = 0.45,
     gap: float = 0.55,
 ) -> tuple[Figure, list[Axes]]:
-    """An empty figure with panels below each other; everything in inches, so that no layout need be searched for.
-
-    Parameters
-    ----------
-    left, right, top, bottom, gap : float
-        Margins of the page, and the space between two panels.
-
-    Returns
-    -------
-    figure : matplotlib.figure.Figure
-        No state of pyplot is touched.
+    """An empty figure with panels below each other, the first on top; all in inches, so that no layout need be searched
+    for.
     """
     from matplotlib.figure import Figure
 
@@ -134,17 +115,9 @@ def heading(panel: Axes, words: str) -> None:
 
 
 def limits(draws: Floats, others: Iterable[float] = (), *, reach: float = 1.5, margin: float = 0.04) -> Limits:
-    """The range of a panel: nearly all draws, and of other values those that are not too far from them.
+    """The range of a panel: nearly all draws, and of other values those that are not farther off than `reach` widths.
 
-    Parameters
-    ----------
-    draws : array
-    others : iterable of float
-        Estimates that should be seen too.
-    reach : float
-        How far from the draws they may be, in widths of theirs.
-    margin : float
-        At either side, as a share of what is shown.
+    `margin` is air at either side, as a share of what is shown.
     """
     low, high = np.quantile(draws, _SHOWN)
     far = reach * (high - low)

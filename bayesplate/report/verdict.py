@@ -33,29 +33,16 @@ from bayesplate.results.tables import Table
 
 @dataclass(frozen=True)
 class DiagnosisSection:
-    """Everything that the page shows of a diagnosis besides its pictures.
-
-    Attributes
-    ----------
-    verdicts : tuple of (str, str, bool)
-        Each word that a verdict may be, what it means, and whether it is the one given.
-    known : str
-        What known effects do to the error, and what is claimed of those that the card states; empty if there are none.
-    tables : tuple of Table
-        Known effects, probabilities, errors, conditions of the claim, shift of the constants, sizes.
-    explained : tuple of str
-        What two words of these tables mean.
-    model : str
-        Which model the rest of the page is of.
-    """
+    """Everything that the page shows of a diagnosis besides its pictures."""
 
     heading: str
+    # each word that a verdict may be, what it means, and whether it is the one given
     verdicts: tuple[tuple[str, str, bool], ...]
     sentences: tuple[str, ...]
-    known: str
-    tables: tuple[Table, ...]
-    explained: tuple[str, ...]
-    model: str
+    known: str  # what known effects do to the error, and what is claimed of those that the card states
+    tables: tuple[Table, ...]  # of probabilities, errors, conditions of the claim, shift of the constants, sizes
+    explained: tuple[str, ...]  # what two words of these tables mean
+    model: str  # which model the rest of the page is of
     notes: tuple[str, ...]
     known_effects: Table | None
     candidates: Table | None
@@ -96,8 +83,8 @@ def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
 def quoted(summary: Summary, diagnosis: Diagnosis | None) -> Summary:
     """A summary with the constants that are to be quoted, and the errors of the fit that they stand for.
 
-    Without a diagnosis it stays as it is; after one the constants are the averaged ones, and the errors those of the
-    first fit unless one model was named, be it in part.
+    After a diagnosis the constants are the averaged ones, and the errors those of the first fit unless one model was
+    named, be it in part.
     """
     if diagnosis is None:
         return summary

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from paper_rows import paper_coefficients
 
 from bayesplate.errors import NotIdentifiableError
-from bayesplate.frequencies.terms import paper_coefficients
 from bayesplate.plate import training
 from bayesplate.plate.naming import find
 from bayesplate.plate.thin import thin_plate
