@@ -28,6 +28,5 @@ class DensityGradient(GradientAlongX):
     )
 
     def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
-        """Inertia that grows along x."""
         inertia = growing_along_x(self.part, lambda values: self.value(values, "gradient"))
         return dict.fromkeys(("mass", "rotary"), inertia)

@@ -37,22 +37,12 @@ _HELD = 1e-6
 
 @dataclass(frozen=True)
 class FieldProfile:
-    """A profile 1 + d(x, y), with no mean of d over the board: what is expected, and what is open.
-
-    Attributes
-    ----------
-    with_mean : Surface or None
-        What d gains where the board's mean is one of its standard deviations higher; None: nothing.
-    components : tuple of Surface
-        What it gains where a parameter of standard normal prior is one.
-    mean, mean_sd : float
-        Of the mean over the board, SI.
-    """
+    """A profile 1 + d(x, y), with no mean of d over the board: what is expected, and what is open."""
 
     expected: Surface
-    with_mean: Surface | None
-    components: tuple[Surface, ...]
-    mean: float
+    with_mean: Surface | None  # what d gains where the board's mean is one of its standard deviations higher
+    components: tuple[Surface, ...]  # what d gains where a parameter of standard normal prior is one
+    mean: float  # over the board, SI
     mean_sd: float
 
     @property
@@ -77,7 +67,6 @@ class Held:
 
 
 def held_in(board: Board) -> tuple[Held, ...]:
-    """How each setup holds the board."""
     return tuple(
         Held(one.ends_x, one.ends_y, vibrating_part(board, one, "x"), vibrating_part(board, one, "y"))
         for one in board.setups
@@ -86,16 +75,10 @@ def held_in(board: Board) -> tuple[Held, ...]:
 
 @lru_cache(maxsize=64)
 def field_profile(found: ConditionedField, held: tuple[Held, ...], power: int, mean_is_known: bool) -> FieldProfile:
-    """The profile of a field, with the components that the setups' frequencies see.
+    """The profile of a field, with the components that the frequencies of the setups, as they hold the board, see.
 
-    Parameters
-    ----------
-    held : tuple of Held
-        One per setup.
-    power : int
-        With which the stiffness goes with the field, the mass going with its first: 3 for a thickness, 1 for a width.
-    mean_is_known : bool
-        Whether the mean is no parameter, so that nothing can go with it.
+    The stiffness goes with the `power` of the field, the mass with its first: 3 for a thickness, 1 for a width. A mean
+    that is known is no parameter, so that nothing can go with it.
     """
 
     def surface(coefficients: Floats) -> Surface:

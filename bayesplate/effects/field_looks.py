@@ -19,17 +19,7 @@ _MOST_TOLD = 2
 
 
 def look(surface: Surface, mean: float, more: str) -> str:
-    """Where a surface is high, and its size, in words.
-
-    Parameters
-    ----------
-    surface : Surface
-        As a fraction of the mean.
-    mean : float
-        Of the field over the board, m.
-    more : str
-        "thicker" or "wider".
-    """
+    """Where a surface, a fraction of a mean in m, is high, and its size, in words; `more`: "thicker" or "wider"."""
     terms = sorted(zip(surface.coefficients, surface.degrees, strict=True), key=lambda one: -abs(one[0]))
     told = [(value, degrees) for value, degrees in terms[:_MOST_TOLD] if value**2 >= _TOLD * surface.size**2]
     places = [_WHERE[degrees][value > 0] if degrees in _WHERE else "in waves" for value, degrees in told]

@@ -15,15 +15,9 @@ from bayesplate.effects.part import WHOLE, Part, vibrating_part
 
 @dataclass(frozen=True)
 class GradientAlongX(Effect):
-    """A property 1 + g (s - 1/2) times its mean, s from 0 to 1 along the whole board.
+    """A property 1 + g (s - 1/2) times its mean, s from 0 to 1 along the whole board."""
 
-    Attributes
-    ----------
-    part : Part
-        What vibrates of the board along x.
-    """
-
-    part: Part = WHOLE
+    part: Part = WHOLE  # what vibrates of the board along x
 
     scope: ClassVar[Scope] = "board"
     default: ClassVar[Quantity]
@@ -31,17 +25,13 @@ class GradientAlongX(Effect):
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> Self:
-        """The effect on the part of the board that vibrates."""
         return cls(part=vibrating_part(board, setup, "x"))
 
     def in_setup(self, board: Board, setup: Setup) -> Self:
-        """The same gradient on the part of the board that vibrates in another setup."""
         return replace(self, part=vibrating_part(board, setup, "x"))
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Relative growth from x = 0 to the other end."""
         return (self.parameter("gradient", self.default, "1", 0.0, self.source),)
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
-        """The two ends along x differ."""
         return False, True

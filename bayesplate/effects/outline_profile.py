@@ -39,21 +39,12 @@ class OutlineProfile(Effect):
     The functions are those of the rectangle as wide as the widest place; what lies outside the outline is all but
     removed. Where both edges along x are free the board is taken to narrow from both alike (readings of a width do not
     say which edge recedes), otherwise from the free one. The mean width is taken to be known apart from the field.
-
-    Attributes
-    ----------
-    ends_y : tuple of str
-        Conditions at y0 and y1.
-    part_x, part_y : Part
-        What vibrates of the board; along y, of its mean width.
-    profile : FieldProfile or None
-        Of the width, along x; None: a rectangle.
     """
 
     ends_y: Ends = ("free", "free")
     part_x: Part = WHOLE
-    part_y: Part = WHOLE
-    profile: FieldProfile | None = None
+    part_y: Part = WHOLE  # of its mean width
+    profile: FieldProfile | None = None  # of the width, along x; None: a rectangle
 
     name: ClassVar[str] = "outline_profile"
     scope: ClassVar[Scope] = "board"
@@ -61,7 +52,6 @@ class OutlineProfile(Effect):
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> OutlineProfile:
-        """The effect with the board's readings of its width."""
         profile = _profile(board)
         is_rectangle = profile is None or profile.is_uniform
         parts = vibrating_part(board, setup, "x"), vibrating_part(board, setup, "y")
@@ -80,7 +70,6 @@ class OutlineProfile(Effect):
 
     @classmethod
     def notes(cls, board: Board) -> tuple[str, ...]:
-        """That readings of the width at stations serve for their mean alone, and why."""
         if not board.inputs["length_y"].has_profile:
             return ()
         told = "the length_y was read at several places: its mean is used"
@@ -95,12 +84,10 @@ class OutlineProfile(Effect):
         return super().candidates(board, setup) if cls.is_implied(board) else ()
 
     def in_setup(self, board: Board, setup: Setup) -> OutlineProfile | None:
-        """The same outline in another setup."""
         return None if self.refusal(board, setup) else self.of(board, setup)
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
-        """It needs readings with places, and an edge that is free to recede."""
         if not board.inputs["length_y"].at_x:
             return "the card gives no widths at stations: length_y_mm = { readings = [..], at_x_mm = [..] }"
         if "free" not in setup.ends_y:
@@ -108,7 +95,6 @@ class OutlineProfile(Effect):
         return ""
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """The components of what the readings leave open."""
         return () if self.profile is None else field_parameters(self, self.profile, _SOURCE, "wider")
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
@@ -118,7 +104,6 @@ class OutlineProfile(Effect):
         return False, self.ends_y[0] == self.ends_y[1]
 
     def outline(self) -> Outline | None:
-        """Where the plate begins and ends along y, as expected."""
         return None if self.profile is None else _Limits(self)
 
     def adjusted(self, values: Values) -> Values:
@@ -159,7 +144,6 @@ class OutlineProfile(Effect):
         return x, float(np.clip(self._corner + y * self.part_y.share / self._widest_part, low, high))
 
     def as_stated(self, x: float, y: float) -> tuple[float, float]:
-        """From the corner of the outline, over the mean width."""
         if self.profile is None:
             return x, y
         return x, float((y - self._corner) * self._widest_part / self.part_y.share)

@@ -36,5 +36,4 @@ class StiffnessGradient(GradientAlongX):
         return "the board is isotropic: it cannot be stiffer along x alone" if board.isotropic else ""
 
     def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
-        """E_x that grows along x."""
         return {"along": growing_along_x(self.part, lambda values: self.value(values, "gradient"))}

@@ -14,6 +14,7 @@ from bayesplate.board.coefficients import CoefficientCard
 from bayesplate.board.material import RIGIDITIES, moduli
 from bayesplate.board.setup import Setup
 from bayesplate.board.words import setup_places
+from bayesplate.effects.part import aspect_ratio_of
 from bayesplate.effects.words import effect_names
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.frequencies.columns import columns
@@ -239,12 +240,6 @@ def _distances(
         ratios = rows @ np.array([p, q, 1.0]) / np.array([solved[b].eigenvalue for b in beams])
         distances[theory] = float(np.sqrt(np.mean((600.0 * np.log2(ratios)) ** 2)))
     return distances
-
-
-def aspect_ratio_of(values: Values, setup: Setup) -> float:
-    """L_x / L_y of the part of a board that vibrates."""
-    length_x, length_y = vibrating_lengths(values, setup)
-    return float(length_x / length_y)
 
 
 def _thickness_ratio(values: Values, setup: Setup) -> float:

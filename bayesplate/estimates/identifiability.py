@@ -209,6 +209,5 @@ def _weakest(found: Identifiability) -> str:
 
 
 def _per_cent(error: float) -> str:
-    """A relative error to two digits."""
     error *= 100
     return f"{error:.{max(1 - int(np.floor(np.log10(min(error, 10.0)))), 0)}f} %"

@@ -60,7 +60,6 @@ def _without_doubles(given: Mapping[int, Label], found: Mapping[int, Label]) -> 
 
 
 def _at(setup: Setup, reading: Reading, label: Label) -> Reading:
-    """A reading with another label."""
     return replace(reading, label=label, beams=(label.m - setup.first_label.m, label.n - setup.first_label.n))
 
 

@@ -138,7 +138,6 @@ def carrying_sentence(modes: Sequence[CarryingMode]) -> str:
 
 
 def _readings(board: Board) -> list[tuple[str, str]]:
-    """Setup and label of every reading."""
     return [(setup.name, str(label)) for setup in board.setups for label in setup.labels]
 
 

@@ -52,7 +52,6 @@ class PaperSystem:
 
     @property
     def condition_number(self) -> float:
-        """Of the matrix X."""
         return float(np.linalg.cond(self.coefficients))
 
 

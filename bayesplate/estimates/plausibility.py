@@ -42,7 +42,6 @@ class Suspect:
 
     @property
     def is_of_a_unit(self) -> bool:
-        """Whether it is one of units or of decimal places."""
         return self.frequency != 1.0 or bool(self.wrong)
 
     @property
@@ -52,7 +51,6 @@ class Suspect:
         return float(self.frequency * wrong.get("length_x", 1.0) ** 2 / wrong.get("thickness", 1.0))
 
     def mended(self, values: Mapping[str, Floats]) -> dict[str, Floats]:
-        """Inputs and rigidities as they would be."""
         stated = {name: value for name, value in values.items() if name not in RIGIDITIES or "E_x" not in values}
         found = with_rigidities(stated | {name: values[name] / factor for name, factor in self.wrong})
         coupling = found["poisson_xy"] * found["D_y"]
@@ -118,12 +116,10 @@ class PriorPredictive:
 
     @property
     def median(self) -> Floats:
-        """Of ln f (Hz) of each reading."""
         return np.median(self.draws, axis=0)
 
     @property
     def spread(self) -> Floats:
-        """Standard deviation of ln f of each reading."""
         return self.draws.std(axis=0)
 
     def distance(self, log_frequencies: Floats) -> float:

@@ -47,7 +47,6 @@ class Bounds:
 
     @property
     def are_open(self) -> bool:
-        """Whether there are no limits at all."""
         return not (np.isfinite(self.lower).any() or np.isfinite(self.upper).any())
 
 

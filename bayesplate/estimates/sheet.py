@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.board.board import Board, Values, vibrating_lengths
+from bayesplate.board.board import Board, Values
 from bayesplate.board.material import MODULI, RIGIDITIES
+from bayesplate.effects.part import aspect_ratio_of
 from bayesplate.estimates.combined import COMBINED, combination, combined_shapes, corner_signs
 from bayesplate.frequencies.columns import columns
 from bayesplate.frequencies.laws import cents
@@ -36,8 +37,6 @@ _BY_MODES = "by what the measured modes tell"
 
 @dataclass(frozen=True, eq=False)
 class SheetMode:
-    """One mode."""
-
     name: str  # its label, or "cannot tell"
     hertz: float
     measured_hz: float | None
@@ -151,7 +150,6 @@ def sheet(
     shares = found.shares(np.array([float(values[name]) for name in RIGIDITIES]))
     limits = system.limits(points())
     shapes = sampled(modes, limits, points())
-    length_x, length_y = vibrating_lengths(system.adjusted(values), setup)
     rows = tuple(
         SheetMode(
             name=mode.name,
@@ -169,7 +167,7 @@ def sheet(
         for i, mode in enumerate(named)
     )
     title = board.title or board.name
-    ratio = float(length_x / length_y)
+    ratio = aspect_ratio_of(system.adjusted(values), setup)
     first = str(setup.first_label)
     likely = "" if all(row.band_hz is None for row in rows) else _BY_MODES if precision is not None else _BY_PRIOR
     mixtures = _combined(rows)

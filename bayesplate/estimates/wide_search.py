@@ -297,7 +297,6 @@ def _symmetric(system: System) -> System:
 
 
 def _alike(setups: Iterable[Setup]) -> list[list[Setup]]:
-    """Setups that hold the plate alike, together."""
     found: list[tuple[Setup, list[Setup]]] = []
     for setup in setups:
         held = replace(setup, name="", readings=(), peaks=(), noise=DEFAULT_NOISE, hammer=None)

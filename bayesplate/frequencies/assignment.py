@@ -81,7 +81,6 @@ class Near:
         return [peak for peak, _ in pairs], [mode for _, mode in pairs]
 
     def modes(self, peak: int) -> list[int]:
-        """Those that a peak is near."""
         ends = zip(self.first, self.end, strict=True)
         return [mode for mode, (first, end) in enumerate(ends) if first <= peak < end]
 

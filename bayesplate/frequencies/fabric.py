@@ -163,8 +163,6 @@ class _Sum:
 
 @dataclass(frozen=True)
 class _Product:
-    """Two fields multiplied."""
-
     first: Field
     second: Field
 

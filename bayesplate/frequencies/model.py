@@ -80,7 +80,6 @@ class SetupModel:
 
     @property
     def every_place(self) -> tuple[Place, ...]:
-        """Places of the labelled modes, then of the others."""
         return (*self.places, *(other.place for other in self.others))
 
     def log_frequencies(self, values: Values, law: LawName) -> NDArray[np.float64]:
@@ -117,7 +116,6 @@ class SetupModel:
 
     @cached_property
     def every_label(self) -> tuple[Label | None, ...]:
-        """Labels of the labelled modes, then of the others."""
         return every_label(self.setup, self.others)
 
     @property
@@ -213,7 +211,6 @@ def with_others(model: SetupModel, values: Values) -> SetupModel:
 
 
 def _with_few(model: SetupModel, n: int) -> SetupModel:
-    """The model with no more than its lowest other modes."""
     n_every = len(model.places) + n
     linear = LinearLaw(model.linear.stiffness[:n_every], model.linear.mass[:n_every])
     residues = None if model.residues is None else model.residues[:n_every]

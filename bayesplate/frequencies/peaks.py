@@ -208,7 +208,6 @@ class PeakLikelihood:
 
     @cached_property
     def _peaks(self) -> Rows:
-        """Peaks of one order after the other."""
         return np.concatenate([order.peaks for order in self.orders])
 
     @cached_property
@@ -232,7 +231,6 @@ class PeakLikelihood:
 
 
 def takes_part(setup: Setup) -> bool:
-    """Whether a setup has peaks without a label, or with a doubtful one."""
     return bool(setup.peaks) or not all(reading.is_sure for reading in setup.readings)
 
 

@@ -36,7 +36,6 @@ class Predictor:
         return replace(self, rows=rows)
 
     def of_labelled(self) -> Predictor:
-        """The same for the modes that have a label on the board."""
         starts = np.cumsum([0, *(len(model.every_place) for model in self.models)])[:-1]
         both = zip(starts, self.models, strict=True)
         return self.of(np.concatenate([start + np.arange(len(model.places)) for start, model in both]))

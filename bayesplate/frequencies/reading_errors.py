@@ -56,7 +56,6 @@ class ReadingErrors:
         return cls(np.array([one.mean for one in every]), own, np.where(own == 0, setup.resolution, 0.0), robust)
 
     def at(self, kept: NDArray[Any]) -> ReadingErrors:
-        """Some of the readings, or all in another order."""
         return replace(self, frequency=self.frequency[kept], own_sd=self.own_sd[kept], resolution=self.resolution[kept])
 
     @cached_property

@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.board.board import Values, vibrating_lengths
+from bayesplate.board.board import Values
 from bayesplate.board.setup import Setup
+from bayesplate.effects.attached_items import fractions_of
 from bayesplate.effects.base import Effect
 from bayesplate.plate.solve import Modes
 
@@ -84,12 +85,3 @@ def sign_probabilities(residues: NDArray[np.float64]) -> NDArray[np.float64]:
     positive = ndtr(np.nan_to_num(residues) / NODAL_LINE)
     positive = np.where(positive < _SURE, 0.0, np.where(positive > 1.0 - _SURE, 1.0, positive))
     return np.stack([positive, 1.0 - positive])
-
-
-def fractions_of(setup: Setup, place: tuple[float, float], values: Values) -> tuple[float, float]:
-    """A place on the board (m from its corner) as fractions of the vibrating sides."""
-    fractions = []
-    for axis, position, side in zip("xy", place, vibrating_lengths(values, setup), strict=True):
-        covered = values[setup.input_name(f"{axis}0")] if f"{axis}0" in setup.clamped else 0.0
-        fractions.append(float(np.clip((position - covered) / side, 0.0, 1.0)))
-    return fractions[0], fractions[1]

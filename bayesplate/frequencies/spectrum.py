@@ -23,8 +23,6 @@ _FEWEST_MODES = 12
 
 @dataclass(frozen=True)
 class NamedMode:
-    """One mode of a setup."""
-
     label: Label | None  # None where no product of beam functions fits
     frequency: float  # Hz
     correlation: float  # with the product that the label names

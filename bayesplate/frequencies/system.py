@@ -122,7 +122,6 @@ class System:
 
 
 def system_of(board: Board, setup: Setup) -> System:
-    """A setup of a board with the board's declared effects."""
     return System(setup, effects_of(board, setup))
 
 

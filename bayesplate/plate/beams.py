@@ -41,7 +41,6 @@ class BeamFunctions:
 
 @lru_cache(maxsize=16)
 def beam_functions(ends: Ends) -> BeamFunctions:
-    """The beam functions of a side with these ends."""
     from scipy.linalg import eigh
 
     side = line(ends, _N_ELEMENTS, is_split=False)

@@ -178,7 +178,6 @@ class SymmetryClass:
         return np.moveaxis(padded[numbers], -1, 0)
 
     def deflections(self, vectors: Floats) -> Deflections:
-        """Deflections of (n_dof, n_vectors) vectors."""
         return Deflections(self.plate.x, self.plate.y, self.parity, self._field("w", vectors))
 
     def strains(self, names: Sequence[str], vectors: Floats) -> dict[str, Floats]:

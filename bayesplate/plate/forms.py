@@ -86,7 +86,6 @@ class Forms:
 
     @property
     def is_projected(self) -> bool:
-        """Whether some terms exist on given deflections only."""
         return any(isinstance(term, OnDeflections) for term, _ in (*self.stiffness, *self.masses))
 
     def parity(self, beams: Beams) -> Parity:

@@ -46,7 +46,6 @@ class Line:
 
     @property
     def n_functions(self) -> int:
-        """Those that an end holds among them."""
         return int(self.basis.N)
 
     @property

@@ -163,7 +163,6 @@ def _places(modes: ClassModes, names: Sequence[Beams]) -> dict[Beams, Place]:
 
 
 def _with_energies(solved: Mapping[Parity, ClassModes], places: Mapping[Beams, Place]) -> dict[Beams, Found]:
-    """The modes at some places."""
     found = {}
     for parity, modes in solved.items():
         own = {name: place for name, place in places.items() if place.parity == parity}

@@ -34,7 +34,6 @@ class Plate(Forms):
         return tuple(SymmetryClass(self, parity) for parity in self.parities)
 
     def symmetry_class(self, parity: Parity) -> SymmetryClass:
-        """The class of that parity."""
         return next(one for one in self.classes if one.parity == parity)
 
 

@@ -153,7 +153,6 @@ class Modes:
 
     @cached_property
     def by_class(self) -> dict[Parity, ClassModes]:
-        """These modes, class by class."""
         found = {}
         for parity in dict.fromkeys(self.parities):
             found[parity] = self.classes[parity].of(self.ranks[self.rows(parity)])
@@ -165,7 +164,6 @@ class Modes:
         return np.concatenate([of_class[parity] for parity in self.by_class])[order]
 
     def rows(self, parity: Parity) -> list[int]:
-        """Which of the modes are of a class."""
         return [i for i, one in enumerate(self.parities) if one == parity]
 
     def displacement(self, x: Floats, y: Floats) -> Floats:

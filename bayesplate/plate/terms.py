@@ -97,12 +97,10 @@ class AtPlaces:
 
     @property
     def is_on_plate(self) -> bool:
-        """Whether all amounts are deflections."""
         return self.n_beside == 0
 
     @property
     def n_beside(self) -> int:
-        """How many coordinates beside the plate there must be."""
         return 1 + max(one.beside for _, *both in self.products for one in both)
 
 

@@ -54,8 +54,6 @@ class TrainingConstants:
 
 @dataclass(frozen=True, eq=False)
 class TrainingPlate:
-    """One plate of the set."""
-
     factors: tuple[float, float]  # of E_x and E_y
     p: float  # D_x / D_s
     q: float  # D_y / D_s
@@ -83,7 +81,6 @@ class Training:
     plates: tuple[TrainingPlate, ...]
 
     def plate(self, factors: tuple[float, float]) -> TrainingPlate:
-        """The plate with the given factors of E_x and E_y."""
         return next(plate for plate in self.plates if plate.factors == factors)
 
 
@@ -147,7 +144,6 @@ def training_weights(
 
 
 def training_matrices(ends_x: Ends, ends_y: Ends, theory: Theory) -> Plate:
-    """Matrices of the training plates."""
     assemble = thin_plate if theory == "thin" else shear_flexible_plate
     return assemble(ends_x, ends_y, SHEAR_ELEMENTS_PER_SIDE, SHEAR_ELEMENTS_PER_SIDE)
 

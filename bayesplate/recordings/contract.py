@@ -40,7 +40,6 @@ class PickedRow:
 
     @property
     def is_likely(self) -> bool:
-        """Whether it is a mode rather than not, by the recordings."""
         return self.spurious_probability < 0.5
 
     @property

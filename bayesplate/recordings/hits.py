@@ -72,7 +72,6 @@ def find_hits(recording: Recording) -> list[Hit]:
 
 
 def usable(hits: Sequence[Hit]) -> list[Hit]:
-    """Those without a fault."""
     return [hit for hit in hits if not hit.fault]
 
 

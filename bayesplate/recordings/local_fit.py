@@ -64,7 +64,6 @@ class Window:
 
     @property
     def spacing(self) -> float:
-        """Of the lines, Hz."""
         return float(self.frequency[1] - self.frequency[0])
 
     def basis(self, poles: Floats) -> Complex:

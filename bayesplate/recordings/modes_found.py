@@ -62,7 +62,6 @@ class Mode:
 
     @property
     def damping(self) -> float:
-        """Damping ratio."""
         return self.decay / self.frequency
 
 

@@ -30,8 +30,6 @@ _SAME = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Picked:
-    """What was picked from recordings."""
-
     # in the order of frequency, without signs and labels, those that are likely no mode included
     peaks: tuple[PickedRow, ...]
     answers: tuple[Answer, ...]
@@ -43,12 +41,10 @@ class Picked:
 
     @property
     def likely(self) -> tuple[PickedRow, ...]:
-        """The peaks that are modes rather than not."""
         return tuple(peak for peak in self.peaks if peak.is_likely)
 
     @property
     def likely_answers(self) -> tuple[Answer, ...]:
-        """Of each likely peak."""
         return tuple(one for one, peak in zip(self.answers, self.peaks, strict=True) if peak.is_likely)
 
     def sign(self, answer: Answer, flips: bool | None) -> str:

@@ -79,7 +79,6 @@ class Peak:
 
     @property
     def is_likely(self) -> bool:
-        """Whether it is a mode rather than not."""
         return self.verdict.spurious < 0.5
 
 
@@ -99,7 +98,6 @@ def verdicts(spectra: Spectra, modes: Sequence[Mode], answered: Sequence[Answer]
 
 
 def part_words(hertz: float) -> str:
-    """What a part of the peak of another mode is called."""
     return f"part of {hertz:.1f} Hz"
 
 

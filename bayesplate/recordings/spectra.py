@@ -40,7 +40,6 @@ class Spectra:
 
     @property
     def spacing(self) -> float:
-        """Of the lines, Hz."""
         return float(self.frequency[1] - self.frequency[0])
 
     @property
@@ -52,7 +51,6 @@ class Spectra:
         return np.asarray(np.maximum(level, 1e-9 * top + 1e-300))
 
     def only(self, records: Rows) -> Spectra:
-        """The same of some records."""
         kept = np.unique(self.places[records])
         return replace(
             self,

@@ -75,7 +75,6 @@ def _of_sets(sets: list[dict[str, Any]], shown: str, motion: Motion) -> Iterator
 
 
 def _unit(one: dict[str, Any], kind: int, name: str) -> float:
-    """The unit of the abscissa in s or Hz."""
     unit, data = str(one.get("abscissa_axis_units_lab") or "").strip(), int(one.get("abscissa_spec_data_type") or 0)
     known, of = _AXES[kind]
     if data not in (*_UNKNOWN, of) or unit.lower() not in known:

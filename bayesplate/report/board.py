@@ -103,7 +103,6 @@ class _Outline:
 
     @property
     def width(self) -> float:
-        """Widest width, m."""
         return float(self.high.max())
 
     def at(self, x: Floats) -> tuple[Floats, Floats]:
@@ -111,7 +110,6 @@ class _Outline:
         return np.interp(x, self.x, self.low), np.interp(x, self.x, self.high)
 
     def across(self) -> str:
-        """Its width in words."""
         narrowest, widest = (f"{end((self.high - self.low) * 1e3):.4g}" for end in (np.min, np.max))
         return f"{widest} mm across" if self.is_rectangle else f"{narrowest} to {widest} mm across"
 
@@ -128,14 +126,12 @@ def _outline(system: System, values: Values) -> _Outline:
 
 
 def _draw_grain(panel: Axes, outline: _Outline) -> None:
-    """Fine lines along the board."""
     for y in np.linspace(0, outline.width, _N_GRAIN + 2)[1:-1]:
         within = (outline.low <= y) & (y <= outline.high)
         panel.plot(outline.x, np.where(within, y, np.nan), color=LIGHT, lw=0.7, zorder=1)
 
 
 def _draw_board(panel: Axes, setup: Setup, outline: _Outline, values: Values, scale: float, along: str) -> None:
-    """Edges and dimensions."""
     length, width = float(values["length_x"]), outline.width
     covered = {edge: float(values[setup.input_name(edge)]) for edge in setup.clamped}
     low_x, high_x = covered.get("x0", 0.0), length - covered.get("x1", 0.0)
@@ -227,7 +223,6 @@ def _draw_items(panel: Axes, setup: Setup, outline: _Outline) -> dict[str, Any]:
 
 
 def _is_warped(board: Board) -> bool:
-    """Whether a rise was read that is not zero."""
     return any(rise.mean for rise in board.warp.values())
 
 
@@ -255,7 +250,6 @@ def _draw_warp(panel: Axes, board: Board, length: float, width: float) -> dict[s
 
 
 def _along(board: Board) -> str:
-    """What the length of a board runs along."""
     return "along x" if board.isotropic else "along the grain"
 
 

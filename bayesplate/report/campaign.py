@@ -145,7 +145,6 @@ def left_out_picture(diagnosis: CampaignDiagnosis) -> Picture:
 
 
 def _shown(names: Iterable[str]) -> list[str]:
-    """Names of boards as far as they have room."""
     return [short(drawable(name), _LONGEST) for name in names]
 
 
@@ -155,7 +154,6 @@ def _ends(entry: Spread, factor: float) -> tuple[float, float, float]:
 
 
 def every_picture(summary: CampaignSummary, diagnosis: CampaignDiagnosis | None = None) -> dict[str, list[Picture]]:
-    """The figures of the page, by the place where they stand."""
     told = diagnosis is not None and bool(diagnosis.left_out_boards)
     return {
         "diagnosis": [left_out_picture(diagnosis)] if diagnosis is not None and told else [],
@@ -192,7 +190,6 @@ def write_campaign_report(
 
 
 def sentences(summary: CampaignSummary, diagnosis: CampaignDiagnosis | None = None) -> tuple[str, ...]:
-    """The page in short."""
     told = []
     if diagnosis is not None:
         told += [claim_sentence(diagnosis)]

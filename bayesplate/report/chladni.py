@@ -102,7 +102,6 @@ def _close(plan: Layout) -> Layout:
 
 
 def _draw_marks(panel: Axes, marks: Marks, sheet: Sheet) -> None:
-    """Sensor, hammer, and where to tap."""
     style: Any = {"ls": "none", "clip_on": False, "zorder": 6, "mec": "black"}
     if marks.taps:
         panel.plot(
@@ -116,7 +115,6 @@ def _draw_marks(panel: Axes, marks: Marks, sheet: Sheet) -> None:
 
 
 def _draw_combined(figure: Figure, plan: Layout, sheet: Sheet, top: float) -> None:
-    """The last row: the combined modes under their heading."""
     mixed = {name for one in sheet.combined for name in one.weights}
     are_measured = all(mode.measured_hz is not None for mode in sheet.modes if mode.name in mixed)
     which = "measured" if are_measured else "lowest named"
@@ -133,7 +131,6 @@ def _draw_combined(figure: Figure, plan: Layout, sheet: Sheet, top: float) -> No
 
 
 def _left(plan: Layout, column: int, in_row: int) -> float:
-    """Left side of a panel in a centred row, inches."""
     return A4[0] / 2 + (column - in_row / 2) * plan.cell[0] + (plan.cell[0] - plan.panel[0]) / 2
 
 
@@ -233,7 +230,6 @@ def caption(panel: Axes, first: str, *others: str) -> None:
 
 
 def _legend(figure: Figure, sheet: Sheet, marks: Marks | None) -> None:
-    """What the drawing means, at the foot of the page."""
     drawn = {"clamped": "hatched", "supported": "dashed", "free": "thin"}
     edges = ", ".join(f"{drawn[word]} = {word}" for word in dict.fromkeys(sheet.edges.values()))
     along, begins = ("x", "x") if sheet.isotropic else ("the grain", "The grain")

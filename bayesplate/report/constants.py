@@ -69,7 +69,6 @@ def constants_picture(summary: Summary, moduli: Mapping[str, NDArray[np.float64]
 
 
 def modulus_title(name: str, *, isotropic: bool = False) -> str:
-    """What stands above the panel of a modulus."""
     return f"{in_figure(name)}: {(STIFFNESS_OF_ISOTROPIC if isotropic else STIFFNESS)[name]}"
 
 
@@ -181,7 +180,6 @@ def _draw_estimates(
 
 
 def _arrows(panel: Axes, estimates: NDArray[np.float64], sizes: NDArray[np.int_], low: float, high: float) -> None:
-    """Marks at the sides for estimates beyond them."""
     for beyond, at, marker in ((estimates < low, low, "<"), (estimates > high, high, ">")):
         for size in np.unique(sizes[beyond]):
             panel.scatter([at], [size], s=22, marker=marker, color="0.45", clip_on=False, zorder=4)

@@ -109,7 +109,6 @@ def corner_figure(
 def write_corner_plot(
     path: Path, columns: Mapping[str, Floats], marked: Mapping[str, float | None] | None = None
 ) -> None:
-    """Write the figure by the ending of the path, PNG or SVG."""
     save_figure(corner_figure(columns, marked), path)
 
 
@@ -174,7 +173,6 @@ def words_and_factor(name: str, board: Board) -> tuple[str, float]:
 
 
 def _correlated(columns: Mapping[str, Floats]) -> str:
-    """The pairs whose correlation is strong, in words."""
     names = [name.partition(",")[0] for name in columns]
     matrix = np.corrcoef([values.ravel() for values in columns.values()])
     strong = [(i, j) for i in range(len(names)) for j in range(i) if abs(matrix[i, j]) > _STRONG]

@@ -62,7 +62,6 @@ _STYLES = {"E_x": (BLUE, "o"), "E_y": (ORANGE, "D"), "G_xy": (GREEN, "s")}
 
 
 def every_grading_picture(graded: Grading) -> dict[str, list[Picture]]:
-    """The figures of the page, by the place where they stand; none where no board was fitted."""
     if not graded.names:
         return {"constants": [], "makers": [], "limits": [], "pairs": []}
     return {
@@ -102,7 +101,6 @@ def sorted_picture(graded: Grading) -> Picture:
 
 
 def _draw_crowd(panel: Axes, ends: tuple[Floats, Floats, Floats]) -> None:
-    """Bars and dots of boards that are too many to be named."""
     low, middle, high = ends
     ranks, as_pixels = np.arange(len(middle)), len(middle) > _MOST_VECTORS
     panel.hlines(ranks, low, high, color=SKY, lw=0.8, rasterized=as_pixels)
@@ -231,7 +229,6 @@ def _lines_of_equal_ratio(panel: Axes, ratios: Floats) -> None:
 
 
 def _limit_band(panel: Axes, graded: Grading, name: str) -> None:
-    """What a specification allows of a constant, shaded."""
     if name in graded.request.limits:
         low, high = graded.request.limits[name]
         factor = FIGURES[name].per_unit
@@ -271,7 +268,6 @@ def write_grading_page(folder: Path, graded: Grading, summary: BatchSummary, *, 
 
 
 def sentences(graded: Grading, summary: BatchSummary) -> tuple[str, ...]:
-    """The page in short."""
     told = [f"{summary.n_fitted} of {summary.n_boards} boards were fitted."]
     if graded.meets_all is not None and graded.names:
         meets = graded.meets_all[graded.trusted]
@@ -293,7 +289,6 @@ def sentences(graded: Grading, summary: BatchSummary) -> tuple[str, ...]:
 
 
 def matching_sentence(graded: Grading) -> str:
-    """When two boards match."""
     within = ", ".join(f"{name} within {value:g} %" for name, value in graded.request.match_percent.items())
     return (
         f"Two boards match where {within}, all at once. The errors of two boards are taken to be independent. The "

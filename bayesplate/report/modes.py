@@ -53,7 +53,6 @@ _N_COLUMNS = 3
 
 
 def modes_pictures(inference: Inference, draws: Draws, summary: Summary) -> list[Picture]:
-    """One picture a setup."""
     problem = inference.problem
     shapes = labelled_shapes(problem.posterior.models, posterior_mean_values(problem, draws))
     caption = (
@@ -77,7 +76,6 @@ def modes_pictures(inference: Inference, draws: Draws, summary: Summary) -> list
 def _sand_figure(
     model: SetupModel, values: Values, modes: Sequence[ModeRow], shapes: Mapping[str, NDArray[np.float64]]
 ) -> Figure:
-    """The modes of a setup, their shapes by label."""
     from matplotlib.figure import Figure
 
     system = model.system
@@ -100,7 +98,6 @@ def _sand_figure(
 
 
 def _hertz(mode: ModeRow) -> tuple[str, str]:
-    """Its measured and its predicted frequency in words."""
     return f"measured {mode.measured_hz:.6g} Hz", f"predicted {mode.predicted_hz.mean:.1f} Hz"
 
 
@@ -224,7 +221,6 @@ _SHARES_CAPTION = (
 
 
 def _best_witnesses(names: list[str], found: Identifiability) -> str:
-    """The best witness of each constant."""
     told = []
     for constant, column in zip(("E_x", "E_y", "G_xy"), found.shares.T, strict=True):
         best = int(np.argmax(column))
@@ -242,7 +238,6 @@ def spectrum_pictures(summary: Summary) -> list[Picture]:
 
 
 def _spectrum_picture(summary: Summary, spectrum: Spectrum) -> Picture:
-    """Measured peaks over predicted modes of a setup."""
     peaks = [peak for peak in summary.peaks if peak.setup == spectrum.setup]
     several = len(summary.spectra) > 1
     figure, (panel,) = stacked([2.6], left=0.2, right=0.2, bottom=0.4, top=0.1)

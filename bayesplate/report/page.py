@@ -96,7 +96,6 @@ def save_page(
 def pictures(
     inference: Inference, draws: Draws, summary: Summary, diagnosis: Diagnosis | None = None
 ) -> dict[str, list[Picture]]:
-    """Every figure of the page, by the place where it stands."""
     problem = inference.problem
     board = problem.board
     first, more = _of_diagnosis(diagnosis)
@@ -143,7 +142,6 @@ def fit_page(
     shown: Mapping[str, Sequence[PagePicture]],
     diagnosis: Diagnosis | None = None,
 ) -> str:
-    """The page as text, with its pictures by their place."""
     problem = inference.problem
     board, prior = problem.board, problem.prior
     return from_template(

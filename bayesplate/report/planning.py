@@ -73,7 +73,6 @@ def gains_picture(plan: Plan) -> Picture:
 
 
 def _doubt(axes: Axes, plan: Plan, shown: Sequence[ProposalEntry]) -> None:
-    """How much of the doubt between the explanations goes."""
     share = 100.0 / plan.entropy
     values = np.array([share * max(one.gain.explanations or 0.0, 0.0) for one in shown])
     errors = np.array([share * (one.gain.explanations_error or 0.0) for one in shown])
@@ -85,7 +84,6 @@ def _doubt(axes: Axes, plan: Plan, shown: Sequence[ProposalEntry]) -> None:
 
 
 def _intervals(axes: Axes, plan: Plan, shown: Sequence[ProposalEntry]) -> None:
-    """What is left of each interval."""
     shared = list(shown[0].gain.shared) if shown else []
     names = shared or list(MODULI)
     for i, name in enumerate(names):

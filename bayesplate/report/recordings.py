@@ -217,7 +217,6 @@ def write_recordings_page(folder: Path, report: PickReport, picked: Picked) -> P
 
 
 def sentences(report: PickReport) -> tuple[str, ...]:
-    """The page in short."""
     hits = "One ring-down" if report.n_hits == 1 else f"{report.n_hits} ring-downs"
     places = "one pair of places" if report.n_places == 1 else f"{report.n_places} pairs of places"
     told = [
@@ -241,7 +240,6 @@ def sentences(report: PickReport) -> tuple[str, ...]:
 
 
 def modes_table(report: PickReport) -> Table:
-    """Every likely mode."""
     rows = tuple(
         (
             f"{peak.hz:.3f} ± {two_digits(peak.sd_hz)}",
@@ -257,7 +255,6 @@ def modes_table(report: PickReport) -> Table:
 
 
 def aside_table(aside: list[PickedRow]) -> Table:
-    """What was set aside, and why."""
     rows = tuple(
         (f"{peak.hz:.2f}", peak.kind or None, f"{peak.amplitude:.3f}", percent(peak.spurious_probability, 1))
         for peak in aside

@@ -61,7 +61,6 @@ def placed(figure: Figure, left: float, bottom: float, width: float, height: flo
 
 
 def plain_axes(panel: Axes) -> None:
-    """Small words, and no frame above and at the right."""
     panel.tick_params(labelsize=SMALL, length=3)
     panel.xaxis.label.set_fontsize(SMALL)
     panel.yaxis.label.set_fontsize(SMALL)
@@ -110,7 +109,6 @@ def name_rows(panel: Axes, names: Sequence[str], *, size: float = SMALL, parse_m
 
 
 def heading(panel: Axes, words: str) -> None:
-    """What a panel is of, above it."""
     panel.set_title(words, fontsize=WORDS, loc="left", weight="bold")
 
 
@@ -207,7 +205,6 @@ def is_symbol(name: str) -> bool:
 
 
 def short(text: str, longest: int) -> str:
-    """A text cut to a number of characters, the cut shown."""
     return text if len(text) <= longest else text[: longest - 1] + "…"
 
 

@@ -57,7 +57,6 @@ _SHIFT = "Shift, sd: how far a constant moves, counted in the standard deviation
 
 
 def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
-    """The section of a diagnosis."""
     tables = (
         answers_table(diagnosis),
         errors_table(diagnosis),
@@ -104,7 +103,6 @@ def quoted(summary: Summary, diagnosis: Diagnosis | None) -> Summary:
 
 
 def quoted_constants(summary: Summary, diagnosis: Diagnosis | None) -> Table:
-    """The constants to quote beside the older methods; its title says what they are."""
     what = "" if diagnosis is None else f", {what_is_quoted(diagnosis)}"
     return compared_constants(quoted(summary, diagnosis), f"Elastic constants{what}, GPa")
 
