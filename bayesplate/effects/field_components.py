@@ -20,7 +20,6 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.board.random_field import ConditionedField, Degrees, Surface, legendre
 from bayesplate.board.setup import Ends
 from bayesplate.effects.base import Effect
-from bayesplate.effects.field_looks import look
 from bayesplate.effects.part import Part, vibrating_part
 from bayesplate.plate.beams import beam_functions
 
@@ -33,6 +32,17 @@ SMALLEST = 5e-4
 """Root mean square over the board below which a surface is nothing."""
 _N_BEAMS = 4
 _HELD = 1e-6
+_TOLD = 0.2
+"""Share of a surface's mean square from which on one of its polynomials is told."""
+_WHERE = {
+    (1, 0): ("towards x0", "towards x1"),
+    (0, 1): ("towards y0", "towards y1"),
+    (2, 0): ("at mid-length", "at both ends"),
+    (0, 2): ("along the middle", "along both sides"),
+    (1, 1): ("at the corners x0 y1 and x1 y0", "at the corners x0 y0 and x1 y1"),
+}
+"""Where a polynomial has its highest places, with a negative coefficient and with a positive one."""
+_MOST_TOLD = 2
 
 
 @dataclass(frozen=True)
@@ -157,6 +167,15 @@ def field_parameters(effect: Effect, profile: FieldProfile, source: str, more: s
         )
         for k, component in enumerate(profile.components, start=1)
     )
+
+
+def look(surface: Surface, mean: float, more: str) -> str:
+    """Where a surface, a fraction of a mean in m, is high, and its size, in words; `more`: "thicker" or "wider"."""
+    terms = sorted(zip(surface.coefficients, surface.degrees, strict=True), key=lambda one: -abs(one[0]))
+    told = [(value, degrees) for value, degrees in terms[:_MOST_TOLD] if value**2 >= _TOLD * surface.size**2]
+    places = [_WHERE[degrees][value > 0] if degrees in _WHERE else "in waves" for value, degrees in told]
+    where = " and ".join(dict.fromkeys(places)) or "in waves"
+    return f"at +1 {more} {where}, {1e3 * mean * surface.size:.2g} mm rms"
 
 
 def coordinates(profile: FieldProfile, mean: Floats, components: Sequence[Floats]) -> list[Floats]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
@@ -9,8 +10,9 @@ from bayesplate.board.board import Board
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
-from bayesplate.effects.base import Effect, Scope
+from bayesplate.effects.base import Effect, Floats, Scope, Variation
 from bayesplate.effects.part import WHOLE, Part, vibrating_part
+from bayesplate.plate.fields import Group
 
 
 @dataclass(frozen=True)
@@ -22,6 +24,7 @@ class GradientAlongX(Effect):
     scope: ClassVar[Scope] = "board"
     default: ClassVar[Quantity]
     source: ClassVar[str]
+    groups: ClassVar[tuple[Group, ...]]  # of terms that the property is a factor of
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> Self:
@@ -35,3 +38,13 @@ class GradientAlongX(Effect):
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
         return False, True
+
+    def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
+        """The property as at the middle of the vibrating part, and what grows along x from there."""
+        at_middle = Variation(None, lambda values: 1.0 + self.value(values, "gradient") * self.part.middle)
+        growing = Variation(_from_middle, lambda values: self.value(values, "gradient") * self.part.share)
+        return dict.fromkeys(self.groups, (at_middle, growing))
+
+
+def _from_middle(x: Floats, y: Floats) -> Floats:
+    return x - 0.5 + 0.0 * y

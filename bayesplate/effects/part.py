@@ -1,18 +1,14 @@
-"""Which part of the whole board vibrates: the strip that each side's clamps leave, and what grows along it."""
+"""Which part of the whole board vibrates: the strip that each side's clamps leave, its shape and its mass."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.board import Board, Values, density, vibrating_lengths
 from bayesplate.board.setup import Setup
-from bayesplate.effects.base import Variation
-
-Floats = NDArray[np.float64]
+from bayesplate.effects.base import Floats
 
 
 @dataclass(frozen=True)
@@ -52,18 +48,3 @@ def vibrating_mass(values: Values, setup: Setup) -> Floats:
     """Mass of the vibrating part, kg, as of the whole rectangle: a number or an (n_draws,) array."""
     length_x, length_y = vibrating_lengths(values, setup)
     return np.asarray(density(values) * values["thickness"] * length_x * length_y)
-
-
-def growing_along_x(part: Part, gradient: Callable[[Values], Floats]) -> tuple[Variation, Variation]:
-    """A property 1 + g (s - 1/2) times its mean over the whole board, s from 0 to 1 along x.
-
-    As at the middle of the vibrating part, and what grows along x from there; `gradient` gives g from the values.
-    """
-    return (
-        Variation(None, lambda values: 1.0 + gradient(values) * part.middle),
-        Variation(_from_middle, lambda values: gradient(values) * part.share),
-    )
-
-
-def _from_middle(x: Floats, y: Floats) -> Floats:
-    return x - 0.5 + 0.0 * y

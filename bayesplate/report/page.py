@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from bayesplate.board.board import Board
 from bayesplate.diagnosis.result import Diagnosis
@@ -41,16 +40,11 @@ from bayesplate.results.tables import escape, render, visible
 _PIXELS_AN_INCH = 96
 
 
-@dataclass(frozen=True)
-class PagePicture:
+class PagePicture(NamedTuple):
     """A picture as the page holds it: its words, its size in pixels, and its content as a data address."""
 
-    name: str
-    title: str
-    alt: str
-    caption: str
-    width: int
-    height: int
+    words: Picture
+    size: tuple[int, ...]
     source: str
 
 
@@ -129,9 +123,9 @@ def _shown(picture: Picture, svg: bytes) -> PagePicture:
     """A picture as a page holds it, from the content of its SVG file."""
     from markupsafe import Markup
 
-    width, height = (round(_PIXELS_AN_INCH * side) for side in picture.figure.get_size_inches())
-    source = Markup(f"data:image/svg+xml;base64,{b64encode(svg).decode('ascii')}")  # nothing in it to escape
-    return PagePicture(picture.name, picture.title, picture.alt, picture.caption, width, height, source)
+    size = tuple(round(_PIXELS_AN_INCH * side) for side in picture.figure.get_size_inches())
+    # nothing in it to escape
+    return PagePicture(picture, size, Markup(f"data:image/svg+xml;base64,{b64encode(svg).decode('ascii')}"))
 
 
 def fit_page(
