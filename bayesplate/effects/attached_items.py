@@ -73,7 +73,7 @@ def fractions_on(board: Board, setup: Setup, places: Places) -> Fractions:
 
 
 def fractions_of(setup: Setup, place: tuple[float, float], values: Values) -> tuple[float, float]:
-    """The same of one place, at given sizes."""
+    """One place as fractions of the sides that vibrate in a setup, at given sizes."""
     starts, sides = _vibrating(values, setup)
     x, y = ((at - start) / side for at, start, side in zip(place, starts, sides, strict=True))
     return float(np.clip(x, 0.0, 1.0)), float(np.clip(y, 0.0, 1.0))
@@ -92,7 +92,7 @@ def radius_on(board: Board, setup: Setup, base: float) -> tuple[float, float]:
 
 
 def _vibrating(values: Values, setup: Setup) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Where the vibrating part begins along x and y, and how long it is, m."""
+    """Start and length of the vibrating part along x and y, m."""
     length_x, length_y = vibrating_lengths(values, setup)
     x, y = (float(values[setup.input_name(edge)]) if edge in setup.clamped else 0.0 for edge in ("x0", "y0"))
     return (x, y), (float(length_x), float(length_y))

@@ -177,7 +177,7 @@ def _masses(setup: Setup) -> tuple[AttachedItem, ...]:
 
 
 def _spot(board: Board, effect: Effect) -> str:
-    """Where the last of the things is, in words."""
+    """The place of the last of the things, in words."""
     assert isinstance(effect, AttachedMass)
     x, y = effect._places_on(board)[-1][0]
     return f"at {1e3 * x:.0f}, {1e3 * y:.0f} mm"

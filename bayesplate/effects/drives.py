@@ -24,9 +24,7 @@ _PLACES_A_SIDE = 8
 
 @dataclass(frozen=True)
 class Spot:
-    """Where an exciter may be along one side, as fractions of the vibrating part; from `low` to `high`, the same where
-    known.
-    """
+    """Range along one side where an exciter may be, as fractions of the vibrating part; one place where it is known."""
 
     low: float
     high: float
@@ -106,5 +104,5 @@ def all_over(low: float, high: float) -> list[float]:
 
 
 def range_of(ends: Ends) -> tuple[float, float]:
-    """Where along a side something may be, mirror places once, as fractions of what vibrates."""
+    """Range along a side where something may be, mirror places once, as fractions of what vibrates."""
     return (0.0, 0.5) if ends[0] == ends[1] else (0.0, 1.0)

@@ -96,7 +96,7 @@ class Exciter(Effect):
         return (replace(whole, drives=tuple(with_known_coil(drive) for drive in whole.drives)),)
 
     def in_setup(self, board: Board, setup: Setup) -> Exciter | None:
-        """The same exciters at the same places of the board, held another way; none where none is fixed to it."""
+        """The exciters at their places of the board, held another way; none where none is fixed to it."""
         if self.refusal(board, setup):
             return None
         own = board.setup(self.owner.name)
@@ -130,7 +130,7 @@ class Exciter(Effect):
         )
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Of each exciter its mass, its coil, its suspension (or resonance), and its place where nobody knows it."""
+        """Mass, coil and suspension (or resonance) of each exciter, and its place where nobody knows it."""
         return tuple(parameter for i in range(len(self.drives)) for parameter in self._parameters_of(i))
 
     def _parameters_of(self, i: int) -> tuple[Parameter, ...]:
@@ -159,7 +159,7 @@ class Exciter(Effect):
 
     @property
     def _ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Where along both sides a place may be, mirror places once."""
+        """Ranges along both sides where an exciter may be, mirror places once."""
         return (range_of(self.ends_x), range_of(self.ends_y))
 
     def _spots(self, drive: Drive) -> tuple[Spot, Spot]:

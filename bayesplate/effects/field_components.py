@@ -170,7 +170,7 @@ def field_parameters(effect: Effect, profile: FieldProfile, source: str, more: s
 
 
 def look(surface: Surface, mean: float, more: str) -> str:
-    """Where a surface, a fraction of a mean in m, is high, and its size, in words; `more`: "thicker" or "wider"."""
+    """Words for where a surface, a fraction of a mean in m, is high, and for its size; `more`: "thicker" or "wider"."""
     terms = sorted(zip(surface.coefficients, surface.degrees, strict=True), key=lambda one: -abs(one[0]))
     told = [(value, degrees) for value, degrees in terms[:_MOST_TOLD] if value**2 >= _TOLD * surface.size**2]
     places = [_WHERE[degrees][value > 0] if degrees in _WHERE else "in waves" for value, degrees in told]

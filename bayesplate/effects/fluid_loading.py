@@ -60,7 +60,7 @@ class FluidLoading(Effect):
         )
 
     def in_setup(self, board: Board, setup: Setup) -> FluidLoading:
-        """The same fluid around the board of another setup, unless that states its own."""
+        """This fluid around the board of another setup, unless that states its own."""
         if setup.fluid is not None:
             return self.of(board, setup)
         return replace(self, owner=setup.owner, aspect_ratio=aspect_ratio_of(board.nominal(), setup))

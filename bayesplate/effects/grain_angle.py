@@ -68,7 +68,7 @@ class GrainAngle(Effect):
 
     @classmethod
     def notes(cls, board: Board) -> tuple[str, ...]:
-        """That the other sign of the angle is another board, where nothing mirrors."""
+        """A sentence that the other sign of the angle is another board, where nothing mirrors."""
         are_both_tried = any(one.sign for one in board.chosen if isinstance(one, cls))
         if cls.name not in board.effects or are_both_tried or not _signs_differ(board):
             return ()

@@ -80,7 +80,7 @@ class OutlineProfile(Effect):
 
     @classmethod
     def candidates(cls, board: Board, setup: Setup) -> tuple[Effect, ...]:
-        """None where the readings say that the board is a rectangle."""
+        """No form where the readings say that the board is a rectangle."""
         return super().candidates(board, setup) if cls.is_implied(board) else ()
 
     def in_setup(self, board: Board, setup: Setup) -> OutlineProfile | None:
@@ -133,7 +133,7 @@ class OutlineProfile(Effect):
         return np.asarray(np.clip(steps, -_FURTHEST, _FURTHEST) / self._strip_steps)
 
     def direction(self, x: Floats, y: Floats, k: int) -> Floats:
-        """Where a component widens the board, 1, and where it narrows it, -1."""
+        """1 where a component widens the board, -1 where it narrows it."""
         return np.sign(self._step(self.part_x.on_whole(x), k)) + 0.0 * y
 
     def placed(self, x: float, y: float) -> tuple[float, float]:
@@ -150,7 +150,7 @@ class OutlineProfile(Effect):
 
     @property
     def _corner(self) -> float:
-        """Where the whole board has its corner of x0 and y0, as a fraction along y of the widest width."""
+        """Place of the board's corner of x0 and y0 along y, as a fraction of the widest width."""
         return float(self.limits(np.array([-self.part_x.start / self.part_x.share]))[0][0])
 
     @property
@@ -204,8 +204,6 @@ class _Limits:
 
 @dataclass(frozen=True)
 class _Direction:
-    """Where a component widens the board."""
-
     effect: OutlineProfile
     k: int
 

@@ -80,7 +80,7 @@ class ThicknessProfile(Effect):
 
     @classmethod
     def candidates(cls, board: Board, setup: Setup) -> tuple[Effect, ...]:
-        """None where the readings say that the board is equally thick everywhere."""
+        """No form where the readings say that the board is equally thick everywhere."""
         profile = _profile(board)
         return () if profile is not None and profile.is_uniform else super().candidates(board, setup)
 
@@ -154,7 +154,7 @@ class ThicknessProfile(Effect):
         return (*(replace(one, order=1) for one in cube if one.order == 0), *first)
 
     def _coefficient(self, values: Values, n: int, i: int, j: int) -> Floats:
-        """Of u^i v^j in the n-th power of the taper, u and v from the middle of the vibrating part."""
+        """Coefficient of u^i v^j in the n-th power of the taper, u and v from the middle of the vibrating part."""
         taper_x, taper_y = self.value(values, "taper_x"), self.value(values, "taper_y")
         middle = 1.0 + taper_x * self.part_x.middle + taper_y * self.part_y.middle
         along_x, along_y = taper_x * self.part_x.share, taper_y * self.part_y.share

@@ -45,7 +45,7 @@ class Identifiability:
 
     @property
     def standard_errors(self) -> NDArray[np.float64]:
-        """Of the logarithms of the free rigidities: (n_constants,) array."""
+        """Standard errors of ln of the free rigidities: (n_constants,) array."""
         return np.sqrt(np.diagonal(self.covariance))
 
     @property
@@ -56,7 +56,7 @@ class Identifiability:
 
     @property
     def errors_of_rigidities(self) -> NDArray[np.float64]:
-        """Of the logarithms of D_x, D_y, D_s: (3,) array."""
+        """Standard errors of ln D_x, ln D_y, ln D_s: (3,) array."""
         return np.sqrt(np.diagonal(self.of_rigidities))
 
     def blind(self) -> tuple[str, ...]:
@@ -76,17 +76,16 @@ def identifiability(
     weighted = symmetry.along(sensitivities) / scales[:, None]
     left, singular, right = np.linalg.svd(weighted, full_matrices=False)
     seen = singular > 1e-10 * singular[0]
-    with np.errstate(divide="ignore"):
-        inverse = np.where(seen, 1.0 / singular, np.inf) if seen.sum() == n else np.full(n, np.inf)
-    covariance = (right.T * inverse**2) @ right if np.isfinite(inverse).all() else np.diag(np.full(n, np.inf))
-    condition = float(singular[0] / singular[-1]) if seen.sum() == n else float("inf")
+    tells_all = seen.sum() == n
+    covariance = (right.T * (1.0 / singular) ** 2) @ right if tells_all else np.diag(np.full(n, np.inf))
+    condition = float(singular[0] / singular[-1]) if tells_all else float("inf")
     leverages = np.sum(left[:, seen] ** 2, axis=1)
     beside = _errors_beside_known(weighted.T @ weighted)
     return Identifiability(condition, covariance, leverages, 2.0 * sensitivities, symmetry, beside)
 
 
 def _errors_beside_known(information: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of each constant, where the others have a 95 % interval of `OTHERS_WITHIN`: (n_constants,) array."""
+    """Standard error of ln of each constant where the others have a 95 % interval of `OTHERS_WITHIN`."""
     precision = (1.96 / np.log(OTHERS_WITHIN)) ** 2
     errors = []
     for i in range(len(information)):

@@ -116,7 +116,8 @@ def _round(tried: Sequence[Estimate]) -> Sequence[Estimate]:
 
 
 def _overshoot(before: tuple[NDArray[np.float64], NDArray[np.float64]], wanted: NDArray[np.float64]) -> float:
-    """By how much a step is too long, at least 1: what the last one, taken as it was, left of what was wanted before.
+    """Factor, at least 1, by which a step is too long: from what the last one, taken as it was, left of what was
+    wanted.
 
     Near a veering the slopes turn within a step; where the residuals are large there, steps go to and fro and hardly
     shrink. The secant through the last two of them tells by how much they overshoot.

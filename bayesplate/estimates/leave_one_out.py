@@ -119,7 +119,7 @@ def united(*found: Iterable[CarryingMode]) -> tuple[CarryingMode, ...]:
 
 
 def indices_of(modes: Iterable[CarryingMode], board: Board) -> tuple[int, ...]:
-    """Where the readings of modes stand among all of a board."""
+    """Indices of the readings of some modes among all readings of a board."""
     named = {(one.setup, one.label) for one in modes}
     return tuple(i for i, reading in enumerate(_readings(board)) if reading in named)
 

@@ -238,7 +238,7 @@ def _strays(board: Board, prior: PriorCard, rng: np.random.Generator) -> list[st
 
 
 def _no_material(board: Board, ratio: float) -> Fault:
-    """That no material has such constants: a larger ratio than nu_xy allows."""
+    """The fault that the ratio of the constants is larger than nu_xy allows: no material is like that."""
     wanted = (
         f"a plate of a material: nu_xy nu_yx is below 1, so E_y below {board.nominal()['poisson_xy'] ** -2:.3g} E_x"
     )
@@ -246,7 +246,7 @@ def _no_material(board: Board, ratio: float) -> Fault:
 
 
 def _contradiction(board: Board, prior: PriorCard, speed: float, rng: np.random.Generator) -> Fault | None:
-    """That the readings want sound faster or slower than any material carries it, or are out of the prior's reach."""
+    """The fault that no material carries sound as the readings want, or that they are out of the prior's reach."""
     place = f"{board.name}.toml frequencies_hz"
     if not SLOWEST < speed < FASTEST:
         wanted = f"those of a material that carries sound at {SLOWEST:g} to {FASTEST:g} m/s"

@@ -95,16 +95,14 @@ class Precision:
     noise: Mapping[str, float]  # relative, by setup
 
     def band(self, frequency: float, shares: NDArray[np.float64], setup: str) -> tuple[float, float]:
-        """Where a reading is expected two times in three, to first order, Hz; `shares` (3,) of D_x, D_y, D_s in its
-        energy.
-        """
+        """Band, Hz, that holds a reading two times in three, to first order, from the (3,) shares in the mode's energy."""
         variance = 0.25 * shares @ self.covariance @ shares + self.noise[setup] ** 2
         factor = float(np.exp(_TWO_THIRDS * np.sqrt(variance)))
         return frequency / factor, frequency * factor
 
 
 def points(n: int = _GRID) -> NDArray[np.float64]:
-    """Where shapes are sampled along each side, as fractions of it, a hair within the edges: (n,) array."""
+    """Points of each side, (n,) fractions of it, at which shapes are sampled; the outer ones a hair within the edges."""
     return np.linspace(1e-3, 1.0 - 1e-3, n)
 
 

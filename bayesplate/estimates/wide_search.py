@@ -75,7 +75,7 @@ class Guess:
 
     @property
     def rigidities(self) -> Floats:
-        """Those at its middle, N m: (3,) array."""
+        """D_x, D_y, D_s at its middle, N m: (3,) array."""
         return np.array([self.values[name] for name in RIGIDITIES])
 
 
@@ -240,7 +240,7 @@ class _Tabled:
     every: tuple[tuple[RegularGridInterpolator, tuple[PeakLikelihood, ...]], ...]
 
     def log_likelihood(self, x: Floats, noise: float) -> Floats:
-        """Of the peaks at (n, 3) ln D: (n,) array, minus infinity where the table has no plate."""
+        """ln of the likelihood of all peaks at (n, 3) ln D: (n,), minus infinity where the table has no plate."""
         noises = np.full(len(x), noise)
         each = [one.log_likelihood(there, noises) for there, peaks in self._there(x) for one in peaks]
         return np.nan_to_num(np.sum(each, axis=0), nan=-np.inf, neginf=-np.inf)
@@ -292,7 +292,7 @@ def _values(nominal: Values, ratios: Floats, scale: float) -> Values:
 
 
 def _symmetric(system: System) -> System:
-    """Without the effects that break the plate's symmetry: they cost much, and move its frequencies by little."""
+    """The system without effects that break its symmetry: they cost much, and move its frequencies by little."""
     return replace(system, effects=tuple(effect for effect in system.effects if all(effect.keeps_symmetry())))
 
 
@@ -314,7 +314,7 @@ def _as_peaks(setup: Setup) -> tuple[Peak, ...]:
 
 
 def _places(model: SetupModel, n_peaks: int) -> tuple[Place, ...]:
-    """So many modes of each symmetry class that the peaks are among them."""
+    """The lowest modes of each symmetry class, enough to hold the peaks."""
     n_each = -(-int(_MODES_PER_PEAK * n_peaks + _SPARE) // len(model.plate.classes))
     return tuple(Place(one.parity, rank, 1.0) for one in model.plate.classes for rank in range(n_each))
 

@@ -57,7 +57,7 @@ class Near:
 
     @classmethod
     def of(cls, is_near: NDArray[np.bool_]) -> Near:
-        """From which peaks any draw has near which modes: an (n_peaks, n_modes) array."""
+        """Rows from an (n_peaks, n_modes) array: which peaks any draw has near which modes."""
         # Every mode is near a peak after all others, then to one before them: so one is found for each.
         near = np.ones((len(is_near) + 1, is_near.shape[1]), dtype=np.bool_)
         near[:-1] = is_near
@@ -70,7 +70,7 @@ class Near:
 
     @cached_property
     def starts(self) -> list[int]:
-        """Where the pairs of each mode begin among those of the row, and where the last ones end: n_modes + 1 int."""
+        """Index of the first pair of each mode among those of the row, and of the end: n_modes + 1 int."""
         counts = (end - first if end > first else 0 for first, end in zip(self.first, self.end, strict=True))
         return list(accumulate(counts, initial=0))
 
@@ -210,7 +210,7 @@ class Assignments:
 
     @property
     def _last(self) -> tuple[int, int]:
-        """Where in the table the sum over all is."""
+        """Place in the table of the sum over all."""
         a, b = self._passages[-1].window if self._passages else (slice(1), slice(1))
         return a.stop - 1, b.stop - 1
 

@@ -87,13 +87,13 @@ class SetupModel:
         return self.every_log_frequency(values, law)[:, : len(self.places)]
 
     def every_log_frequency(self, values: Values, law: LawName) -> NDArray[np.float64]:
-        """The same of the labelled modes, then of the others: (n_draws, n_modes + n_others) array."""
+        """ln f of the labelled modes, then of the others: (n_draws, n_modes + n_others) array."""
         own = log_frequency(self.law(law).squared(self.system.weights(values)))
         return mean_log_frequency([own, *(one.every_log_frequency(values, law) for one in self.roved)])
 
     @cached_property
     def _discrepancy_names(self) -> dict[int, tuple[str, str]]:
-        """By mode: the parameters whose product is its discrepancy."""
+        """Names of the two parameters whose product is the discrepancy of a mode, by mode."""
         names = {i: discrepancy_names(self.setup, label) for i, label in enumerate(self.every_label) if label}
         return {i: both for i, both in names.items() if both is not None}
 
@@ -109,7 +109,7 @@ class SetupModel:
         return found
 
     def tangent(self, values: Values) -> SetupModel:
-        """The same with the linear law of the modes that the exact law has at one draw of values."""
+        """A model with the linear law of the modes that the exact law has at one draw of values."""
         assert self.exact is not None
         linear = self.exact.tangent(self.system.weights(values))
         return replace(self, linear=linear, roved=tuple(one.tangent(values) for one in self.roved))
@@ -124,7 +124,7 @@ class SetupModel:
         return (*(reading.beams for reading in self.setup.readings), *(other.beams for other in self.others))
 
     def labelled_as(self, setup: Setup) -> SetupModel:
-        """The same modes where other readings have labels, each of a mode that the model has: nothing is solved."""
+        """A model of the same modes where other readings have labels, each of a mode that it has: nothing is solved."""
         beams = self.every_beams
         labelled = [beams.index(reading.beams) for reading in setup.readings]
         return self._labelled_as(setup, labelled, [i for i in range(len(beams)) if i not in labelled])

@@ -66,7 +66,7 @@ class PeakLikelihood:
 
     @classmethod
     def of(cls, model: SetupModel, robust: bool = False) -> PeakLikelihood | None:
-        """Of a setup's model that has all its modes (`with_others`); None where every peak has a sure label."""
+        """The likelihood of the peaks of a model with all modes (`with_others`); None if every peak has a sure label."""
         setup = model.setup
         if not takes_part(setup):
             return None
@@ -139,7 +139,7 @@ class PeakLikelihood:
         return total / len(noise)
 
     def probabilities_of_each(self, every_log_frequency: Floats, noise: Floats) -> Floats:
-        """The same at each draw: (n_peaks, n_modes, n_draws) array."""
+        """Probability that each peak is each mode at each draw: (n_peaks, n_modes, n_draws) array."""
         modes, _, assignments = self._assignments(every_log_frequency[:, self.columns], noise)
         result = np.zeros((*self.log_prior.shape, len(noise)))
         for row, (order, pairs) in enumerate(zip(self.orders, assignments.pairs(), strict=True)):
@@ -235,7 +235,7 @@ def takes_part(setup: Setup) -> bool:
 
 
 def _orders(signs: Rows, n_modes: int, residues: Floats | None) -> Iterator[Order]:
-    """Those that may be of one sign, peaks of which it is not known among both; or all together."""
+    """One order for each sign, peaks of unknown sign in both; or one of all peaks."""
     unsigned = np.flatnonzero(signs == 0)
     log_sign = np.zeros((3, n_modes))
     is_known = residues is not None and not np.isnan(residues).any()

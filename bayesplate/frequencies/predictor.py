@@ -26,13 +26,13 @@ class Predictor:
     n_constants: int = 3  # the first parameters, logarithms of free rigidities: all others have priors
 
     def __call__(self, x: Floats) -> Floats:
-        """From (n, n_free) parameters to (n, n_modes) ln f."""
+        """ln f, (n, n_modes), at (n, n_free) parameters."""
         values = self.values(x)
         every = np.concatenate(log_frequencies_of_board(self.models, values, self.law), axis=1)
         return every if self.rows is None else every[:, self.rows]
 
     def of(self, rows: NDArray[np.intp]) -> Predictor:
-        """The same for some of the modes, by their places among all."""
+        """A predictor of some of the modes, by their places among all."""
         return replace(self, rows=rows)
 
     def of_labelled(self) -> Predictor:
@@ -41,7 +41,7 @@ class Predictor:
         return self.of(np.concatenate([start + np.arange(len(model.places)) for start, model in both]))
 
     def with_fixed(self, rest: Floats) -> Predictor:
-        """The same as a function of the first parameters only, the (n_rest,) others held where they are."""
+        """A predictor of the first parameters only, the (n_rest,) others held where they are."""
         return replace(self, values=lambda x: self.values(np.concatenate([x, np.tile(rest, (len(x), 1))], axis=1)))
 
     def tangent(self, at: Floats) -> Predictor:

@@ -58,7 +58,7 @@ def prior_draws(board: Board, prior: PriorCard, rng: np.random.Generator, n: int
 
 
 def with_rigidities(values: Values) -> dict[str, NDArray[np.float64]]:
-    """The same values with D_x, D_y, D_s, from the moduli where these are given: all three, or one if isotropic."""
+    """Values with D_x, D_y, D_s added, from the moduli where these are given: all three, or one if isotropic."""
     if set(RIGIDITIES) <= set(values):
         return dict(values)
     if "E_y" not in values:

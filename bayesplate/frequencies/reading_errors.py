@@ -152,7 +152,7 @@ class ReadingErrors:
         return np.where(np.isnan(predicted), -np.inf, result)
 
     def log_likelihood_of_pairs(self, readings: NDArray[np.intp], predicted: Floats, noise: Floats) -> Floats:
-        """The same of (n_pairs,) readings if each were of the mode whose (n_pairs, n_draws) ln f it is paired with."""
+        """ln of the probability of (n_pairs,) readings if each were of the mode whose (n_pairs, n_draws) ln f is given."""
         if self.rounded.any():
             return np.ascontiguousarray(self.at(readings).log_likelihood(predicted.T, noise).T)
         scale = np.ascontiguousarray(_join(noise, self.own_sd).T)
@@ -212,7 +212,7 @@ class ReadingErrors:
         return np.sign(z) * root, np.where(at_peak, np.sqrt(self._density.curvature), slopes)
 
     def _of_interval(self, low: Floats, high: Floats) -> tuple[Floats, Floats]:
-        """The same for a probability between two bounds: the derivative is for both bounds moving together."""
+        """Signed root of the deviance of an interval, and its derivative by both bounds moving together."""
         density = self._density
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         highest, found = density.log_between(-half, half), density.log_between(low, high)

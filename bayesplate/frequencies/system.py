@@ -86,10 +86,7 @@ class System:
         return next((effect for effect in self.effects if effect.outline() is not None), None)
 
     def limits(self, x: NDArray[np.float64]) -> Limits | None:
-        """Where the plate begins and ends along y at fractions of its length, as fractions of its widest width.
-
-        None where it is a rectangle.
-        """
+        """Ends of the plate along y at fractions of its length, as fractions of its widest width; None: a rectangle."""
         outline = None if self.shaped is None else self.shaped.outline()
         return None if outline is None else outline(x)
 

@@ -113,6 +113,6 @@ def _dipoles(shape: tuple[int, int], steps: tuple[float, float]) -> Floats:
 
 
 def _between_panels(by_offset: Floats, shape: tuple[int, int]) -> Floats:
-    """From a table over offsets, no offset in its middle, to a matrix over pairs of panels."""
+    """Matrix over pairs of panels from a table over offsets, which has no offset in its middle."""
     i, j = (index.ravel() for index in np.indices(shape))
     return by_offset[shape[0] - 1 + i[:, None] - i, shape[1] - 1 + j[:, None] - j]

@@ -164,7 +164,7 @@ class SymmetryClass:
         return row
 
     def _on_unknowns(self, name: str, values: Floats) -> Floats:
-        """From (..., n_x, n_y) values on a field's functions to (..., n_dof) on the unknowns."""
+        """Values on the unknowns, (..., n_dof), from (..., n_x, n_y) values on a field's functions."""
         numbers = self._numbering[0][name].ravel()
         kept = numbers >= 0
         found = np.zeros((*values.shape[:-2], self.n_dof))
@@ -268,5 +268,5 @@ def _forms(first: Floats, second: Floats, weights: Floats) -> Floats:
 
 
 def _squares(first: Floats, second: Floats, weights: Floats) -> Floats:
-    """The same of each vector with itself."""
+    """Weighted sums of products of each vector with itself."""
     return np.asarray((first * second) @ weights)

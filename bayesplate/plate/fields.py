@@ -77,9 +77,9 @@ UNIFORM = Fabric()
 
 
 def layout(groups: Sequence[Group], counts: Mapping[Group, int]) -> list[tuple[int, int]]:
-    """Which of the plate's own terms takes which field, by their indices: every term with its first field first.
+    """Pairs of a term's index and the index of a field that it takes: every term with its first field first.
 
-    Given are the group of each term, and the number of fields of each group.
+    Given are the group of each of the plate's own terms, and the number of fields of each group.
     """
     most = max(counts[group] for group in groups)
     return [(term, k) for k in range(most) for term, group in enumerate(groups) if k < counts[group]]

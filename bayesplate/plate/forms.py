@@ -45,7 +45,7 @@ class Elements:
         return all(weight >= 0.0 for term, weight in self.elsewhere if isinstance(term, AtPlaces) and term.is_on_plate)
 
     def without_negative(self) -> Elements:
-        """The same without products at places of negative weight."""
+        """The elements without products at places of negative weight."""
         kept = (
             one for one in self.elsewhere if not (isinstance(one[0], AtPlaces) and one[0].is_on_plate and one[1] < 0.0)
         )
@@ -63,7 +63,7 @@ class Forms:
     masses: tuple[tuple[Term, Floats | None], ...]
 
     def with_terms(self, stiffness: Sequence[Term], masses: Sequence[Term]) -> Self:
-        """The same with further terms, which come after its own."""
+        """A plate with further terms, which come after its own."""
         stiff, inert = (
             tuple(
                 (one, weights_within(self.x, self.y, one.outline) if isinstance(one, OverPlate) else None)

@@ -41,7 +41,7 @@ class Line:
 
     @property
     def nodes(self) -> Floats:
-        """Where the elements meet, from 0 to 1 or to the middle."""
+        """Ends of the elements, from 0 to 1 or to the middle."""
         return np.asarray(self.basis.mesh.p[0])
 
     @property
@@ -60,7 +60,7 @@ class Line:
 
     @cached_property
     def weights(self) -> Floats:
-        """Their weights in an integral over the whole side: (n_points,) array."""
+        """Weights of the Gauss points in an integral over the whole side: (n_points,) array."""
         return self.share * np.asarray(self.basis.dx).ravel()
 
     @cached_property

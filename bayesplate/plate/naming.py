@@ -30,7 +30,7 @@ _AHEAD = 12
 
 @dataclass(frozen=True)
 class Place:
-    """Where a named mode stands: its class, its rank there, and how well the name fits."""
+    """The place of a named mode: its class, its rank there, and how well the name fits."""
 
     parity: Parity
     rank: int  # among the elastic modes of the class, from 0
@@ -156,7 +156,7 @@ def _expected_ranks(plate: Plate, weights: Weights, names: list[Beams]) -> dict[
 
 
 def _places(modes: ClassModes, names: Sequence[Beams]) -> dict[Beams, Place]:
-    """Those of the wanted names that some of the lowest modes of a class have."""
+    """Places of those wanted names that some of the lowest modes of a class have."""
     of_each = name_shapes(modes.own, modes.vectors, modes.on_plate)
     parity = modes.own.parity
     return {name: Place(parity, rank, fit) for rank, (name, fit) in enumerate(of_each) if name in names}

@@ -141,7 +141,7 @@ class ReducedOrderModel:
         return stiffness, mass
 
     def _of(self, own: ReducedClass) -> tuple[list[int], list[int]]:
-        """Which of the wanted modes are of a class, and their ranks there."""
+        """Indices of the wanted modes that are of a class, and their ranks there."""
         both = [(i, place.rank) for i, place in enumerate(self.places) if place.parity == own.parity]
         return [i for i, _ in both], [rank for _, rank in both]
 

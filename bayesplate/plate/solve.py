@@ -55,7 +55,7 @@ class ClassModes:
 
 
 def solve_classes(plate: Plate, weights: Weights, n_modes: Mapping[Parity, int]) -> dict[Parity, ClassModes]:
-    """As many of the lowest elastic modes of each symmetry class as asked for, at the weights of one draw.
+    """The lowest elastic modes, `n_modes` of each symmetry class, at the weights of one draw.
 
     LinAlgError if the weights are those of no plate.
     """
@@ -171,7 +171,7 @@ class Modes:
         return self.in_order({p: one.own.deflections(one.vectors).on(x, y) for p, one in self.by_class.items()})
 
     def displacement_across(self, x: Floats, y: Floats) -> Floats:
-        """The same at points y, (n_x, n_y), of their own at each x, (n_x,)."""
+        """Shapes at points y, (n_x, n_y), of their own at each x, (n_x,)."""
         return self.in_order({p: one.own.deflections(one.vectors).across(x, y) for p, one in self.by_class.items()})
 
 

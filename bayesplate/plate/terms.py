@@ -125,18 +125,18 @@ class Deflections:
     coefficients: Floats  # (n_vectors, n_functions_x, n_functions_y)
 
     def on(self, x: Floats, y: Floats) -> Floats:
-        """On a lattice, x and y fractions of the sides: (n_vectors, n_x, n_y) array."""
+        """Values on a lattice, x and y fractions of the sides: (n_vectors, n_x, n_y) array."""
         along_x, along_y = self.x.shapes(x, self.parity.x).toarray(), self.y.shapes(y, self.parity.y).toarray()
         return np.asarray(along_x @ self.coefficients @ along_y.T)
 
     def across(self, x: Floats, y: Floats) -> Floats:
-        """At points y, (n_x, n_y), of their own at each x, (n_x,): (n_vectors, n_x, n_y) array."""
+        """Values at points y, (n_x, n_y), of their own at each x, (n_x,): (n_vectors, n_x, n_y) array."""
         along_x = self.x.shapes(x, self.parity.x).toarray()
         along_y = self.y.shapes(y.ravel(), self.parity.y).toarray().reshape(*y.shape, -1)
         return np.einsum("xi,nij,xyj->nxy", along_x, self.coefficients, along_y, optimize=True)
 
     def integrals(self, outline: Outline | None) -> Floats:
-        """Over the plate, or what an outline leaves of it: (n_vectors,) array; zero where they are odd."""
+        """Integrals over the plate, or what an outline leaves of it: (n_vectors,) array; zero where they are odd."""
         if any(self.parity[axis] and side.is_split for axis, side in enumerate((self.x, self.y))):
             return np.zeros(len(self.coefficients))
         grid = self.x.derivatives[0] @ self.coefficients @ self.y.derivatives[0].T

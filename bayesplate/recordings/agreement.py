@@ -63,7 +63,7 @@ def _middle(squares: Floats) -> float:
 
 
 def _poles(spectra: Spectra, lowest: float, highest: float) -> Iterator[tuple[Floats, Floats, Rows]]:
-    """Of each strong peak: poles (n, 2) of the records that show it, over its decay rate; variances; their files."""
+    """For each strong peak the (n, 2) poles of the records that show it, over its decay rate; variances; files."""
     from scipy.signal import find_peaks, peak_widths
 
     values = spectra.values / spectra.noise

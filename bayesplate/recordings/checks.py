@@ -177,7 +177,7 @@ def _level_fault(one: Recording, signal: Floats, name: str) -> Fault | None:
 
 
 def _fall_beside(side: Floats, first: int, stop: int) -> float:
-    """By how much a wave falls before and after a run at its top, within as many samples: the smaller of the two."""
+    """The smaller fall of a wave before and after a run at its top, within as many samples."""
     length = stop - first
     beside = [part for part in (side[max(first - length, 0) : first], side[stop : stop + length]) if part.size]
     return min((float(side[first] - part.min()) for part in beside), default=0.0)

@@ -44,7 +44,7 @@ class PickedRow:
 
     @property
     def mode_probability(self) -> float:
-        """That it is a mode of the board, by the recordings and by the modes that the board has."""
+        """Probability of a mode of the board, by the recordings and by the modes that the board has."""
         return (1.0 - self.spurious_probability) * (1.0 - (self.unlabelled_probability or 0.0))
 
     def may_be(self, most: int) -> dict[str, float]:

@@ -97,7 +97,7 @@ def _fault(recording: Recording, onset: int, start: int, stop: int, end: str) ->
 
 
 def _fall(response: Floats, rate: float, onset: int, start: int, stop: int) -> float:
-    """By how many dB a sound falls from its first tenth to its last, at the frequencies that the hit has raised.
+    """Fall of a sound in dB from its first tenth to its last, at the frequencies that the hit has raised.
 
     Hum, a steady tone and rumble were there before the hit, and do not fall.
     """
@@ -119,7 +119,7 @@ def _powers(part: Floats, n: int) -> Floats:
 
 
 def _gated(heard: Floats, rate: float) -> int | None:
-    """Where a noise gate cuts a decay off: it falls suddenly, far and for good; None where none does."""
+    """Sample at which a noise gate cuts a decay off: it falls suddenly, far and for good; None where none does."""
     block = max(round(_GATE_BLOCK * rate), 1)
     n = heard.size // block
     steps = np.abs(np.diff(heard))

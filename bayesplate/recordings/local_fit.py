@@ -101,7 +101,7 @@ class Fitted:
 
     @property
     def variance(self) -> Floats:
-        """Of the noise of each record, (n_records,): the mean square of what is left, if that is not too little."""
+        """Noise variance of each record, (n_records,): the mean square of the rest, but not below the least one."""
         power = np.sum(np.abs(self.rest) ** 2, axis=0) / self.n_free
         return np.maximum(power, max(self.window.least_variance, 1e-300))
 

@@ -80,7 +80,7 @@ class _Part(NamedTuple):
     high: float
 
     def own(self, poles: Floats) -> Floats:
-        """Of modes (n_modes, 2) those that count."""
+        """Those of (n_modes, 2) modes that count."""
         return poles[(poles[:, 0] >= self.low) & (poles[:, 0] < self.high)]
 
 
@@ -191,7 +191,7 @@ def _inverse(information: Floats) -> Floats:
 
 
 def _excess(places: NDArray[np.intp], steps: Floats, variances: Floats) -> Floats:
-    """By how much the steps of hits, or of places, exceed their variances, 1 or more: the larger of the two ratios.
+    """Factor, at least 1, by which the steps of hits, or of places if larger, exceed their variances.
 
     The steps are those by which each record would move frequency and decay rate.
     """
@@ -229,7 +229,7 @@ def _expected(gain: float, n_records: int, n_lines: int) -> float:
 
 
 def _correlation(fit: Fitted) -> float:
-    """By how much what is left varies more slowly than from line to line: a factor of variances, 1 to 10."""
+    """Factor of variances, 1 to 10, by which the rest of a fit varies more slowly than from line to line."""
     rest = fit.rest / np.sqrt(fit.variance)
     total = float(np.sum(np.abs(rest) ** 2))
     factor = 1.0
@@ -242,7 +242,7 @@ def _correlation(fit: Fitted) -> float:
 
 
 def _narrower(fit: Fitted, part: _Part) -> Fitted:
-    """The same modes fitted to the lines of the window without most of its margins."""
+    """A fit of the same modes to the lines of the window without most of its margins."""
     window = fit.window
     kept = (window.frequency >= part.low - 0.4 * _MARGIN) & (window.frequency <= part.high + 0.4 * _MARGIN)
     if kept.sum() < 0.6 * kept.size or kept.sum() < 3 * len(fit.poles) + 8:
@@ -251,7 +251,7 @@ def _narrower(fit: Fitted, part: _Part) -> Fitted:
 
 
 def _shift(narrow: Fitted, pole: Floats, variances: Floats) -> Floats:
-    """By how much frequency and decay rate move in the narrower window, if that is more than fewer lines let expect."""
+    """Change of frequency and decay rate in the narrower window, if it is more than fewer lines let expect."""
     nearest = int(np.argmin(np.abs(narrow.poles[:, 0] - pole[0])))
     own = np.diagonal(_inverse(narrow.information()[1]))[[nearest, len(narrow.poles) + nearest]]
     expected = np.maximum(own - variances, 0.0)

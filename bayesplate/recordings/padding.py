@@ -40,5 +40,5 @@ def padding_of(values: NDArray[np.complex128]) -> int:
 
 
 def common_padding(responses: Sequence[FrequencyResponse]) -> int:
-    """The same of responses on one grid: the least of them, for nothing that one of them knows is left out."""
+    """The least padding of responses on one grid: nothing that one of them knows is left out."""
     return min(padding_of(one.values) for one in responses)

@@ -76,6 +76,6 @@ def _summed(each: Floats, likely: Floats) -> Floats:
 
 
 def _relative(each: Floats, likely: Floats) -> Floats:
-    """Over the average of the modes that a peak may be."""
+    """Log likelihoods less the average of the modes that a peak may be."""
     mean = _summed(each, likely) - np.log(np.sum(likely + 1e-6, axis=1))
     return np.clip(each - mean[:, None], _LEAST, -_LEAST)

@@ -118,7 +118,6 @@ class _Beside:
         self.broad = broad_odds(np.array([mode.damping for mode in modes]), weights)
 
     def verdict(self, m: int) -> Verdict:
-        """On one mode."""
         mode, alike = self.modes[m], self.answered[m].alike
         unlike = _unlike(alike, self.n_places, self.n_records - self.n_places)
         lines = self._of_lines(m, unlike)
@@ -136,7 +135,7 @@ class _Beside:
         return Verdict(spurious, worst)
 
     def _of_lines(self, m: int, unlike: float) -> dict[str, float]:
-        """That it is hum of the mains or another line that does not decay."""
+        """Probability of hum of the mains, or of another line that does not decay."""
         mode = self.modes[m]
         off = min(abs(mode.frequency - base * round(mode.frequency / base)) for base in _MAINS)
         is_mains = mode.frequency > 40.0 and off < _NEAR_MAINS and mode.decay < _NEAR_MAINS
@@ -205,7 +204,7 @@ def weighted_median(values: Floats, weights: Floats) -> float:
 
 
 def _unlike(alike: float, n_places: int, spare: int) -> float:
-    """That residues are alike from hit to hit by chance only."""
+    """Probability that residues are alike from hit to hit by chance only."""
     from scipy.special import betaln
 
     if spare < 2 or alike >= 1.0:

@@ -64,7 +64,7 @@ def read_recordings(
 
 
 def _set_aside(read: list[Read]) -> list[Read]:
-    """Of a file with several recordings those that are neither silent nor a copy, the first with the remarks."""
+    """Recordings of a file that are neither silent nor a copy of another; the first has the remarks on the rest."""
     kept, told, seen = list[Read](), list[str](), dict[bytes, str]()
     for one in read:
         signal = one.response if isinstance(one, Recording) else one.values

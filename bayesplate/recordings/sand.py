@@ -90,7 +90,7 @@ def agreement(forms: Floats, shapes: Floats) -> Floats:
 
 
 def _still(shape: Floats) -> Floats:
-    """Where sand would lie, 0 to 1, at the points of the grid."""
+    """Stillness of a shape, 0 to 1, at the points of the grid: sand lies where it is 1."""
     level = np.abs(shape) / np.abs(shape).max()
     return _sampled(np.exp(-((level / _STILL) ** 2)), *_points())
 

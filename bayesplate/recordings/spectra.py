@@ -111,7 +111,7 @@ def response_spectra(responses: Sequence[FrequencyResponse], highest: float, pad
 
 
 def _force_spectrum(force: Floats, rate: float, hit: Hit, frequency: Floats) -> Complex:
-    """Of one pulse, from the moment at which the decay begins; outside the pulse the force is noise."""
+    """Spectrum of one pulse, its time counted from where the decay begins; outside the pulse the force is noise."""
     first = max(hit.onset - round(_BEFORE_PULSE * rate), 0)
     pulse = force[first : hit.start] - np.median(force)
     at = (np.arange(first, hit.start) - hit.start) / rate

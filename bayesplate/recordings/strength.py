@@ -50,7 +50,7 @@ class Answer:
 
     @property
     def complexity(self) -> float:
-        """By how many degrees the residues are complex, 0 to 90, the strongest counting most."""
+        """Angle of the residues from real ones, 0 to 90 degrees, the strongest counting most."""
         squares, power = np.sum(self.mobility**2), float(np.sum(np.abs(self.mobility) ** 2))
         # of residues r_k e^(i a) with one a, the sum of squares is real and positive where a is zero
         return float(np.degrees(0.5 * np.arccos(np.clip(np.real(squares) / max(power, 1e-300), -1.0, 1.0))))

@@ -94,7 +94,7 @@ _WARP = (
 
 @dataclass(frozen=True, eq=False)
 class _Outline:
-    """Where a whole board begins and ends along y, m, at points along it, clamped parts included."""
+    """Ends of a whole board along y, m, at points along it, clamped parts included."""
 
     x: Floats
     low: Floats
@@ -106,7 +106,7 @@ class _Outline:
         return float(self.high.max())
 
     def at(self, x: Floats) -> tuple[Floats, Floats]:
-        """Where it begins and ends along y at points along it, m; as at its ends beyond them."""
+        """Its ends along y at points along it, m; beyond its length as at its ends."""
         return np.interp(x, self.x, self.low), np.interp(x, self.x, self.high)
 
     def across(self) -> str:

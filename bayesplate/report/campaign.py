@@ -149,7 +149,7 @@ def _shown(names: Iterable[str]) -> list[str]:
 
 
 def _ends(entry: Spread, factor: float) -> tuple[float, float, float]:
-    """Where a 90 % interval begins, its median, and where it ends."""
+    """Lower end, median and upper end of a 90 % interval."""
     return entry.q05 * factor, entry.q50 * factor, entry.q95 * factor
 
 

@@ -96,7 +96,7 @@ def chladni_sheet(sheet: Sheet, marks: Marks | None = None) -> Figure:
 
 
 def _close(plan: Layout) -> Layout:
-    """The same panels with no more room below each than its caption takes."""
+    """A layout with the same panels and no more room below each than its caption takes."""
     height = min(plan.cell[1], plan.panel[1] + _CAPTION + _GAP + _AIR)
     return replace(plan, cell=(plan.cell[0], height))
 
@@ -182,7 +182,7 @@ def _outline(limits: Limits | None) -> tuple[NDArray[np.float64], NDArray[np.flo
 
 
 def _places(n: int, limits: Limits | None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where a shape of n by n points is drawn: x and y, as it is, (n, n) arrays."""
+    """Points x and y, (n, n) arrays, at which a shape of n by n points is drawn."""
     x, y = np.meshgrid(points(n), points(n), indexing="ij")
     if limits is None:
         return x, y

@@ -52,7 +52,7 @@ def constants_figure(summary: Summary, moduli: Mapping[str, NDArray[np.float64]]
 
 
 def constants_picture(summary: Summary, moduli: Mapping[str, NDArray[np.float64]]) -> Picture:
-    """The same below each other, for a page."""
+    """The posterior of each constant below the other, for a page."""
     figure, panels = stacked([0.95] * 3, left=0.2, right=0.2, top=0.3, bottom=0.95, gap=0.72)
     for panel, name in zip(panels, MODULI, strict=True):
         _draw_posterior(panel, name, summary, moduli[name])

@@ -202,7 +202,7 @@ def _figure(picture: Picture | None, place: str, wanted: str, got: str) -> Figur
 
 
 def _place(what: str, name: str | None, names: Sequence[str]) -> int:
-    """Where a name stands among those that there are; the first if none is given."""
+    """Index of a name among those that there are; the first if none is given."""
     if name is not None and name not in names:
         raise InputError(Fault(what, f"one of {', '.join(names)}", repr(name)))
     return 0 if name is None else list(names).index(name)

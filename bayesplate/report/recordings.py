@@ -163,7 +163,7 @@ def errors_picture(report: PickReport) -> Picture:
 
 
 def stability_picture(report: PickReport, paths: Sequence[FoundPath]) -> Picture:
-    """Where the search found modes with one mode in a window, with two, and so on."""
+    """The modes that the search found with one mode in a window, with two, and so on."""
     figure, (panel,) = stacked([2.2], left=0.55, right=0.2, bottom=0.75, top=0.05)
     widths = sorted({path.width for path in paths}, reverse=True)
     keys = []
