@@ -95,14 +95,14 @@ class Precision:
     noise: Mapping[str, float]  # relative, by setup
 
     def band(self, frequency: float, shares: NDArray[np.float64], setup: str) -> tuple[float, float]:
-        """Band, Hz, that holds a reading two times in three, to first order, from the (3,) shares in the mode's energy."""
+        """Band, Hz, that holds a reading two times in three, to first order, from (3,) shares in the energy."""
         variance = 0.25 * shares @ self.covariance @ shares + self.noise[setup] ** 2
         factor = float(np.exp(_TWO_THIRDS * np.sqrt(variance)))
         return frequency / factor, frequency * factor
 
 
 def points(n: int = _GRID) -> NDArray[np.float64]:
-    """Points of each side, (n,) fractions of it, at which shapes are sampled; the outer ones a hair within the edges."""
+    """Points of each side, (n,) fractions of it, at which shapes are sampled, all a hair within the edges."""
     return np.linspace(1e-3, 1.0 - 1e-3, n)
 
 

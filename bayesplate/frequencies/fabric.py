@@ -45,7 +45,10 @@ def _joined(effects: tuple[Effect, ...]) -> dict[Group, list[Joined]]:
         return {}
     whole = [{"along": each.get("bending", _UNIFORM), **each} for each in varying]
     every = {group: product(*(each.get(group, _UNIFORM) for each in whole)) for group in _GROUPS}
-    return {group: [joined for joined in each if _order(joined) <= HIGHEST_ORDER] for group, each in every.items()}
+    return {
+        group: [joined for joined in each if sum(one.order for one in joined) <= HIGHEST_ORDER]
+        for group, each in every.items()
+    }
 
 
 def fabric_of(effects: Sequence[Effect]) -> Fabric:
@@ -118,10 +121,6 @@ def over_fields(base: Weights, effects: Sequence[Effect], theory: Theory, values
 
 def _reweighed(base: Weights, effects: Sequence[Effect], values: Values, setup: Setup) -> Weights:
     return reduce(lambda weights, effect: effect.reweigh(weights, values, setup), effects, base)
-
-
-def _order(joined: Joined) -> int:
-    return sum(one.order for one in joined)
 
 
 def _fields(joined: Joined) -> tuple[Field | EdgeStrip | None, ...]:

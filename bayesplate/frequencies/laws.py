@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,24 +18,12 @@ _LARGEST = 1e150
 """Weight above which a draw is no plate: its matrices, or products of them, would not be finite."""
 
 
-class Law(Protocol):
-    """omega^2 of the wanted modes from the weights of the terms."""
-
-    @property
-    def name(self) -> LawName:
-        """ "linear" or "exact"."""
-
-    def squared(self, weights: Weights) -> NDArray[np.float64]:
-        """omega^2 in s^-2: (n_draws, n_modes) array."""
-
-
 @dataclass(frozen=True, eq=False)
 class LinearLaw:
     """omega^2 as a ratio of weighted energies of the modes at the estimate: the paper's law."""
 
     stiffness: NDArray[np.float64]  # (n_modes, n_terms)
     mass: NDArray[np.float64]  # (n_modes, n_masses)
-    name: LawName = "linear"
 
     def squared(self, weights: Weights) -> NDArray[np.float64]:
         """omega^2 in s^-2: (n_draws, n_modes) array; negative where the law has left the region it is made for."""
@@ -47,7 +35,6 @@ class ExactLaw:
     """omega^2 as eigenvalues of a reduced-order model."""
 
     reduced: ReducedOrderModel
-    name: LawName = "exact"
 
     def squared(self, weights: Weights) -> NDArray[np.float64]:
         """omega^2 in s^-2: (n_draws, n_modes) array; not a number at a draw that is no plate.

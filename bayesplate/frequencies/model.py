@@ -13,7 +13,7 @@ from bayesplate.board.board import Values
 from bayesplate.board.sessions import discrepancy_names
 from bayesplate.board.setup import Setup
 from bayesplate.frequencies.columns import rigidity_parts
-from bayesplate.frequencies.laws import ExactLaw, Law, LawName, LinearLaw, log_frequency, mean_log_frequency
+from bayesplate.frequencies.laws import ExactLaw, LawName, LinearLaw, log_frequency, mean_log_frequency
 from bayesplate.frequencies.residues import residues_of
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
@@ -71,7 +71,7 @@ class SetupModel:
     def setup(self) -> Setup:
         return self.system.setup
 
-    def law(self, name: LawName) -> Law:
+    def law(self, name: LawName) -> LinearLaw | ExactLaw:
         if name == "linear":
             return self.linear
         if self.exact is None:
@@ -206,15 +206,9 @@ def with_others(model: SetupModel, values: Values) -> SetupModel:
     """
     found, modes = _with_others(model, values)
     roved = tuple(_with_others(one, values, len(modes.eigenvalues))[0] for one in model.roved)
-    n = min(len(one.others) for one in (found, *roved))
-    return replace(_with_few(found, n), roved=tuple(_with_few(one, n) for one in roved))
-
-
-def _with_few(model: SetupModel, n: int) -> SetupModel:
-    n_every = len(model.places) + n
-    linear = LinearLaw(model.linear.stiffness[:n_every], model.linear.mass[:n_every])
-    residues = None if model.residues is None else model.residues[:n_every]
-    return replace(model, others=model.others[:n], linear=linear, residues=residues)
+    n_labelled, n_others = len(model.places), min(len(one.others) for one in (found, *roved))
+    rest = range(n_labelled, n_labelled + n_others)
+    return replace(found, roved=roved)._labelled_as(model.setup, list(range(n_labelled)), list(rest))
 
 
 def _with_others(model: SetupModel, values: Values, n_least: int = 0) -> tuple[SetupModel, Modes]:

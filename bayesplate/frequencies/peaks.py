@@ -66,7 +66,7 @@ class PeakLikelihood:
 
     @classmethod
     def of(cls, model: SetupModel, robust: bool = False) -> PeakLikelihood | None:
-        """The likelihood of the peaks of a model with all modes (`with_others`); None if every peak has a sure label."""
+        """The likelihood of the peaks of a model with all modes (`with_others`); None if all labels are sure."""
         setup = model.setup
         if not takes_part(setup):
             return None

@@ -152,7 +152,7 @@ class ReadingErrors:
         return np.where(np.isnan(predicted), -np.inf, result)
 
     def log_likelihood_of_pairs(self, readings: NDArray[np.intp], predicted: Floats, noise: Floats) -> Floats:
-        """ln of the probability of (n_pairs,) readings if each were of the mode whose (n_pairs, n_draws) ln f is given."""
+        """ln of the probability of (n_pairs,) readings if each were of the mode of the (n_pairs, n_draws) ln f."""
         if self.rounded.any():
             return np.ascontiguousarray(self.at(readings).log_likelihood(predicted.T, noise).T)
         scale = np.ascontiguousarray(_join(noise, self.own_sd).T)

@@ -19,11 +19,10 @@ from __future__ import annotations
 from functools import lru_cache
 
 from bayesplate.board.setup import Ends
-from bayesplate.plate.fields import Group
 from bayesplate.plate.line import line
 from bayesplate.plate.plate import Plate, plate_of
 from bayesplate.plate.terms import Derivative, Kinematics
-from bayesplate.plate.thin import THIN, THIN_TERMS, thin_groups
+from bayesplate.plate.thin import THIN, THIN_TERMS
 
 SHEAR_TERMS = (*THIN_TERMS, "shear_x", "shear_y")
 SHEAR_MASSES = ("board", "rotary_x", "rotary_y")
@@ -35,17 +34,6 @@ SHEAR_ELEMENTS_PER_SIDE = 16
 """Elements per side for `bayesplate.plate.mesh.mesh`: six modes within 0.15 cent, twelve within 0.3."""
 
 _TWIST = (Derivative(1.0, "w", 1, 1), Derivative(-0.5, "g_x", 0, 1), Derivative(-0.5, "g_y", 1, 0))
-
-
-def shear_groups(is_turned: bool = False) -> tuple[tuple[Group, ...], tuple[Group, ...]]:
-    """Group of each stiffness and of each mass term that is the shear-flexible plate's own.
-
-    Where the grain runs at an angle, the terms that couple bending with twist and the two shear strains come last.
-    """
-    bending, _ = thin_groups(is_turned)
-    own, coupling = bending[: len(THIN_TERMS)], bending[len(THIN_TERMS) :]
-    strains: tuple[Group, ...] = ("shear",) if is_turned else ()
-    return (*own, "shear", "shear", *coupling, *strains), ("mass", "rotary", "rotary")
 
 
 SHEAR_FLEXIBLE = Kinematics(
@@ -70,7 +58,9 @@ SHEAR_FLEXIBLE = Kinematics(
         ("shear_x", "shear_y"),
     ),
     masses=(("w", "w"), ("turn_x", "turn_x"), ("turn_y", "turn_y")),
-    groups=shear_groups,
+    groups_of_stiffnesses=(*THIN.groups_of_stiffnesses, "shear", "shear"),
+    turned_groups=(*THIN.turned_groups[:4], "shear", "shear", *THIN.turned_groups[4:], "shear"),
+    groups_of_masses=("mass", "rotary", "rotary"),
 )
 
 

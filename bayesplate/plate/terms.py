@@ -61,8 +61,13 @@ class Kinematics(NamedTuple):
     strains: Mapping[str, Strain]  # "turn_x" and "turn_y" are how the cross-sections turn
     stiffnesses: tuple[Pair, ...]  # of the plate's own terms, those that a turned grain adds last
     masses: tuple[Pair, ...]
-    # from whether the grain runs at an angle to the group of each of the plate's own terms
-    groups: Callable[[bool], tuple[tuple[Group, ...], tuple[Group, ...]]]
+    groups_of_stiffnesses: tuple[Group, ...]
+    turned_groups: tuple[Group, ...]  # of the stiffnesses where the grain runs at an angle
+    groups_of_masses: tuple[Group, ...]
+
+    def groups(self, is_turned: bool) -> tuple[tuple[Group, ...], tuple[Group, ...]]:
+        """Group of each stiffness and of each mass term that is the plate's own."""
+        return self.turned_groups if is_turned else self.groups_of_stiffnesses, self.groups_of_masses
 
 
 @dataclass(frozen=True)

@@ -80,9 +80,6 @@ class Training:
     modes: Mapping[Beams, TrainedMode]
     plates: tuple[TrainingPlate, ...]
 
-    def plate(self, factors: tuple[float, float]) -> TrainingPlate:
-        return next(plate for plate in self.plates if plate.factors == factors)
-
 
 def train(
     ends_x: Ends,
