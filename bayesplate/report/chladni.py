@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bayesplate.estimates.sheet import CombinedMode, Sheet, SheetMode, points
 from bayesplate.frequencies.system import Limits
+from bayesplate.planning.places import Placing
 from bayesplate.report.style import BLUE, DARK, GREEN, SMALL, VERMILLION, WORDS, drawable, in_figure, placed
 from bayesplate.results.words import STIFFNESS, STIFFNESS_OF_ISOTROPIC
 
@@ -57,25 +58,15 @@ def layout(n_modes: int, aspect_ratio: float, *, has_combined: bool) -> Layout:
     return max(found, key=lambda one: one.panel[0])
 
 
-@dataclass(frozen=True)
-class Marks:
-    """What is marked on every figure of a sheet, as fractions of the length that vibrates and of the width there."""
-
-    sensor: tuple[float, float]
-    hammer: tuple[float, float]
-    taps: tuple[tuple[float, float], ...]
-    heading: str  # in place of the sheet's own
-
-
-def chladni_sheet(sheet: Sheet, marks: Marks | None = None) -> Figure:
-    """A sheet, A4 upright: one panel a mode in the order of frequency, then the combined modes."""
+def chladni_sheet(sheet: Sheet, placing: Placing | None = None) -> Figure:
+    """A sheet, A4 upright: a panel for each mode, where sensor and hammer go on each, then the combined modes."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=A4)
     plan = layout(len(sheet.modes), sheet.aspect_ratio, has_combined=bool(sheet.combined))
-    if marks is not None:
+    if placing is not None:
         plan = _close(plan)
-    heading = f"{'Chladni figures' if marks is None else marks.heading}: {drawable(sheet.title)}"
+    heading = f"{'Chladni figures' if placing is None else 'Modes to look for'}: {drawable(sheet.title)}"
     size = min(14.0, 14.0 * _LONGEST_HEADING / len(heading))
     _text(figure, A4[0] / 2, A4[1] - 0.45, heading, fontsize=size, weight="bold")
     held = f"setup: {sheet.setup}; {sheet.theory} plate; Hz {sheet.basis}"
@@ -86,12 +77,12 @@ def chladni_sheet(sheet: Sheet, marks: Marks | None = None) -> Figure:
         in_row = min(plan.n_columns, len(sheet.modes) - row * plan.n_columns)
         panel = _panel(figure, plan, _left(plan, column, in_row), top - row * plan.cell[1], sheet)
         draw_sand(panel, mode.shape, sheet.limits)
-        if marks is not None:
-            _draw_marks(panel, marks, sheet)
+        if placing is not None:
+            _draw_placing(panel, placing, sheet)
         caption(panel, *_mode_caption(mode))
     if sheet.combined:
         _draw_combined(figure, plan, sheet, top - plan.n_rows * plan.cell[1])
-    _legend(figure, sheet, marks)
+    _legend(figure, sheet, placing)
     return figure
 
 
@@ -101,17 +92,17 @@ def _close(plan: Layout) -> Layout:
     return replace(plan, cell=(plan.cell[0], height))
 
 
-def _draw_marks(panel: Axes, marks: Marks, sheet: Sheet) -> None:
+def _draw_placing(panel: Axes, placing: Placing, sheet: Sheet) -> None:
     style: Any = {"ls": "none", "clip_on": False, "zorder": 6, "mec": "black"}
-    if marks.taps:
+    if placing.taps:
         panel.plot(
-            *np.transpose([sheet.drawn_at(*tap) for tap in marks.taps]),
+            *np.transpose([sheet.drawn_at(*tap) for tap in placing.taps]),
             ".",
             ms=4,
             **style | {"mfc": GREEN, "mec": GREEN},
         )
-    panel.plot(*sheet.drawn_at(*marks.sensor), "o", ms=8, color=BLUE, mew=0.8, **style)
-    panel.plot(*sheet.drawn_at(*marks.hammer), "X", ms=9, color=VERMILLION, mew=0.8, **style)
+    panel.plot(*sheet.drawn_at(*placing.sensor), "o", ms=8, color=BLUE, mew=0.8, **style)
+    panel.plot(*sheet.drawn_at(*placing.hammer), "X", ms=9, color=VERMILLION, mew=0.8, **style)
 
 
 def _draw_combined(figure: Figure, plan: Layout, sheet: Sheet, top: float) -> None:
@@ -229,7 +220,7 @@ def caption(panel: Axes, first: str, *others: str) -> None:
         panel.annotate(line, (0.5, 0.0), (0, -18 - 10 * i), fontsize=SMALL, color=DARK, **common)
 
 
-def _legend(figure: Figure, sheet: Sheet, marks: Marks | None) -> None:
+def _legend(figure: Figure, sheet: Sheet, placing: Placing | None) -> None:
     drawn = {"clamped": "hatched", "supported": "dashed", "free": "thin"}
     edges = ", ".join(f"{drawn[word]} = {word}" for word in dict.fromkeys(sheet.edges.values()))
     along, begins = ("x", "x") if sheet.isotropic else ("the grain", "The grain")
@@ -240,7 +231,7 @@ def _legend(figure: Figure, sheet: Sheet, marks: Marks | None) -> None:
         f"here the counts begin at {sheet.first_label}.",
     )
     told = [f"Likely: two times in three, {sheet.likely}."] if sheet.likely else []
-    if marks is not None:
+    if placing is not None:
         told.append("Disc: the sensor. Cross: the hammer. Small dots: tap there to tell the figures apart.")
     for i, line in enumerate((*lines, *told)):
         _text(figure, A4[0] / 2, 0.68 - 0.15 * i, line, fontsize=8)

@@ -12,7 +12,7 @@ from bayesplate.board.material import MODULI
 from bayesplate.planning.bench import Bench
 from bayesplate.planning.plan import Plan, ProposalEntry
 from bayesplate.planning.words import shared_words
-from bayesplate.report.chladni import Marks, chladni_sheet
+from bayesplate.report.chladni import chladni_sheet
 from bayesplate.report.style import (
     BLUE,
     DARK,
@@ -116,5 +116,4 @@ def _told(one: ProposalEntry) -> str:
 
 def bench_sheet(bench: Bench) -> Figure:
     """The sheet of one way to hold the board: A4 upright, one panel a mode in the order of frequency."""
-    placing = bench.placing
-    return chladni_sheet(bench.sheet, Marks(placing.sensor, placing.hammer, placing.taps, "Modes to look for"))
+    return chladni_sheet(bench.sheet, bench.placing)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from types import SimpleNamespace
 
 from bayesplate.diagnosis.known_words import known_table
 from bayesplate.diagnosis.result import Diagnosis
@@ -30,25 +31,6 @@ from bayesplate.results.fit_tables import compared_constants
 from bayesplate.results.summary import Summary
 from bayesplate.results.tables import Table
 
-
-@dataclass(frozen=True)
-class DiagnosisSection:
-    """Everything that the page shows of a diagnosis besides its pictures."""
-
-    heading: str
-    # each word that a verdict may be, what it means, and whether it is the one given
-    verdicts: tuple[tuple[str, str, bool], ...]
-    sentences: tuple[str, ...]
-    known: str  # what known effects do to the error, and what is claimed of those that the card states
-    tables: tuple[Table, ...]  # of probabilities, errors, conditions of the claim, shift of the constants, sizes
-    explained: tuple[str, ...]  # what two words of these tables mean
-    model: str  # which model the rest of the page is of
-    notes: tuple[str, ...]
-    known_effects: Table | None
-    candidates: Table | None
-    recommendation: str
-
-
 _LOG_SCORE = (
     "Log score: the natural logarithm of how probable each reading was, given the others, summed over the modes. The "
     "higher, the better; it punishes errors as well as intervals that are too narrow."
@@ -56,7 +38,8 @@ _LOG_SCORE = (
 _SHIFT = "Shift, sd: how far a constant moves, counted in the standard deviations that it had before."
 
 
-def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
+def diagnosis_section(diagnosis: Diagnosis) -> SimpleNamespace:
+    """Everything that the page shows of a diagnosis besides its pictures."""
     tables = (
         answers_table(diagnosis),
         errors_table(diagnosis),
@@ -64,8 +47,9 @@ def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
         shift_table(diagnosis),
         sizes_table(diagnosis),
     )
-    return DiagnosisSection(
+    return SimpleNamespace(
         heading=IN_PART if diagnosis.named_in_part else VERDICTS[diagnosis.verdict].heading,
+        # each word that a verdict may be, what it means, and whether it is the one given
         verdicts=tuple((word, one.heading, word == diagnosis.verdict) for word, one in VERDICTS.items()),
         sentences=tuple(verdict_sentences(diagnosis)),
         known=" ".join(known_sentences(diagnosis)),
