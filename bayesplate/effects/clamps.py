@@ -43,8 +43,7 @@ class CompliantClamp(Effect):
         return None if self.refusal(board, setup) else replace(self, owner=setup.owner, clamped=clamped_ends(setup))
 
     def springs(self, strains: tuple[str, str], stiffest: float, power: int) -> tuple[Contribution, ...]:
-        """Springs along the clamped edges of each side that has any; what they hold along x0 and x1, and along y0 and
-        y1.
+        """Springs along the clamped edges of each side, against a strain along x0 and x1, and along y0 and y1.
 
         A spring of stiffness k has the weight k / (rho h L^power): 3 if it holds the slope, 1 if the deflection. The
         parameter `compliance` is D / (k L^(4 - power)) of the first side that has a clamped edge; k is the same along

@@ -23,9 +23,7 @@ _RATIO_SOURCE = "log-normal around the published G_xz / E_x 0.05-0.12 and G_yz /
 
 @dataclass(frozen=True)
 class TransverseShear(Effect):
-    """The shear-flexible plate in place of the thin one; a modulus (Pa) that is None is G_xy, as in a plate alike in
-    all directions.
-    """
+    """The shear-flexible plate in place of the thin one; a modulus (Pa) that is None is G_xy."""
 
     xz: Quantity | None = DEFAULT_XZ
     yz: Quantity | None = DEFAULT_YZ

@@ -39,8 +39,7 @@ class Estimate:
     rigidities: NDArray[np.float64]  # (3,), N m
     values: Mapping[str, NDArray[np.float64]]  # the rigidities and the nominal inputs
     models: tuple[SetupModel, ...]  # one a setup, solved at the estimate, settled or not
-    # (n_modes, 3) d ln f / d ln D, setup after setup; a fit of an isotropic board moves along their sum
-    # (`Symmetry.along`)
+    # (n_modes, 3) d ln f / d ln D, setup after setup; see `Symmetry.along` for an isotropic board
     sensitivities: NDArray[np.float64]
     residuals: NDArray[np.float64]  # (n_modes,): ln measured - ln predicted
     scales: NDArray[np.float64]  # (n_modes,): of `reading_scales`
@@ -116,8 +115,7 @@ def _round(tried: Sequence[Estimate]) -> Sequence[Estimate]:
 
 
 def _overshoot(before: tuple[NDArray[np.float64], NDArray[np.float64]], wanted: NDArray[np.float64]) -> float:
-    """Factor, at least 1, by which a step is too long: from what the last one, taken as it was, left of what was
-    wanted.
+    """Factor, at least 1, by which a step is too long, from what the last one left of what was wanted.
 
     Near a veering the slopes turn within a step; where the residuals are large there, steps go to and fro and hardly
     shrink. The secant through the last two of them tells by how much they overshoot.

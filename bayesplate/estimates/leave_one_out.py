@@ -100,9 +100,7 @@ def leverages_of(
 
 
 def carrying_modes(board: Board, found: Leverages, names: Sequence[str]) -> tuple[CarryingMode, ...]:
-    """The modes of a board that alone carry something, in the order of its readings; names of the parameters, constants
-    first.
-    """
+    """The modes of a board that alone carry one of the named parameters, of which the constants come first."""
     return tuple(
         CarryingMode(setup, label, float(leverage), names[column])
         for (setup, label), leverage, column in zip(_readings(board), found.values, found.carries, strict=True)

@@ -18,8 +18,7 @@ from bayesplate.frequencies.columns import inverse_lambda
 class PaperSystem:
     """The linear system psi = X d of a board."""
 
-    # (n_modes,), N m: omega^2 / lambda of the measured frequencies, lambda = 1 / (rho h A^2), less what effects give of
-    # it
+    # (n_modes,), N m: measured omega^2 / lambda, lambda = 1 / (rho h A^2), less what effects give of it
     psi: NDArray[np.float64]
     coefficients: NDArray[np.float64]  # X, (n_modes, 3): a, b, c
     values: Values  # nominal inputs, for the moduli

@@ -264,9 +264,7 @@ def _contradiction(board: Board, prior: PriorCard, speed: float, rng: np.random.
 
 
 def speed_and_ratio(board: Board) -> tuple[float, float]:
-    """Speed of sound that the readings imply in the stiffer direction, sqrt(12 D / rho h^3), m/s, and D_y / D_x, both
-    rough.
-    """
+    """Speed of sound in the stiffer direction, sqrt(12 D / rho h^3) in m/s, and D_y / D_x, from rough rigidities."""
     values = board.nominal()
     D_x, D_y, _ = starting_rigidities(board)
     return float(np.sqrt(12.0 * max(D_x, D_y) / (density(values) * values["thickness"] ** 3))), float(D_y / D_x)

@@ -110,9 +110,7 @@ def most_likely(
 
 
 def has_come_to_rest(fitted: Floats, starts: Floats, n: int) -> NDArray[np.bool_]:
-    """Whether fits, (..., n_free) with n constants, ended well within reach of their starts: else nothing tells the
-    constants.
-    """
+    """Whether (..., n_free) fits ended well within reach of their starts: else nothing tells the n constants."""
     return np.asarray(_distance(fitted, starts, n) <= _EDGE * _REACH)
 
 

@@ -20,8 +20,7 @@ SMALLEST = 0.005
 
 
 def rise_with_air(board: Board, estimate: Estimate) -> NDArray[np.float64]:
-    """Relative rise of E_x, E_y and G_xy with open air of 1.2 kg/m3 around every setup, by weighted least squares:
-    (3,).
+    """Relative rise of E_x, E_y and G_xy, (3,), with open air of 1.2 kg/m3 around every setup.
 
     Zeros where a fluid is declared: whatever it is, it is in the model.
     """

@@ -85,10 +85,9 @@ def are_far_apart(first: Floats, second: Floats) -> bool:
 
 
 def search_widely(board: Board, prior: PriorCard, rng: np.random.Generator) -> list[Guess]:
-    """Regions of the prior in which the peaks of a board are likely, those under a smaller noise and the likelier ones
-    first.
+    """Regions of the prior in which the peaks of a board are likely: of smaller noise, then likelier ones first.
 
-    Labels tell the symmetry class of their peak here, and nothing else. Empty where no draw has a frequency for every
+    Labels tell the symmetry class of their peak here, and nothing else. Empty where no draw has a frequency for each
     mode.
     """
     nominal = board.nominal()

@@ -28,21 +28,21 @@ class Columns(NamedTuple):
 def columns(system: System, values: Values, stiffness: NDArray[np.float64]) -> Columns:
     """Coefficients of modes from their (n_modes, n_terms) energies phi' K_i phi: Ducceschi et al., eq. (10, 12)."""
     per_lambda = inverse_lambda(values, system.setup)
-    parts, total = (one * per_lambda for one in rigidity_parts(system, values, stiffness))
+    total, without = (one * per_lambda for one in with_and_without(system, values, stiffness))
     constants = np.array([float(values[name]) for name in RIGIDITIES])
-    coefficients = parts / constants
+    coefficients = (total[:, None] - without) / constants
     rest = total - coefficients @ constants
     rest[np.abs(rest) < 1e-9 * total] = 0.0
     return Columns(coefficients, rest)
 
 
-def rigidity_parts(
+def with_and_without(
     system: System, values: Values, stiffness: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What D_x, D_y and D_s give to omega^2 of modes, (n_modes, 3), and all of it, (n_modes,), s^-2."""
-    total = stiffness @ system.weights(values).stiffness[0]
+    """omega^2 of modes, (n_modes,) s^-2, and what is left of it without D_x, D_y or D_s, (n_modes, 3)."""
     zeroed = (system.weights({**values, name: 0.0 * values[name]}).stiffness[0] for name in RIGIDITIES)
-    return np.column_stack([total - stiffness @ without for without in zeroed]), total
+    without = np.column_stack([stiffness @ weights for weights in zeroed])
+    return stiffness @ system.weights(values).stiffness[0], without
 
 
 def inverse_lambda(values: Values, setup: Setup) -> float:

@@ -85,8 +85,7 @@ def in_plane(effects: Sequence[Effect], values: Values) -> Field | None:
 
 
 def over_fields(base: Weights, effects: Sequence[Effect], theory: Theory, values: Values, setup: Setup) -> Weights:
-    """Weights of the plate's own terms in the presence of effects, once for each field that they take, as `layout` has
-    them.
+    """Weights of the plate's own terms in the presence of effects, once for each field, in the order of `layout`.
 
     `base` has each term once, without effects. The part of the modulus along the grain takes fields of its own, and is
     turned with the grain as all the rest.

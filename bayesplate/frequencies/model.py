@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bayesplate.board.board import Values
 from bayesplate.board.sessions import discrepancy_names
 from bayesplate.board.setup import Setup
-from bayesplate.frequencies.columns import rigidity_parts
+from bayesplate.frequencies.columns import with_and_without
 from bayesplate.frequencies.laws import ExactLaw, LawName, LinearLaw, log_frequency, mean_log_frequency
 from bayesplate.frequencies.residues import residues_of
 from bayesplate.frequencies.system import System
@@ -152,8 +152,8 @@ class SetupModel:
         """
         if self.roved:
             return np.asarray(np.mean([one.sensitivities(values) for one in self.stations], axis=0))
-        parts, total = rigidity_parts(self.system, values, self.linear.stiffness[: len(self.places)])
-        return 0.5 * parts / total[:, None]
+        total, without = with_and_without(self.system, values, self.linear.stiffness[: len(self.places)])
+        return 0.5 * (1.0 - without / total[:, None])
 
 
 def setup_model(
@@ -201,9 +201,7 @@ def _ranked_model(system: System, values: Values, plate: Plate, places: tuple[Pl
 
 
 def with_others(model: SetupModel, values: Values) -> SetupModel:
-    """Add the modes that peaks may be, with their linear law: all without a label up to above the highest peak, at
-    least one.
-    """
+    """Add the modes without a label, at least one, up to above the highest peak, with their linear law."""
     found, modes = _with_others(model, values)
     roved = tuple(_with_others(one, values, len(modes.eigenvalues))[0] for one in model.roved)
     n_labelled, n_others = len(model.places), min(len(one.others) for one in (found, *roved))

@@ -155,8 +155,7 @@ class PeakLikelihood:
         return float(self.log_alone[at] - np.log(width))
 
     def _assignments(self, there: Floats, noise: Floats) -> tuple[Rows, Floats, Assignments]:
-        """What the peaks say of the modes in the order of each draw, that order, and ln of the probability that each
-        left no peak.
+        """The order of the modes, ln of the probability that each left no peak, and what the peaks say in that order.
 
         The order is (n_modes, n_draws), or (n_modes, 1) where all draws have one. Pairs that are near each other at no
         draw are left out.
@@ -195,9 +194,7 @@ class PeakLikelihood:
         return np.asarray((most - log_missed.min(axis=1))[self._peaks])
 
     def _log_missed(self, log_frequency: Floats, noise: Floats) -> Floats:
-        """ln of the probability that each mode left no peak, none of them infinite, from ln f: (n_modes, n_draws)
-        arrays.
-        """
+        """Finite ln of the probability that each mode left no peak, from ln f: (n_modes, n_draws) arrays."""
         from scipy.special import ndtr
 
         missed = np.repeat(self.missed[:, None], noise.size, axis=1)

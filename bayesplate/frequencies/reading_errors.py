@@ -139,8 +139,7 @@ class ReadingErrors:
         return _join(noise, np.sqrt(self.own_variance))
 
     def log_likelihood(self, predicted: Floats, noise: ArrayLike) -> Floats:
-        """ln of the probability of each reading: of its rounding interval where it is rounded, else the density of ln
-        f.
+        """ln of the probability of each reading: of its rounding interval, or else of the density of ln f.
 
         Minus infinity where the model has no frequency, which is not a number.
         """
@@ -161,9 +160,7 @@ class ReadingErrors:
         return np.asarray(self._density.log(z) - np.log(scale)[readings])
 
     def log_most(self, lowest: Floats, highest: Floats, least_noise: float, most_noise: float) -> Floats:
-        """The most that `log_likelihood_of_pairs` may be, or somewhat more, within ranges of ln f: (n_readings,
-        n_modes).
-        """
+        """The most that `log_likelihood_of_pairs` is within ranges of ln f, or more: (n_readings, n_modes)."""
         away = np.maximum(lowest - self.log_high[:, None], self.log_low[:, None] - highest)
         z = np.maximum(away, 0.0) / _join(most_noise, self.own_sd)[:, None]
         result = self._density.log(z) - np.log(_join(least_noise, self.own_sd))[:, None]

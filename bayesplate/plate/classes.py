@@ -195,8 +195,7 @@ class SymmetryClass:
         return found
 
     def on_span(self, pencils: Sequence[tuple[Any, Any]], weights: Weights, vectors: Floats) -> tuple[Floats, Floats]:
-        """Stiffness and mass of n draws on the span of (n_dof, n_vectors) vectors: two (n, n_vectors, n_vectors)
-        arrays.
+        """Stiffness and mass of n draws on the span of (n_dof, n_vectors) vectors: (n, n_vectors, n_vectors).
 
         The pencils, as of `pencil`, are joined by the terms that exist on deflections only.
         """

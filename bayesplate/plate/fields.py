@@ -86,9 +86,7 @@ def layout(groups: Sequence[Group], counts: Mapping[Group, int]) -> list[tuple[i
 
 
 def weights_within(x: Line, y: Line, outline: Outline | None = None, factor: Field | None = None) -> Floats:
-    """Weights of the plate's Gauss points, (n_x, n_y), in integrals of a field within an outline; None: uniform,
-    everywhere.
-    """
+    """Weights of the plate's Gauss points, (n_x, n_y), in integrals of a field (None: uniform) within an outline."""
     if outline is None:
         uniform = np.outer(x.weights, y.weights)
         return uniform if factor is None else uniform * factor(x.points[:, None], y.points)

@@ -145,8 +145,7 @@ def rigid_degrees(ends: Ends) -> tuple[int, ...]:
 
 
 def graded_nodes(ends: Holds, n_elements: int) -> Floats:
-    """Nodes of equal elements, save that the one at each free end is split at a quarter and at a sixteenth of its
-    length.
+    """Nodes of equal elements, save that the one at each free end is split at 1/4 and 1/16 of its length.
 
     Along a free edge the twist of a shear-flexible plate dies out over about a third of the thickness times sqrt(G_xy /
     G_xz): a layer too narrow for as many equal elements, whose frequencies lie up to 3 cents too high. The split ones

@@ -62,8 +62,7 @@ def membrane_terms(
     curvatures: tuple[Curvature, ...] = CURVATURES,
     thickness: Field | None = None,
 ) -> Floats:
-    """Membrane energies of deflections, by `curvature_pairs` and by the moduli: (n_pairs * 4, n_vectors, n_vectors)
-    array.
+    """Membrane energies, (n_pairs * 4, n_vectors, n_vectors), by `curvature_pairs` and by the moduli.
 
     For a plate of unit area: what a unit of the product of the two curvatures (each pair once, a cross term both ways)
     and of the modulus gives to the stiffness. The in-plane fields are solved at the `moduli` Q_11, Q_12, Q_22, Q_66, of

@@ -91,9 +91,7 @@ def fits(parts: Floats, squares: Floats, on_plate: Floats) -> Floats:
 
 
 def name_parts(parts: Floats) -> list[tuple[int, float]]:
-    """Product and correlation of each mode, from what it has of each (1: all of it), each product given to one mode
-    only.
-    """
+    """Product and correlation of each mode, from what it has of each (1: all); a product goes to one mode only."""
     from scipy.optimize import linear_sum_assignment
 
     rows, columns = linear_sum_assignment(parts**2, maximize=True)

@@ -71,10 +71,9 @@ class ReducedClass:
         return _weighted(weights.mass, self.masses)
 
     def ranks(self, weights: Weights, n_modes: int, least: float = 0.0) -> NDArray[np.intp]:
-        """Which of the lowest elastic modes each of `products` names, with at least that correlation: (n_draws,
-        n_products).
+        """Rank of the mode that each of `products` names with at least that correlation: (n_draws, n_products).
 
-        From 0; `n_modes` where it names none of them, -1 at a draw that is no plate.
+        From 0; `n_modes` where it names none of the lowest elastic modes, -1 at a draw that is no plate.
         """
         found = np.full((len(weights.stiffness), len(self.products)), -1, dtype=np.intp)
         values, vectors = self.modes(weights, n_modes)
@@ -121,8 +120,7 @@ class ReducedOrderModel:
         return values
 
     def ranks(self, weights: Weights, least: float = 0.0) -> dict[Beams, NDArray[np.intp]]:
-        """Rank in its class of the mode that each product of beam functions names, with at least that correlation:
-        (n_draws,).
+        """Rank in its class of the mode that each product names with at least that correlation: (n_draws,).
 
         A product that names none of the lowest modes has the highest rank of all; -1 at a draw that is no plate.
         """

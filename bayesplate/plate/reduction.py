@@ -42,8 +42,7 @@ def reduced_order_model(
     held_out: Sequence[Weights],
     tolerance: float,
 ) -> ReducedOrderModel:
-    """Project a plate on its modes at `centre` and `around` it, and check the result at the points `held_out`, in
-    cents.
+    """Project a plate on its modes at `centre` and `around` it, and check it at the points `held_out`, in cents.
 
     Of many points around the first half will do if the error at the held-out ones stays within the tolerance and the
     basis short. While that is not so, the second half joins the basis, then half of the held-out points. The check is

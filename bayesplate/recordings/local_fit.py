@@ -89,8 +89,7 @@ class Fitted:
     poles: Floats  # (n_modes, 2), Hz: frequency, and decay rate: half the width of the peak at half its power
     residues: Complex  # (n_modes, n_records): of the values of the window
     rest: Complex  # (n_lines, n_records): what the fit leaves
-    # (n_lines, 2 n_modes): change of a mode's shape with its frequency, then its decay rate, less what other shapes
-    # take up
+    # (n_lines, 2 n_modes): change of a shape with its frequency, then its decay rate, less what other shapes take up
     jacobian: Complex
     orthogonal: Complex  # (n_lines, n_basis): an orthonormal basis of the shapes
 

@@ -39,8 +39,7 @@ class Answer:
     # but for a factor for each place without a force
     mobility: Complex
     sd: Floats
-    # share of the residues' power, 0 to 1, that is the same for every hit between the same places; 1 where there is one
-    # each
+    # share of the residues' power that is the same for every hit between the same places; 1 where there is one each
     alike: float
 
     @property

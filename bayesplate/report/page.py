@@ -74,8 +74,7 @@ def write_report(
 def save_page(
     path: Path, groups: Mapping[str, Sequence[Picture]], text: Callable[[Mapping[str, Sequence[PagePicture]]], str]
 ) -> Path:
-    """Write a page and, into the folder beside it, its figures as PNG and SVG; pictures go by the place where they
-    stand.
+    """Write a page and, into the folder beside it, its figures as PNG and SVG, by the place where they stand.
 
     The page shows the SVG figures, and is there before the PNG files are.
     """

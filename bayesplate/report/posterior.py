@@ -60,9 +60,7 @@ class Compared:
 
     @property
     def told(self) -> str:
-        """What the readings made of it: how much narrower, or whether it was at least moved; what is positive by its
-        logarithm.
-        """
+        """What the readings made of it: how much narrower, or moved; of what is positive, by its logarithm."""
         is_log = self.prior.kind != "normal"
         draws = np.log(self.draws) if is_log else self.draws
         mean, sd = (np.log(self.prior.median), self.prior.log_sd) if is_log else (self.prior.mean, self.prior.sd)

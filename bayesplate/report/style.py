@@ -76,9 +76,7 @@ def stacked(
     bottom: float = 0.45,
     gap: float = 0.55,
 ) -> tuple[Figure, list[Axes]]:
-    """An empty figure with panels below each other, the first on top; all in inches, so that no layout need be searched
-    for.
-    """
+    """An empty figure with panels below each other, placed in inches, so that no layout need be searched for."""
     from matplotlib.figure import Figure
 
     height = top + sum(heights) + gap * (len(heights) - 1) + bottom
