@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
@@ -22,8 +22,6 @@ from bayesplate.board.setup import Ends
 from bayesplate.effects.base import Effect
 from bayesplate.effects.part import Part, vibrating_part
 from bayesplate.plate.beams import beam_functions
-
-Floats = NDArray[np.float64]
 
 CARRIED = 0.95
 """Share of the variance of the energies that the components carry, where `MOST` of them can."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board, Values, vibrating_lengths
 from bayesplate.board.coefficients import CoefficientCard
 from bayesplate.board.material import RIGIDITIES, moduli
@@ -41,10 +41,10 @@ class CoefficientRows:
 
     source: CoefficientSource
     # (n_modes,): readings of the setup; a printed table may lack modes of peaks without a sure label
-    readings: NDArray[np.intp]
-    coefficients: NDArray[np.float64]  # (n_modes, 3): a, b, c
+    readings: Indices
+    coefficients: Floats  # (n_modes, 3): a, b, c
     # (n_modes,), N m: what effects make of omega^2 / lambda; training and table have shear in a, b, c
-    rest: NDArray[np.float64]
+    rest: Floats
     aspect_ratio: float  # L_x / L_y
     theory: str
     sentence: str
@@ -221,7 +221,7 @@ def _distances(
     card: CoefficientCard,
     setup: Setup,
     beams: Sequence[Beams],
-    rows: NDArray[np.float64],
+    rows: Floats,
     thickness_ratio: float,
 ) -> dict[Theory, float]:
     """How far a table's frequencies lie from plates of each theory in the middle of its training: rms, cents."""

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.material import ORTHOTROPIC, Symmetry
 from bayesplate.effects.words import joined
@@ -35,27 +35,27 @@ class Identifiability:
     """How well n readings determine the constants of a board, to first order at the estimate."""
 
     condition_number: float  # of the weighted sensitivities d ln f / d ln D: free of the units of the constants
-    covariance: NDArray[np.float64]  # (n_constants, n_constants): of ln of the free rigidities, at the expected noise
-    leverages: NDArray[np.float64]  # (n_modes,): share of each reading in its own prediction; their sum is n_constants
-    shares: NDArray[np.float64]  # (n_modes, 3): of D_x, D_y, D_s in each mode's energy; rows sum to 1
+    covariance: Floats  # (n_constants, n_constants): of ln of the free rigidities, at the expected noise
+    leverages: Floats  # (n_modes,): share of each reading in its own prediction; their sum is n_constants
+    shares: Floats  # (n_modes, 3): of D_x, D_y, D_s in each mode's energy; rows sum to 1
     symmetry: Symmetry = ORTHOTROPIC
     # (n_constants,) standard errors of ln D where the others are known within `OTHERS_WITHIN`: a constant that hardly
     # enters a mode does not spoil what the mode tells of another
-    errors_beside_known: NDArray[np.float64] | None = None
+    errors_beside_known: Floats | None = None
 
     @property
-    def standard_errors(self) -> NDArray[np.float64]:
+    def standard_errors(self) -> Floats:
         """Standard errors of ln of the free rigidities: (n_constants,) array."""
         return np.sqrt(np.diagonal(self.covariance))
 
     @property
-    def of_rigidities(self) -> NDArray[np.float64]:
+    def of_rigidities(self) -> Floats:
         """Covariance of ln D_x, ln D_y, ln D_s: (3, 3) array, of rank one where they follow one of them."""
         follows = list(self.symmetry.follows)
         return np.asarray(self.covariance[np.ix_(follows, follows)])
 
     @property
-    def errors_of_rigidities(self) -> NDArray[np.float64]:
+    def errors_of_rigidities(self) -> Floats:
         """Standard errors of ln D_x, ln D_y, ln D_s: (3,) array."""
         return np.sqrt(np.diagonal(self.of_rigidities))
 
@@ -65,9 +65,7 @@ class Identifiability:
         return tuple(n for n, error in zip(self.symmetry.free, self.standard_errors, strict=True) if not error <= limit)
 
 
-def identifiability(
-    sensitivities: NDArray[np.float64], scales: NDArray[np.float64], symmetry: Symmetry = ORTHOTROPIC
-) -> Identifiability:
+def identifiability(sensitivities: Floats, scales: Floats, symmetry: Symmetry = ORTHOTROPIC) -> Identifiability:
     """First-order identifiability from (n_modes, 3) d ln f / d ln D and the relative uncertainties of the readings.
 
     Variances are infinite where the readings leave a direction open.
@@ -84,7 +82,7 @@ def identifiability(
     return Identifiability(condition, covariance, leverages, 2.0 * sensitivities, symmetry, beside)
 
 
-def _errors_beside_known(information: NDArray[np.float64]) -> NDArray[np.float64]:
+def _errors_beside_known(information: Floats) -> Floats:
     """Standard error of ln of each constant where the others have a 95 % interval of `OTHERS_WITHIN`."""
     precision = (1.96 / np.log(OTHERS_WITHIN)) ** 2
     errors = []
@@ -140,7 +138,7 @@ def require_identifiable(board: Board, found: Identifiability) -> None:
     )
 
 
-def _factors(errors: NDArray[np.float64]) -> NDArray[np.float64]:
+def _factors(errors: Floats) -> Floats:
     """Factor within which 95 % lie, from standard errors of logarithms."""
     with np.errstate(over="ignore"):
         return np.asarray(np.exp(1.96 * errors))

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.board.setup import Setup
@@ -36,22 +36,22 @@ _PULL = 1e-3
 class Estimate:
     """A point estimate of the rigidities, and how well the readings determine it."""
 
-    rigidities: NDArray[np.float64]  # (3,), N m
-    values: Mapping[str, NDArray[np.float64]]  # the rigidities and the nominal inputs
+    rigidities: Floats  # (3,), N m
+    values: Mapping[str, Floats]  # the rigidities and the nominal inputs
     models: tuple[SetupModel, ...]  # one a setup, solved at the estimate, settled or not
     # (n_modes, 3) d ln f / d ln D, setup after setup; see `Symmetry.along` for an isotropic board
-    sensitivities: NDArray[np.float64]
-    residuals: NDArray[np.float64]  # (n_modes,): ln measured - ln predicted
-    scales: NDArray[np.float64]  # (n_modes,): of `reading_scales`
+    sensitivities: Floats
+    residuals: Floats  # (n_modes,): ln measured - ln predicted
+    scales: Floats  # (n_modes,): of `reading_scales`
     converged: bool
 
 
-def reading_scales(board: Board) -> NDArray[np.float64]:
+def reading_scales(board: Board) -> Floats:
     """Relative uncertainty of each reading at the median noise of its setup, rounding included: (n_modes,) array."""
     return reading_sd(board.setups, [setup.noise.median for setup in board.setups])
 
 
-def log_measured(board: Board) -> NDArray[np.float64]:
+def log_measured(board: Board) -> Floats:
     """ln of the measured frequencies (Hz), setup after setup: (n_modes,) array."""
     return np.log(np.concatenate([setup.measured for setup in board.setups]))
 
@@ -59,7 +59,7 @@ def log_measured(board: Board) -> NDArray[np.float64]:
 def weighted_least_squares(
     board: Board,
     most_steps: int = MOST_STEPS,
-    start: NDArray[np.float64] | None = None,
+    start: Floats | None = None,
     accepted: float = _CONVERGED,
 ) -> Estimate:
     """Rigidities that minimise the weighted squares of relative frequency errors over all setups.
@@ -76,7 +76,7 @@ def weighted_least_squares(
     target, scales = log_measured(board), reading_scales(board)
     settled, previous = False, np.inf
     tried: list[Estimate] = []
-    before: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    before: tuple[Floats, Floats] | None = None
     for _ in range(most_steps):
         values = inputs | symmetry.rigidities(np.exp(log_next), nu_xy)
         rigidities = np.array([float(values[name]) for name in RIGIDITIES])
@@ -114,7 +114,7 @@ def _round(tried: Sequence[Estimate]) -> Sequence[Estimate]:
     return ()
 
 
-def _overshoot(before: tuple[NDArray[np.float64], NDArray[np.float64]], wanted: NDArray[np.float64]) -> float:
+def _overshoot(before: tuple[Floats, Floats], wanted: Floats) -> float:
     """Factor, at least 1, by which a step is too long, from what the last one left of what was wanted.
 
     Near a veering the slopes turn within a step; where the residuals are large there, steps go to and fro and hardly
@@ -145,7 +145,7 @@ def has_settled(step: float, previous: float, accepted: float = _CONVERGED) -> b
     return remaining < accepted or previous <= step < _SMALL
 
 
-def starting_rigidities(board: Board) -> NDArray[np.float64]:
+def starting_rigidities(board: Board) -> Floats:
     """Rough rigidities from Rayleigh quotients of beam-function products, which need no constants: (3,) array, N m.
 
     A weak pull towards a plate that bends alike both ways keeps within reach what the modes do not tell.
@@ -163,7 +163,7 @@ def starting_rigidities(board: Board) -> NDArray[np.float64]:
     return np.asarray(columns @ (alike * np.maximum(constants, 1e-2 * constants.max())))
 
 
-def _rayleigh_rows(setup: Setup, inputs: Values) -> NDArray[np.float64]:
+def _rayleigh_rows(setup: Setup, inputs: Values) -> Floats:
     products = product_coefficients(setup.ends_x, setup.ends_y)
     columns = rigidity_columns(inputs, setup)
     return np.stack([products[:, i, j] for i, j in (reading.beams for reading in setup.readings)]) @ columns

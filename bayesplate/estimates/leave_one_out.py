@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import effect_name, joined
@@ -36,22 +36,22 @@ class Leverages:
     """How much each reading decides its own prediction, to first order."""
 
     # (n_readings,), 0 to 1; of a mode that was read in several sessions, of these readings together
-    values: NDArray[np.float64]
+    values: Floats
     # (n_readings,): parameter that the mode alone carries, constants first; -1: none, or too few modes to leave one out
-    carries: NDArray[np.intp]
+    carries: Indices
 
 
 @dataclass(frozen=True, eq=False)
 class Errors:
     """ln measured - ln predicted of every mode, by one estimator."""
 
-    in_sample: NDArray[np.float64]  # (n_modes,)
+    in_sample: Floats  # (n_modes,)
     # (n_modes,): by a refit without the mode; nan where the others leave a constant open, and everywhere if there are
     # no more modes than constants
-    left_out: NDArray[np.float64]
+    left_out: Floats
     leverages: Leverages  # at the fit of all modes
 
-    def at(self, readings: NDArray[np.intp], n_readings: int) -> Errors:
+    def at(self, readings: Indices, n_readings: int) -> Errors:
         """The errors among those of more readings, by their indices; what the others have is not a number."""
         in_sample, left_out, values = (np.full(n_readings, none) for none in (np.nan, np.nan, 0.0))
         carries = np.full(n_readings, -1, dtype=np.intp)
@@ -71,8 +71,8 @@ class CarryingMode:
 
 
 def leverages_of(
-    columns: NDArray[np.float64],
-    scales: NDArray[np.float64],
+    columns: Floats,
+    scales: Floats,
     modes: Sequence[Sequence[int]] | None = None,
     n_open: int = 3,
 ) -> Leverages:
@@ -141,12 +141,12 @@ def _readings(board: Board) -> list[tuple[str, str]]:
 
 def prediction_errors(
     predict: Predict,
-    target: NDArray[np.float64],
+    target: Floats,
     misfit: Misfit,
-    starts: NDArray[np.float64],
+    starts: Floats,
     bounds: Bounds | None = None,
     modes: Sequence[Sequence[int]] | None = None,
-    scales: NDArray[np.float64] | None = None,
+    scales: Floats | None = None,
 ) -> Errors:
     """Errors of the most likely constants, in sample and with each mode left out in turn.
 
@@ -157,11 +157,11 @@ def prediction_errors(
     """
     n = n_constants(predict)
 
-    def best(starts: NDArray[np.float64], squares: NDArray[np.float64]) -> NDArray[np.float64]:
+    def best(starts: Floats, squares: Floats) -> Floats:
         lost = squares.sum(axis=1) + np.sum(starts[:, n:] ** 2, axis=1)
         return np.asarray(starts[np.argmin(np.where(np.isfinite(lost), lost, np.inf))])
 
-    def squared(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def squared(x: Floats) -> Floats:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a start may be no plate
             return misfit(predict(x))[0] ** 2
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import Moduli, moduli
 from bayesplate.estimates.coefficients import CoefficientRows, CoefficientSource, coefficient_rows
@@ -19,12 +19,12 @@ class PaperSystem:
     """The linear system psi = X d of a board."""
 
     # (n_modes,), N m: measured omega^2 / lambda, lambda = 1 / (rho h A^2), less what effects give of it
-    psi: NDArray[np.float64]
-    coefficients: NDArray[np.float64]  # X, (n_modes, 3): a, b, c
+    psi: Floats
+    coefficients: Floats  # X, (n_modes, 3): a, b, c
     values: Values  # nominal inputs, for the moduli
     origins: tuple[CoefficientRows, ...] = ()  # one a setup
 
-    def solve(self, rows: NDArray[np.intp] | slice = slice(None)) -> NDArray[np.float64]:
+    def solve(self, rows: Indices | slice = slice(None)) -> Floats:
         """Unweighted least squares of the modes `rows`, (..., n_some) for many subsets: (..., 3) d_x, d_y, d_s in N m.
 
         Ducceschi et al., eq. (13). The shortest solution where a subset leaves something open; not a number where it
@@ -36,7 +36,7 @@ class PaperSystem:
         cutoff = np.finfo(np.float64).eps * max(coefficients.shape[-2:])
         return np.asarray((np.linalg.pinv(coefficients, cutoff) @ psi[..., None])[..., 0])
 
-    def moduli(self, constants: NDArray[np.float64], nu_yx: float | None = None) -> Moduli:
+    def moduli(self, constants: Floats, nu_yx: float | None = None) -> Moduli:
         """Elastic moduli of (..., 3) rigidities, Pa; Ducceschi et al., eq. (14).
 
         With `nu_yx` given, the Poisson factor 1 - nu_xy nu_yx is fixed as the paper does; otherwise nu_yx follows from

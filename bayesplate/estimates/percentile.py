@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Bools, Floats
 from bayesplate.board.material import MODULI
 from bayesplate.estimates.paper import PaperSystem
 
@@ -27,8 +27,8 @@ MOST_MODES = 16
 class PercentileEstimate:
     """Mean and spread of the trimmed estimates of each modulus, Pa."""
 
-    estimates: NDArray[np.float64]  # (n_subsets, 3) E_x, E_y, G_xy, before trimming
-    kept: NDArray[np.bool_]  # (n_subsets, 3)
+    estimates: Floats  # (n_subsets, 3) E_x, E_y, G_xy, before trimming
+    kept: Bools  # (n_subsets, 3)
     mean: Mapping[str, float]
     sd: Mapping[str, float]
 
@@ -59,7 +59,7 @@ def percentile_estimate(system: PaperSystem) -> PercentileEstimate | None:
     return PercentileEstimate(estimates, kept, means, sds)
 
 
-def _trimmed(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _trimmed(values: Floats) -> Bools:
     """Which values are positive and lie between the two percentiles of the positive ones."""
     positive = values > 0
     if not positive.any():

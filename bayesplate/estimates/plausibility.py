@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, density
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.board.prior import PriorCard
@@ -19,8 +19,6 @@ from bayesplate.frequencies.prior_bands import prior_draws, with_rigidities
 from bayesplate.frequencies.terms import term_weights
 from bayesplate.labels import Label
 from bayesplate.plate.beams import N_BEAMS, product_coefficients
-
-Floats = NDArray[np.float64]
 
 FASTEST = 15_000.0
 """Speed of sound in m/s that stiffness and density may imply: 5,000 in spruce and steel, 13,000 in carbon fibre."""

@@ -6,13 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Bools, Floats
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.reading_errors import ReadingErrors
 
-Floats = NDArray[np.float64]
 Predict = Callable[[Floats], Floats]
 """From (n_draws, n_free) parameters to (n_draws, n_modes) logarithms of frequencies.
 
@@ -109,7 +108,7 @@ def most_likely(
         return np.asarray(least_squares(residuals, start, jacobian, bounds=limits, x_scale="jac").x)
 
 
-def has_come_to_rest(fitted: Floats, starts: Floats, n: int) -> NDArray[np.bool_]:
+def has_come_to_rest(fitted: Floats, starts: Floats, n: int) -> Bools:
     """Whether (..., n_free) fits ended well within reach of their starts: else nothing tells the n constants."""
     return np.asarray(_distance(fitted, starts, n) <= _EDGE * _REACH)
 

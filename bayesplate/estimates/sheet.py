@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.effects.part import aspect_ratio_of
@@ -43,9 +43,9 @@ class SheetMode:
     hertz: float
     measured_hz: float | None
     band_hz: tuple[float, float] | None  # where it is expected two times in three
-    shares: NDArray[np.float64]  # (4,): of D_x, D_y, D_s and of effects in its energy
-    coefficients: NDArray[np.float64]  # (3,): the paper's a, b, c
-    shape: NDArray[np.float64]  # (n_x, n_y): as `sampled` at `points`
+    shares: Floats  # (4,): of D_x, D_y, D_s and of effects in its energy
+    coefficients: Floats  # (3,): the paper's a, b, c
+    shape: Floats  # (n_x, n_y): as `sampled` at `points`
 
     @property
     def miss_cents(self) -> float | None:
@@ -60,7 +60,7 @@ class CombinedMode:
     name: str
     modulus: str
     weights: Mapping[str, float]
-    shape: NDArray[np.float64]
+    shape: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,22 +93,22 @@ class Sheet:
 class Precision:
     """What the modes measured so far foretell of the others."""
 
-    covariance: NDArray[np.float64]  # (3, 3): of ln D_x, ln D_y, ln D_s
+    covariance: Floats  # (3, 3): of ln D_x, ln D_y, ln D_s
     noise: Mapping[str, float]  # relative, by setup
 
-    def band(self, frequency: float, shares: NDArray[np.float64], setup: str) -> tuple[float, float]:
+    def band(self, frequency: float, shares: Floats, setup: str) -> tuple[float, float]:
         """Band, Hz, that holds a reading two times in three, to first order, from (3,) shares in the energy."""
         variance = 0.25 * shares @ self.covariance @ shares + self.noise[setup] ** 2
         factor = float(np.exp(_TWO_THIRDS * np.sqrt(variance)))
         return frequency / factor, frequency * factor
 
 
-def points(n: int = _GRID) -> NDArray[np.float64]:
+def points(n: int = _GRID) -> Floats:
     """Points of each side, (n,) fractions of it, at which shapes are sampled, all a hair within the edges."""
     return np.linspace(1e-3, 1.0 - 1e-3, n)
 
 
-def sampled(modes: Modes, limits: Limits | None, grid: NDArray[np.float64]) -> NDArray[np.float64]:
+def sampled(modes: Modes, limits: Limits | None, grid: Floats) -> Floats:
     """Deflections of modes, (n_modes, n, n), positive next to the corner of x1 and y1.
 
     The grid is in fractions of the length, and of the width at each of its points; `limits` are those of the plate
@@ -200,7 +200,7 @@ def _combined(modes: tuple[SheetMode, ...]) -> tuple[CombinedMode, ...]:
     )
 
 
-def combination(coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
+def combination(coefficients: Floats) -> Floats:
     """How much of each mode makes each combined mode, (3, n_modes): the inverse of X = (a, b, c) by Moore and Penrose.
 
     Its product with X is the unit matrix: the combined psi are d_x, d_y and d_s (Ducceschi et al., section 3).
@@ -211,7 +211,7 @@ def combination(coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.linalg.pinv(coefficients))
 
 
-def combined_shapes(coefficients: NDArray[np.float64], shapes: NDArray[np.float64]) -> NDArray[np.float64]:
+def combined_shapes(coefficients: Floats, shapes: Floats) -> Floats:
     """Shapes of the combined modes alpha, beta and gamma, (3, n_x, n_y), from (n_modes, n_x, n_y) shapes on one grid.
 
     Each mode enters with unit norm, positive next to the corner of x1 and y1: the paper does not state its signs, and
@@ -222,14 +222,14 @@ def combined_shapes(coefficients: NDArray[np.float64], shapes: NDArray[np.float6
     return np.asarray(np.tensordot(combination(coefficients), units, axes=1))
 
 
-def corner_signs(shapes: NDArray[np.float64]) -> NDArray[np.float64]:
+def corner_signs(shapes: Floats) -> Floats:
     """Sign of each shape next to the corner of x1 and y1, where held edges may be zero themselves."""
     n_x, n_y = shapes.shape[1] // 10 + 2, shapes.shape[2] // 10 + 2
     near = shapes[:, -n_x:, -n_y:].sum(axis=(1, 2))
     return np.where(near < 0, -1.0, 1.0)
 
 
-def labelled_shapes(models: Sequence[SetupModel], values: Values) -> dict[str, dict[str, NDArray[np.float64]]]:
+def labelled_shapes(models: Sequence[SetupModel], values: Values) -> dict[str, dict[str, Floats]]:
     """Shapes of every labelled mode by setup and label, as `sampled` at `points(N_POINTS)`.
 
     A label means a rank within a symmetry class, as in the likelihood.

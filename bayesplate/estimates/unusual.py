@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, density
 from bayesplate.board.material import MODULI, RIGIDITIES, moduli
 from bayesplate.board.prior import PriorCard
-
-Floats = NDArray[np.float64]
 
 MOST_ORTHOTROPIC = 100.0
 """E_x over E_y that no plate reaches: 10 to 20 in spruce, up to 70 in balsa."""

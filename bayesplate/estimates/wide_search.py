@@ -19,8 +19,8 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import RIGIDITIES, moduli
 from bayesplate.board.prior import PriorCard
@@ -39,7 +39,6 @@ from bayesplate.plate.terms import Parity
 if TYPE_CHECKING:
     from scipy.interpolate import RegularGridInterpolator
 
-Floats = NDArray[np.float64]
 
 NOISES = (0.08, 0.04, 0.02, 0.01)
 """Relative, one after the other; the last is what the tables err by, with a usual noise."""
@@ -244,7 +243,7 @@ class _Tabled:
         each = [one.log_likelihood(there, noises) for there, peaks in self._there(x) for one in peaks]
         return np.nan_to_num(np.sum(each, axis=0), nan=-np.inf, neginf=-np.inf)
 
-    def assignments(self, x: Floats, noise: float) -> NDArray[np.intp]:
+    def assignments(self, x: Floats, noise: float) -> Indices:
         """The likeliest mode of each peak at each member, -1 for none: (n, n_peaks) array, setup by setup."""
         ways = []
         for there, peaks in self._there(x):

@@ -36,9 +36,8 @@ from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from bayesplate.arrays import Bools, Floats
 
 LOG_NOTHING = float(np.log(1e-18))
 """Of a ratio that changes no sum of one and more; smaller ones come to numbers that processors are slow with."""
@@ -56,7 +55,7 @@ class Near:
     low: list[int]  # the first of them and of those near the modes to come
 
     @classmethod
-    def of(cls, is_near: NDArray[np.bool_]) -> Near:
+    def of(cls, is_near: Bools) -> Near:
         """Rows from an (n_peaks, n_modes) array: which peaks any draw has near which modes."""
         # Every mode is near a peak after all others, then to one before them: so one is found for each.
         near = np.ones((len(is_near) + 1, is_near.shape[1]), dtype=np.bool_)

@@ -8,8 +8,8 @@ from functools import lru_cache, reduce
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Values
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Effect, Theory, Variation
@@ -18,8 +18,6 @@ from bayesplate.plate.fields import EdgeStrip, Fabric, Field, Group, layout
 from bayesplate.plate.shear import SHEAR_FLEXIBLE
 from bayesplate.plate.terms import Weights
 from bayesplate.plate.thin import THIN
-
-Floats = NDArray[np.float64]
 
 _GROUPS: tuple[Group, ...] = ("along", "bending", "shear", "mass", "rotary")
 

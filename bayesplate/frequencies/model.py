@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Values
 from bayesplate.board.sessions import discrepancy_names
 from bayesplate.board.setup import Setup
@@ -53,7 +53,7 @@ class SetupModel:
     exact: ExactLaw | None = None  # None until `with_exact`
     others: tuple[OtherMode, ...] = ()  # modes without a label, up to above the highest peak; none until `with_others`
     # (n_modes + n_others,), over the largest that each shape could give; None: places not known
-    residues: NDArray[np.float64] | None = None
+    residues: Floats | None = None
     # the modes with what roved at its further places: a frequency is the mean over all
     roved: tuple[SetupModel, ...] = ()
 
@@ -82,11 +82,11 @@ class SetupModel:
     def every_place(self) -> tuple[Place, ...]:
         return (*self.places, *(other.place for other in self.others))
 
-    def log_frequencies(self, values: Values, law: LawName) -> NDArray[np.float64]:
+    def log_frequencies(self, values: Values, law: LawName) -> Floats:
         """ln f of each labelled mode: (n_draws, n_modes) array; not a number where the law gives no frequency."""
         return self.every_log_frequency(values, law)[:, : len(self.places)]
 
-    def every_log_frequency(self, values: Values, law: LawName) -> NDArray[np.float64]:
+    def every_log_frequency(self, values: Values, law: LawName) -> Floats:
         """ln f of the labelled modes, then of the others: (n_draws, n_modes + n_others) array."""
         own = log_frequency(self.law(law).squared(self.system.weights(values)))
         return mean_log_frequency([own, *(one.every_log_frequency(values, law) for one in self.roved)])
@@ -97,7 +97,7 @@ class SetupModel:
         names = {i: discrepancy_names(self.setup, label) for i, label in enumerate(self.every_label) if label}
         return {i: both for i, both in names.items() if both is not None}
 
-    def discrepancies(self, values: Values) -> NDArray[np.float64]:
+    def discrepancies(self, values: Values) -> Floats:
         """ln f of the board less that of its plate, (n_draws, n_every); a single zero where no session shares any."""
         known = {i: names for i, names in self._discrepancy_names.items() if names[1] in values}
         if not known:
@@ -145,7 +145,7 @@ class SetupModel:
             roved=tuple(one._labelled_as(setup, labelled, rest) for one in self.roved),
         )
 
-    def sensitivities(self, values: Values) -> NDArray[np.float64]:
+    def sensitivities(self, values: Values) -> Floats:
         """d ln f / d ln D at the point where the model was made: (n_modes, 3) array, columns D_x, D_y, D_s.
 
         Half the share of each constant in the mode's energy: for the bare thin plate rows sum to one half.
@@ -238,7 +238,7 @@ def _with_others(model: SetupModel, values: Values, n_least: int = 0) -> tuple[S
     return replace(model, linear=linear, exact=None, others=others, residues=residues), modes
 
 
-def log_frequencies_of_board(models: Sequence[SetupModel], values: Values, law: LawName) -> list[NDArray[np.float64]]:
+def log_frequencies_of_board(models: Sequence[SetupModel], values: Values, law: LawName) -> list[Floats]:
     """ln f of all modes of each setup, (n_draws, n_every), with the discrepancies that sessions share."""
     return [model.every_log_frequency(values, law) + model.discrepancies(values) for model in models]
 
@@ -263,7 +263,7 @@ def with_exact(
     return replace(model, exact=ExactLaw(reduced), roved=roved)
 
 
-def full_log_frequencies(model: SetupModel, values: Values) -> NDArray[np.float64]:
+def full_log_frequencies(model: SetupModel, values: Values) -> Floats:
     """ln f (Hz) of a setup's labelled modes, (n_modes,), solved at given constants instead of taken from a law."""
     if model.roved:
         return mean_log_frequency([full_log_frequencies(one, values) for one in model.stations])

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.reading import Peak, Reading
 from bayesplate.board.setup import Setup
 from bayesplate.frequencies.assignment import LOG_NOTHING, Assignments, Near
@@ -17,8 +17,7 @@ from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.frequencies.residues import share_seen, sign_probabilities
 from bayesplate.labels import Label
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.intp]
+Rows = Indices
 
 _MOST_UNSIGNED = 6
 """Peaks of unknown sign up to which each is tried with both."""

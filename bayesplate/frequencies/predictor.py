@@ -6,13 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Values
 from bayesplate.frequencies.laws import LawName
 from bayesplate.frequencies.model import SetupModel, log_frequencies_of_board
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +20,7 @@ class Predictor:
     values: Callable[[Floats], Values]  # to constants and sizes by name, SI
     models: Sequence[SetupModel]
     law: LawName
-    rows: NDArray[np.intp] | None = None  # (n_modes,): which of all modes that the models have
+    rows: Indices | None = None  # (n_modes,): which of all modes that the models have
     n_constants: int = 3  # the first parameters, logarithms of free rigidities: all others have priors
 
     def __call__(self, x: Floats) -> Floats:
@@ -31,7 +29,7 @@ class Predictor:
         every = np.concatenate(log_frequencies_of_board(self.models, values, self.law), axis=1)
         return every if self.rows is None else every[:, self.rows]
 
-    def of(self, rows: NDArray[np.intp]) -> Predictor:
+    def of(self, rows: Indices) -> Predictor:
         """A predictor of some of the modes, by their places among all."""
         return replace(self, rows=rows)
 

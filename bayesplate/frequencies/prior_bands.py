@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import MODULI, RIGIDITIES, isotropic_moduli, rigidities
 from bayesplate.board.prior import PriorCard
@@ -21,7 +21,7 @@ WITHIN = (1 / 6, 5 / 6)
 _N_DRAWS = 4000
 
 
-def prior_medians(board: Board, prior: PriorCard) -> dict[str, NDArray[np.float64]]:
+def prior_medians(board: Board, prior: PriorCard) -> dict[str, Floats]:
     """Constants at the median of the prior, and the nominal inputs: dict of float."""
     medians = {name: np.asarray(density.median) for name, density in prior.constants.items()}
     return with_rigidities({**board.nominal(), **medians})
@@ -50,14 +50,14 @@ def prior_bands(
     return bands
 
 
-def prior_draws(board: Board, prior: PriorCard, rng: np.random.Generator, n: int) -> dict[str, NDArray[np.float64]]:
+def prior_draws(board: Board, prior: PriorCard, rng: np.random.Generator, n: int) -> dict[str, Floats]:
     """Draws of the constants and of the board's inputs: dict of (n,) array, SI."""
     drawn = {name: one.sample(rng, n) for name, one in prior.constants.items()}
     inputs = {name: quantity.value(rng.standard_normal(n)) for name, quantity in board.inputs.items()}
     return with_rigidities({**inputs, **drawn})
 
 
-def with_rigidities(values: Values) -> dict[str, NDArray[np.float64]]:
+def with_rigidities(values: Values) -> dict[str, Floats]:
     """Values with D_x, D_y, D_s added, from the moduli where these are given: all three, or one if isotropic."""
     if set(RIGIDITIES) <= set(values):
         return dict(values)

@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import log_ndtr
 
+from bayesplate.arrays import Bools, Floats, Indices
 from bayesplate.board.setup import Setup
-
-Floats = NDArray[np.float64]
 
 _LOWEST = 1e-3
 """Share of a reading that its rounding interval stays above: the logarithm needs a positive end."""
@@ -125,7 +124,7 @@ class ReadingErrors:
         return np.log(self.frequency + self.resolution / 2.0)
 
     @cached_property
-    def rounded(self) -> NDArray[np.bool_]:
+    def rounded(self) -> Bools:
         """Which readings are known as an interval: (n_modes,) array."""
         return self.resolution > 0
 
@@ -150,7 +149,7 @@ class ReadingErrors:
         result[..., rounded] = self._density.log_between(low[..., rounded], high[..., rounded])
         return np.where(np.isnan(predicted), -np.inf, result)
 
-    def log_likelihood_of_pairs(self, readings: NDArray[np.intp], predicted: Floats, noise: Floats) -> Floats:
+    def log_likelihood_of_pairs(self, readings: Indices, predicted: Floats, noise: Floats) -> Floats:
         """ln of the probability of (n_pairs,) readings if each were of the mode of the (n_pairs, n_draws) ln f."""
         if self.rounded.any():
             return np.ascontiguousarray(self.at(readings).log_likelihood(predicted.T, noise).T)

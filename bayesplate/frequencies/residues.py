@@ -7,8 +7,8 @@ with a nodal line near either place shows hardly or not at all; where both move 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Values
 from bayesplate.board.setup import Setup
 from bayesplate.effects.attached_items import fractions_of
@@ -27,7 +27,7 @@ _SURE = 1e-3
 _GRID = np.linspace(0.0, 1.0, 21)
 
 
-def residues_of(setup: Setup, modes: Modes, values: Values, shaped: Effect | None = None) -> NDArray[np.float64] | None:
+def residues_of(setup: Setup, modes: Modes, values: Values, shaped: Effect | None = None) -> Floats | None:
     """Residue of each mode over the square of its largest deflection, -1 to 1: (n_modes,) array.
 
     None where the card does not state the hammer's place and that of one accelerometer. `shaped` is the effect that
@@ -41,7 +41,7 @@ def residues_of(setup: Setup, modes: Modes, values: Values, shaped: Effect | Non
 
 def deflections(
     setup: Setup, modes: Modes, values: Values, place: tuple[float, float], shaped: Effect | None = None
-) -> NDArray[np.float64]:
+) -> Floats:
     """Deflection of each mode at a place (m from the board's corner) over its largest: (n_modes,) array, -1 to 1."""
     x, y = fractions_of(setup, place, values)
     if shaped is not None:
@@ -50,7 +50,7 @@ def deflections(
     return np.asarray(at / _largest(modes, shaped))
 
 
-def _largest(modes: Modes, shaped: Effect | None) -> NDArray[np.float64]:
+def _largest(modes: Modes, shaped: Effect | None) -> Floats:
     """The largest deflection of each mode on the plate: (n_modes,) array."""
     outline = None if shaped is None else shaped.outline()
     if outline is None:
@@ -60,7 +60,7 @@ def _largest(modes: Modes, shaped: Effect | None) -> NDArray[np.float64]:
     return np.asarray(np.max(np.abs(modes.displacement_across(_GRID, places)), axis=(1, 2)))
 
 
-def share_seen(residues: NDArray[np.float64]) -> NDArray[np.float64]:
+def share_seen(residues: Floats) -> Floats:
     """Share of its chance to leave a peak that a mode keeps between hammer and sensor: (n_modes,) array, 0 to 1.
 
     It is r^2 / (r^2 + s^2) with s = `NODAL_LINE`, averaged over residues r that scatter about the computed one by s,
@@ -75,7 +75,7 @@ def share_seen(residues: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(1.0 - np.sqrt(np.pi / 2.0) * wofz(argument).real)
 
 
-def sign_probabilities(residues: NDArray[np.float64]) -> NDArray[np.float64]:
+def sign_probabilities(residues: Floats) -> Floats:
     """Probability that the residue of each mode is positive, and that it is negative: (2, n_modes) array.
 
     For a computed residue that is off by `NODAL_LINE`; one half each where none is known.

@@ -7,8 +7,8 @@ from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.setup import Ends, Setup
 from bayesplate.effects import effects_of
@@ -22,7 +22,7 @@ from bayesplate.plate.shear import SHEAR_ELEMENTS_PER_SIDE, SHEAR_FLEXIBLE
 from bayesplate.plate.terms import Weights
 from bayesplate.plate.thin import THIN
 
-Limits = tuple[NDArray[np.float64], NDArray[np.float64]]
+Limits = tuple[Floats, Floats]
 """Where a plate begins and ends along y at some points of its length, (n,) arrays, as fractions of its widest width."""
 
 
@@ -85,7 +85,7 @@ class System:
         """The effect that gives the plate its outline, where that is not the whole rectangle."""
         return next((effect for effect in self.effects if effect.outline() is not None), None)
 
-    def limits(self, x: NDArray[np.float64]) -> Limits | None:
+    def limits(self, x: Floats) -> Limits | None:
         """Ends of the plate along y at fractions of its length, as fractions of its widest width; None: a rectangle."""
         outline = None if self.shaped is None else self.shaped.outline()
         return None if outline is None else outline(x)

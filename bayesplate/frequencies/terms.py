@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Values, density, vibrating_lengths
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.board.setup import Setup
@@ -33,7 +33,7 @@ def term_weights(values: Values, setup: Setup) -> Weights:
     return Weights(stiffness, np.ones((stiffness.shape[0], 1)))
 
 
-def shear_moduli(values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def shear_moduli(values: Values) -> tuple[Floats, Floats]:
     """G_xz and G_yz, Pa; one that is not there is G_xy, as in a plate that is alike in all directions."""
     of_plane = 3.0 * values["D_s"] / np.asarray(values["thickness"]) ** 3
     return np.asarray(values.get("G_xz", of_plane)), np.asarray(values.get("G_yz", of_plane))
@@ -75,7 +75,7 @@ def along_grain(base: Weights, values: Values, setup: Setup) -> Weights:
     return Weights(along, np.zeros_like(base.mass))
 
 
-def rigidity_columns(values: Values, setup: Setup) -> NDArray[np.float64]:
+def rigidity_columns(values: Values, setup: Setup) -> Floats:
     """The matrix that takes (D_x, D_y, D_s) to the stiffness weights, at given inputs: (4, 3) array."""
     unit = dict(zip(RIGIDITIES, np.eye(3), strict=True))
     return term_weights({**values, **unit}, setup).stiffness.T

@@ -18,12 +18,10 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.plate.fields import Outline
 from bayesplate.plate.terms import Deflections
-
-Floats = NDArray[np.float64]
 
 _PANELS = 20
 """Panels along each side of a square, on the coarser of two lattices; the finer has half as many again."""

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.setup import Ends
 from bayesplate.plate.line import Line, line, rigid_degrees
 
-Floats = NDArray[np.float64]
 Beams = tuple[int, int]
 """Order of the beam functions along x and y whose product a mode resembles; (0, 0) is the lowest."""
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.arrays import Bools, Floats, Indices
 from bayesplate.plate.beams import is_rigid
 from bayesplate.plate.forms import Elements, Forms, each_weighed
 from bayesplate.plate.terms import (
@@ -25,8 +26,6 @@ from bayesplate.plate.terms import (
     Weights,
 )
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class SymmetryClass:
@@ -36,7 +35,7 @@ class SymmetryClass:
     parity: Parity
 
     @cached_property
-    def _numbering(self) -> tuple[dict[str, NDArray[np.intp]], int]:
+    def _numbering(self) -> tuple[dict[str, Indices], int]:
         """Number of each field's unknown by its functions along x and along y, -1 where there is none; how many."""
         x, y = self.plate.x, self.plate.y
         is_sheared = len(self.plate.kinematics.fields) > 1
@@ -102,7 +101,7 @@ class SymmetryClass:
         return local.ravel() if both[0] == both[1] else np.concatenate([local.ravel(), local.swapaxes(1, 2).ravel()])
 
     @cached_property
-    def _pattern(self) -> tuple[NDArray[np.bool_], NDArray[np.intp], NDArray[np.int32], NDArray[np.int32]]:
+    def _pattern(self) -> tuple[Bools, Indices, NDArray[np.int32], NDArray[np.int32]]:
         """Which entries of the elements count, where each is stored, and the rows and column starts of these places."""
         own = {name: self._of_elements(name) for name in self.plate.kinematics.fields}
         rows, columns = [], []
@@ -117,7 +116,7 @@ class SymmetryClass:
         indptr = np.searchsorted(places, np.arange(self.n_dof + 1) * self.n_dof)
         return kept, stored_at, (places % self.n_dof).astype(np.int32), indptr.astype(np.int32)
 
-    def _of_elements(self, name: str) -> NDArray[np.intp]:
+    def _of_elements(self, name: str) -> Indices:
         """Number of each element's unknowns of a field, in the order of `Plate.elements`: (n_elements, 16) array."""
         x, y = self.plate.x.unknowns, self.plate.y.unknowns
         found = self._numbering[0][name][x[None, :, :, None], y[:, None, None, :]]

@@ -12,11 +12,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.plate.line import N_POINTS_CUT, Line
-
-Floats = NDArray[np.float64]
 
 Field = Callable[[Floats, Floats], Floats]
 """A factor over the unit square: of points x and y, arrays that broadcast, to an array of their common shape."""

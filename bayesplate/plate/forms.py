@@ -11,8 +11,8 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.plate.beams import N_BEAMS, Beams, is_rigid
 from bayesplate.plate.fields import weights_within
 from bayesplate.plate.line import Line
@@ -28,8 +28,6 @@ from bayesplate.plate.terms import (
     Term,
     Weights,
 )
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,11 +11,9 @@ from functools import cached_property, lru_cache
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Bools, Floats, Indices
 from bayesplate.board.setup import Ends
-
-Floats = NDArray[np.float64]
 
 Hold = Literal["clamped", "supported", "guided", "free"]
 """What an end holds: value and slope, the value, the slope, nothing. No card can ask for a guided end: it is a clamped
@@ -71,7 +69,7 @@ class Line:
         return np.moveaxis(np.array(orders), 0, -1)
 
     @cached_property
-    def unknowns(self) -> NDArray[np.intp]:
+    def unknowns(self) -> Indices:
         """Unknowns of each element: (n_elements, 4) array."""
         return np.asarray(self.basis.element_dofs.T, dtype=np.intp)
 
@@ -104,7 +102,7 @@ class Line:
         rows[np.arange(len(nodes)), [2 * node + order for node in nodes]] = 1.0
         return rows, np.full(len(nodes), self.share)
 
-    def kept(self, parity: int, is_sheared: bool) -> NDArray[np.bool_]:
+    def kept(self, parity: int, is_sheared: bool) -> Bools:
         """Which functions the deflection has: (n_functions,) array.
 
         On a shear-flexible plate it keeps its slope at a clamp, where it stands at the angle of the shear strain.
@@ -112,7 +110,7 @@ class Line:
         held = {"clamped": (True, not is_sheared), "supported": (True, False), "guided": (False, not is_sheared)}
         return self._without([held.get(end, (False, False)) for end in self.held], parity)
 
-    def kept_strain(self, parity: int) -> NDArray[np.bool_]:
+    def kept_strain(self, parity: int) -> Bools:
         """Which functions the shear strain along this side has: where the turning is held, not its value."""
         return self._without([(end in ("clamped", "guided"), False) for end in self.held], 1 - parity)
 
@@ -122,7 +120,7 @@ class Line:
         nodes = [(0, self.held[0])] if self.is_split else [(0, self.held[0]), (last, self.held[1])]
         return [(value, value + 1) for value, end in nodes if end in ("clamped", "guided")]
 
-    def _without(self, held: list[tuple[bool, bool]], parity: int) -> NDArray[np.bool_]:
+    def _without(self, held: list[tuple[bool, bool]], parity: int) -> Bools:
         first, last = held
         if self.is_split:
             last = (parity == 1, parity == 0)

@@ -19,13 +19,12 @@ from itertools import combinations_with_replacement
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.setup import Ends
 from bayesplate.plate.fields import Field
 from bayesplate.plate.terms import Deflections
 
-Floats = NDArray[np.float64]
 Curvature = Literal["bow", "cup", "twist"]
 
 CURVATURES: tuple[Curvature, ...] = ("bow", "cup", "twist")
@@ -52,7 +51,7 @@ class _Matrices:
     loads: tuple[Any, ...]
     mass: Any  # (n_w, n_w): integral of the product of two deflections
     places: Floats  # (2, n_w): of the deflections, as fractions of the sides
-    held: NDArray[np.intp]  # (n_held,): unknowns that edges hold
+    held: Indices  # (n_held,): unknowns that edges hold
 
 
 def membrane_terms(
@@ -110,7 +109,7 @@ def _solved(held: _Held, moduli: tuple[float, ...], curvature: int, loads: Seque
 
 
 @lru_cache(maxsize=16)
-def _factors(held: _Held, moduli: tuple[float, ...]) -> tuple[NDArray[np.intp], Any]:
+def _factors(held: _Held, moduli: tuple[float, ...]) -> tuple[Indices, Any]:
     """Unknowns that no edge holds, and the factors of their stiffness."""
     from scipy.sparse import csc_array, diags_array
     from scipy.sparse.linalg import splu

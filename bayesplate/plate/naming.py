@@ -6,15 +6,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.plate.beams import Beams, beam_functions, product_coefficients
 from bayesplate.plate.classes import SymmetryClass
 from bayesplate.plate.plate import Plate
 from bayesplate.plate.solve import ClassModes, Modes, solve_classes
 from bayesplate.plate.terms import Parity, Weights
-
-Floats = NDArray[np.float64]
 
 CERTAIN = 0.75
 """Correlation with its product of beam functions below which a mode's name is "cannot tell"."""

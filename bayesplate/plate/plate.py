@@ -12,16 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
+from bayesplate.arrays import Floats
 from bayesplate.plate.classes import SymmetryClass
 from bayesplate.plate.fields import UNIFORM, Fabric, Group, layout
 from bayesplate.plate.forms import Forms
 from bayesplate.plate.line import Line
 from bayesplate.plate.terms import Kinematics, OverPlate, Pair, Parity, Term
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,14 +12,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.plate.beams import Beams
 from bayesplate.plate.naming import Place, fits, name_parts
 from bayesplate.plate.pencils import pencil_modes, pencil_values, stepped
 from bayesplate.plate.terms import Parity, Weights
-
-Floats = NDArray[np.float64]
 
 SPARE = 4
 """Modes above the highest wanted one of a class that the basis is made for too."""
@@ -70,7 +68,7 @@ class ReducedClass:
         """Mass matrices of many draws on the basis: (n_draws, r, r) array."""
         return _weighted(weights.mass, self.masses)
 
-    def ranks(self, weights: Weights, n_modes: int, least: float = 0.0) -> NDArray[np.intp]:
+    def ranks(self, weights: Weights, n_modes: int, least: float = 0.0) -> Indices:
         """Rank of the mode that each of `products` names with at least that correlation: (n_draws, n_products).
 
         From 0; `n_modes` where it names none of the lowest elastic modes, -1 at a draw that is no plate.
@@ -119,12 +117,12 @@ class ReducedOrderModel:
             values[:, columns] = own.eigenvalues(weights)[:, ranks]
         return values
 
-    def ranks(self, weights: Weights, least: float = 0.0) -> dict[Beams, NDArray[np.intp]]:
+    def ranks(self, weights: Weights, least: float = 0.0) -> dict[Beams, Indices]:
         """Rank in its class of the mode that each product names with at least that correlation: (n_draws,).
 
         A product that names none of the lowest modes has the highest rank of all; -1 at a draw that is no plate.
         """
-        found: dict[Beams, NDArray[np.intp]] = {}
+        found: dict[Beams, Indices] = {}
         for own in self.classes:
             n_modes = max(self._of(own)[1]) + 1 + SPARE
             found |= dict(zip(own.products, own.ranks(weights, n_modes, least).T, strict=True))

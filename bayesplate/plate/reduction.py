@@ -9,8 +9,8 @@ from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.plate.classes import SymmetryClass
 from bayesplate.plate.naming import Place, beam_parts, reaching
 from bayesplate.plate.pencils import pencil_modes, pencil_values, stepped
@@ -18,8 +18,6 @@ from bayesplate.plate.plate import Plate
 from bayesplate.plate.reduced import SPARE, ReducedClass, ReducedOrderModel
 from bayesplate.plate.solve import ClassModes, solve_classes
 from bayesplate.plate.terms import Parity, Weights
-
-Floats = NDArray[np.float64]
 
 _FEW = 9
 """Training points, the centre among them, that are always solved, all of them."""

@@ -9,15 +9,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.plate.beams import product_coefficients
 from bayesplate.plate.classes import SymmetryClass
 from bayesplate.plate.forms import Elements
 from bayesplate.plate.plate import Plate
 from bayesplate.plate.terms import Parity, Weights
-
-Floats = NDArray[np.float64]
 
 _SPARE_FOR_PROJECTED = 8
 _FIRST_OF_CLASS = 8
@@ -40,7 +38,7 @@ class ClassModes:
     rigid: Floats  # (n_dof, n_rigid): the rigid motions, mass-normalised
     on_plate: Floats  # (n_modes,): share of the kinetic energy that is not of coordinates beside the plate
 
-    def of(self, ranks: Sequence[int] | NDArray[np.intp]) -> ClassModes:
+    def of(self, ranks: Sequence[int] | Indices) -> ClassModes:
         own = list(ranks)
         return replace(
             self, eigenvalues=self.eigenvalues[own], vectors=self.vectors[:, own], on_plate=self.on_plate[own]
@@ -132,7 +130,7 @@ class Modes:
     plate: Plate
     eigenvalues: Floats  # (n_modes,): omega^2, s^-2
     parities: tuple[Parity, ...]
-    ranks: NDArray[np.intp]  # (n_modes,): among the elastic modes of its class, from 0
+    ranks: Indices  # (n_modes,): among the elastic modes of its class, from 0
     classes: Mapping[Parity, ClassModes]  # the modes of each symmetry class, at least these
 
     @property

@@ -10,12 +10,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.plate.fields import Group, Outline, weights_within
 from bayesplate.plate.line import Line
-
-Floats = NDArray[np.float64]
 
 
 class Weights(NamedTuple):

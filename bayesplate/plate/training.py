@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.material import rigidities
 from bayesplate.board.setup import Ends
 from bayesplate.errors import NotIdentifiableError
@@ -57,8 +57,8 @@ class TrainingPlate:
     factors: tuple[float, float]  # of E_x and E_y
     p: float  # D_x / D_s
     q: float  # D_y / D_s
-    squared: NDArray[np.float64]  # (n_modes,): non-dimensional omega_bar^2, increasing
-    mac: NDArray[np.float64]  # (n_reference, n_modes): modal assurance criterion between reference modes and its own
+    squared: Floats  # (n_modes,): non-dimensional omega_bar^2, increasing
+    mac: Floats  # (n_reference, n_modes): modal assurance criterion between reference modes and its own
     matches: Mapping[Beams, int]  # which of its modes each reference mode is, where it can be recognised
 
 
@@ -153,7 +153,7 @@ def _modes_to_hold(plate: Plate, weights: Weights, highest: float) -> int:
     return n_modes
 
 
-def _sampled(modes: Modes) -> NDArray[np.float64]:
+def _sampled(modes: Modes) -> Floats:
     """Shapes on a grid of cell centres, where sums stand for integrals: (n_modes, n_points) array of unit norm."""
     points = (np.arange(_GRID) + 0.5) / _GRID
     shapes = modes.displacement(points, points).reshape(len(modes.eigenvalues), -1)
@@ -165,7 +165,7 @@ def _tracked(
     weights: Weights,
     aspect_ratio: float,
     modes: Modes,
-    reference: NDArray[np.float64],
+    reference: Floats,
     beams: Sequence[Beams],
 ) -> TrainingPlate:
     mac = (reference @ _sampled(modes).T) ** 2

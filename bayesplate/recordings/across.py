@@ -16,14 +16,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.modes_found import Mode
 from bayesplate.recordings.plausibility import Peak
 from bayesplate.recordings.spectra import Rows, Spectra
 
-Floats = NDArray[np.float64]
 Group = dict[int, Peak]
 """One mode: from the number of a set of records to the peak that it shows of it."""
 

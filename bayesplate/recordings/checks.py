@@ -7,11 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.errors import Fault
 from bayesplate.recordings.hits import LEAST_DURATION
 from bayesplate.recordings.signals import FrequencyResponse, Read, Recording
-
-Floats = NDArray[np.float64]
 
 SILENT = 1e-5
 """Of full scale: less than the last bit of 16."""

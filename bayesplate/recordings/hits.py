@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.recordings.onsets import heard_as, onsets, soft_onsets
 from bayesplate.recordings.signals import Recording
-
-Floats = NDArray[np.float64]
 
 LEAST_DURATION = 0.25
 """s; a shorter decay does not tell neighbouring modes of a board apart."""

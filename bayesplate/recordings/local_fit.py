@@ -18,11 +18,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from bayesplate.arrays import Complex, Floats
 
 DEGREE = 2
 """Of the polynomial that stands for what lies beyond the window."""

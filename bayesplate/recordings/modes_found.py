@@ -8,13 +8,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Complex, Floats, Indices
 from bayesplate.recordings.local_fit import Fitted, Window, refined, search
 from bayesplate.recordings.spectra import Spectra
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 WIDTHS = (100.0, 60.0)
 """Hz of the windows in which modes are looked for; the first are those of the final fits."""
@@ -190,7 +187,7 @@ def _inverse(information: Floats) -> Floats:
     return np.asarray(np.linalg.pinv(information.sum(axis=0), hermitian=True))
 
 
-def _excess(places: NDArray[np.intp], steps: Floats, variances: Floats) -> Floats:
+def _excess(places: Indices, steps: Floats, variances: Floats) -> Floats:
     """Factor, at least 1, by which the steps of hits, or of places if larger, exceed their variances.
 
     The steps are those by which each record would move frequency and decay rate.

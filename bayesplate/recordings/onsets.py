@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from bayesplate.arrays import Floats
 
 _BLOCK = 0.002
 """s over which a sound's power is taken."""

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.recordings.plausibility import weighted_median
-
-Floats = NDArray[np.float64]
 
 SHAPE_ERROR = 0.05
 """By how much a computed residue may be off, over the largest that the shape gives: modes mix, places are read off."""

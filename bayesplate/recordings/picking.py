@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.across import modes_across
 from bayesplate.recordings.agreement import agreeing
@@ -16,8 +16,6 @@ from bayesplate.recordings.modes_found import Mode, Path, find_modes, fit_modes,
 from bayesplate.recordings.plausibility import Peak, Verdict, judged, part_words
 from bayesplate.recordings.spectra import Spectra
 from bayesplate.recordings.strength import Answer
-
-Floats = NDArray[np.float64]
 
 LOWEST, HIGHEST = 20.0, 1000.0
 """Hz between which modes are looked for unless others are given."""

@@ -13,14 +13,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Bools, Floats
 from bayesplate.recordings.local_fit import STEADY
 from bayesplate.recordings.modes_found import Mode
 from bayesplate.recordings.spectra import Spectra
 from bayesplate.recordings.strength import Answer, answers
-
-Floats = NDArray[np.float64]
 
 FAINT, FAINT_FACTOR = 0.01, 4.5
 """Strength of what is no mode over that of modes nearby, log-normal: its median and factor."""
@@ -177,7 +175,7 @@ class _Beside:
         return _uniform(90.0) / _of_real(self.answered[m].complexity) if self.has_force else 1.0
 
 
-def _usual(hertz: Floats, strengths: Floats, rings: NDArray[np.bool_]) -> Floats:
+def _usual(hertz: Floats, strengths: Floats, rings: Bools) -> Floats:
     """Strength of the stronger modes that ring down within an octave of each, of all where none does: (n_modes,)."""
     near = (np.abs(np.log2(hertz[:, None] / hertz)) <= 1.0) & rings
     return np.array([np.quantile(strengths[row if row.any() else slice(None)], 0.7) for row in near])

@@ -12,11 +12,9 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.errors import Fault, InputError
-
-Floats = NDArray[np.float64]
 
 GRID = (96, 48)
 """Points along x and across it at which picture and shapes are compared."""

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from bayesplate.arrays import Complex, Floats
+
 Place = tuple[float, float]
 """m, from the corner of the edges x0 and y0."""
 

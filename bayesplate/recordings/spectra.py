@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Complex, Floats, Indices
 from bayesplate.recordings.hits import LONGEST_DURATION, Hit
 from bayesplate.recordings.signals import FrequencyResponse, Motion, Place, Recording
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Rows = NDArray[np.intp]
+Rows = Indices
 Between = tuple[Place | None, Place | None]
 """Places of hammer and sensor."""
 

@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Complex, Floats
 from bayesplate.recordings.local_fit import STEADY
 from bayesplate.recordings.modes_found import Mode
 from bayesplate.recordings.signals import Motion
 from bayesplate.recordings.spectra import Spectra
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _TURN: dict[Motion, tuple[complex, int]] = {
     "acceleration": (-1j, -1),

@@ -8,12 +8,10 @@ from itertools import islice
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.signals import MOTIONS, FrequencyResponse, Motion, Read, Recording
-
-Floats = NDArray[np.float64]
 
 _KEYS: dict[str, str] = {
     "time": "time", "time_s": "time", "t": "time", "force": "force", "response": "response", "sound": "pressure",

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values, vibrating_lengths
 from bayesplate.board.setup import Setup
 from bayesplate.board.words import EDGES
@@ -18,7 +18,6 @@ from bayesplate.report.style import DARK, GREY, LIGHT, SMALL, VERMILLION, WIDTH,
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Floats = NDArray[np.float64]
 
 _WIDEST, _TALLEST = 3.1, 3.6
 _LEFT, _ABOVE, _BELOW = 0.85, 0.42, 0.62

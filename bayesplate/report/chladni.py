@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.estimates.sheet import CombinedMode, Sheet, SheetMode, points
 from bayesplate.frequencies.system import Limits
 from bayesplate.planning.places import Placing
@@ -163,7 +163,7 @@ def draw_edge(panel: Axes, name: str, word: str, depth: float, limits: Limits | 
         panel.add_patch(hatched)
 
 
-def _outline(limits: Limits | None) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _outline(limits: Limits | None) -> tuple[Floats, Floats, Floats]:
     """Points along the length, from end to end, and where the board begins and ends along y there."""
     if limits is None:
         return np.array([0.0, 1.0]), np.zeros(2), np.ones(2)
@@ -172,7 +172,7 @@ def _outline(limits: Limits | None) -> tuple[NDArray[np.float64], NDArray[np.flo
     return x, *limits
 
 
-def _places(n: int, limits: Limits | None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _places(n: int, limits: Limits | None) -> tuple[Floats, Floats]:
     """Points x and y, (n, n) arrays, at which a shape of n by n points is drawn."""
     x, y = np.meshgrid(points(n), points(n), indexing="ij")
     if limits is None:
@@ -181,7 +181,7 @@ def _places(n: int, limits: Limits | None) -> tuple[NDArray[np.float64], NDArray
     return x, low + y * (high - low)
 
 
-def draw_sand(panel: Axes, shape: NDArray[np.float64], limits: Limits | None = None) -> None:
+def draw_sand(panel: Axes, shape: Floats, limits: Limits | None = None) -> None:
     """Nodal lines in black; the parts that move down while the others move up are grey."""
     at = _places(len(shape), limits)
     panel.contourf(*at, shape, levels=[-np.inf, 0.0, np.inf], colors=[_LOW, "white"])

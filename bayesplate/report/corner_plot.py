@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.material import MODULI
 from bayesplate.libraries import load_arviz
@@ -23,7 +23,6 @@ from bayesplate.results.words import GPA
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 MOST = 6
 """Columns of the report: more cannot be read on a phone."""

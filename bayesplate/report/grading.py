@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.material import MODULI
 from bayesplate.grading.boards import BatchSummary
 from bayesplate.grading.figures import FIGURES, limit_told
@@ -47,8 +47,6 @@ from bayesplate.results.words import percent
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-
-Floats = NDArray[np.float64]
 
 MOST_NAMED = 30
 """Boards up to which each has a row with its name; more are drawn in the order of their size, without names."""

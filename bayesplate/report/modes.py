@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Values, vibrating_lengths
 from bayesplate.estimates.identifiability import Identifiability
 from bayesplate.estimates.sheet import N_POINTS, labelled_shapes, points
@@ -73,9 +73,7 @@ def modes_pictures(inference: Inference, draws: Draws, summary: Summary) -> list
     return pictures
 
 
-def _sand_figure(
-    model: SetupModel, values: Values, modes: Sequence[ModeRow], shapes: Mapping[str, NDArray[np.float64]]
-) -> Figure:
+def _sand_figure(model: SetupModel, values: Values, modes: Sequence[ModeRow], shapes: Mapping[str, Floats]) -> Figure:
     from matplotlib.figure import Figure
 
     system = model.system
@@ -132,7 +130,7 @@ def residuals_picture(summary: Summary) -> Picture:
     return Picture("residuals", "How far each mode is missed", f"Errors of the fit, cents: {told}.", caption, figure)
 
 
-def predictive_picture(summary: Summary, predictive: NDArray[np.float64]) -> Picture:
+def predictive_picture(summary: Summary, predictive: Floats) -> Picture:
     """What the model expects to be read, (..., n_modes) draws of the next reading in Hz, beside what was read."""
     modes = summary.modes
     measured = np.array([mode.measured_hz for mode in modes])
@@ -161,7 +159,7 @@ def predictive_picture(summary: Summary, predictive: NDArray[np.float64]) -> Pic
     return Picture("predictive", "What the model would expect you to read", alt, caption, figure)
 
 
-def _rounding(modes: Sequence[ModeRow]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _rounding(modes: Sequence[ModeRow]) -> tuple[Floats, Floats]:
     """How far below and above each reading its rounding interval reaches: two (n_modes,) arrays, cents."""
     below, above = np.array([mode.rounding_cents or (0.0, 0.0) for mode in modes]).T
     return below, above

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.board.parameter import Parameter, unit_of_people
@@ -55,7 +55,7 @@ class Compared:
 
     name: str
     unit: str
-    draws: NDArray[np.float64]
+    draws: Floats
     prior: Quantity
 
     @property

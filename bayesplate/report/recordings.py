@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.recordings.contract import PickedRow, PickReport
 from bayesplate.recordings.modes_found import Path as FoundPath
 from bayesplate.recordings.picking import Picked
@@ -38,8 +38,6 @@ from bayesplate.report.style import (
 )
 from bayesplate.results.tables import Table
 from bayesplate.results.words import chances, percent, two_digits
-
-Floats = NDArray[np.float64]
 
 MOST_PLACES = 8
 _STEP = 30.0

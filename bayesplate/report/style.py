@@ -8,8 +8,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.results.tables import GREEK, JOINERS, SYMBOL, visible
 
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-Floats = NDArray[np.float64]
 Limits = tuple[float, float]
 
 BLUE, ORANGE, GREEN, VERMILLION, SKY, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7"
@@ -177,7 +176,7 @@ def upright_names(panel: Axes, hertz: Sequence[float], names: Sequence[str], sta
         panel.text(place, end, names[i], rotation=90, ha="center", va=side, fontsize=SMALL - 1.5, **at)
 
 
-def moved_apart(wanted: NDArray[np.float64], least: float) -> NDArray[np.float64]:
+def moved_apart(wanted: Floats, least: float) -> Floats:
     """Places from 0 to 1, at least so far apart, near where they are wanted, which is in rising order."""
     placed = wanted.copy()
     for _ in range(2000):
