@@ -15,16 +15,7 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Ends, Setup
 from bayesplate.effects.attached_items import fractions_on, places_on
 from bayesplate.effects.base import Contribution, Effect, Floats, Mass, Scope, Stiffness
-from bayesplate.effects.drives import (
-    Drive,
-    Spot,
-    all_over,
-    at_station,
-    drive_of,
-    is_stated,
-    range_of,
-    with_known_coil,
-)
+from bayesplate.effects.drives import Drive, Spot, all_over, at_station, drive_of, is_stated, range_of, with_known_coil
 from bayesplate.effects.part import vibrating_mass
 from bayesplate.plate.terms import Amount, AtPlaces
 

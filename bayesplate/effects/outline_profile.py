@@ -117,11 +117,7 @@ class OutlineProfile(Effect):
         if self.profile is None or not self.profile.components:
             return {}
         moved = tuple(
-            Variation(
-                EdgeStrip(_Limits(self, k), _Direction(self, k)),
-                partial(self._share, k=k),
-                _FIRST_ORDER_ALONE,
-            )
+            Variation(EdgeStrip(_Limits(self, k), _Direction(self, k)), partial(self._share, k=k), _FIRST_ORDER_ALONE)
             for k in range(len(self.profile.components))
         )
         return dict.fromkeys(_GROUPS, (Variation(None), *moved))

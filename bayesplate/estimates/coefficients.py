@@ -218,11 +218,7 @@ def _label_in_table(card: CoefficientCard, setup: Setup, label: Label) -> Label:
 
 
 def _distances(
-    card: CoefficientCard,
-    setup: Setup,
-    beams: Sequence[Beams],
-    rows: Floats,
-    thickness_ratio: float,
+    card: CoefficientCard, setup: Setup, beams: Sequence[Beams], rows: Floats, thickness_ratio: float
 ) -> dict[Theory, float]:
     """How far a table's frequencies lie from plates of each theory in the middle of its training: rms, cents."""
     constants = _constants_of(card)

@@ -57,10 +57,7 @@ def log_measured(board: Board) -> Floats:
 
 
 def weighted_least_squares(
-    board: Board,
-    most_steps: int = MOST_STEPS,
-    start: Floats | None = None,
-    accepted: float = _CONVERGED,
+    board: Board, most_steps: int = MOST_STEPS, start: Floats | None = None, accepted: float = _CONVERGED
 ) -> Estimate:
     """Rigidities that minimise the weighted squares of relative frequency errors over all setups.
 

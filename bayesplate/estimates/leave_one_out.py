@@ -71,10 +71,7 @@ class CarryingMode:
 
 
 def leverages_of(
-    columns: Floats,
-    scales: Floats,
-    modes: Sequence[Sequence[int]] | None = None,
-    n_open: int = 3,
+    columns: Floats, scales: Floats, modes: Sequence[Sequence[int]] | None = None, n_open: int = 3
 ) -> Leverages:
     """Leverages of readings that are fitted by weighted squares; zero where the fit has no slopes.
 

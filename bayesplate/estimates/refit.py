@@ -72,11 +72,7 @@ def deviance_misfit(errors: Sequence[ReadingErrors], noise: Sequence[float] | Fl
 
 
 def most_likely(
-    predict: Predict,
-    misfit: Misfit,
-    start: Floats,
-    bounds: Bounds | None = None,
-    left_out: Sequence[int] = (),
+    predict: Predict, misfit: Misfit, start: Floats, bounds: Bounds | None = None, left_out: Sequence[int] = ()
 ) -> Floats:
     """Parameters, (n_free,), that minimise the squares of a misfit, the constants within reach of the start.
 

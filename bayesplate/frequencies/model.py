@@ -244,11 +244,7 @@ def log_frequencies_of_board(models: Sequence[SetupModel], values: Values, law: 
 
 
 def with_exact(
-    model: SetupModel,
-    centre: Values,
-    around: Sequence[Values],
-    held_out: Sequence[Values],
-    tolerance: float,
+    model: SetupModel, centre: Values, around: Sequence[Values], held_out: Sequence[Values], tolerance: float
 ) -> SetupModel:
     """Add the exact law, trained at `centre` and `around` it and checked at the points `held_out`, in cents."""
     reduced = reduced_order_model(

@@ -44,11 +44,7 @@ def air_mass(deflections: Deflections, aspect_ratio: float, is_baffled: bool, ou
 
 
 def _on_lattice(
-    deflections: Deflections,
-    aspect_ratio: float,
-    is_baffled: bool,
-    outline: Outline | None,
-    refinement: float,
+    deflections: Deflections, aspect_ratio: float, is_baffled: bool, outline: Outline | None, refinement: float
 ) -> Floats:
     shape = _lattice(aspect_ratio, refinement)
     sides = np.sqrt(aspect_ratio), 1.0 / np.sqrt(aspect_ratio)

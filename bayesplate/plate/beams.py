@@ -73,10 +73,5 @@ def product_coefficients(ends_x: Ends, ends_y: Ends) -> Floats:
     )
     ones = np.ones(N_BEAMS)
     return np.stack(
-        [
-            np.outer(bent_x, ones),
-            np.outer(ones, bent_y),
-            2.0 * np.outer(mixed_x, mixed_y),
-            np.outer(turned_x, turned_y),
-        ]
+        [np.outer(bent_x, ones), np.outer(ones, bent_y), 2.0 * np.outer(mixed_x, mixed_y), np.outer(turned_x, turned_y)]
     )

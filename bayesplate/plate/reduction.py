@@ -91,11 +91,7 @@ def _solved(plate: Plate, points: Iterable[Weights], n_modes: dict[Parity, int])
 
 
 def _reduced(
-    own: SymmetryClass,
-    middle: _Solved,
-    snapshots: Sequence[_Solved],
-    checks: Sequence[_Solved],
-    tolerance: float,
+    own: SymmetryClass, middle: _Solved, snapshots: Sequence[_Solved], checks: Sequence[_Solved], tolerance: float
 ) -> tuple[ReducedClass, float]:
     """The smallest basis of a class that is within the tolerance at the points that check it, and its error there."""
     parity = own.parity

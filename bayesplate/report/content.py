@@ -17,16 +17,7 @@ from bayesplate.results.contract import Spread
 from bayesplate.results.fit_tables import modes_table, peaks_table
 from bayesplate.results.summary import NONE_JUDGED, TOO_FEW_LEFT, Summary
 from bayesplate.results.tables import Cell, Row, Table, by_constant
-from bayesplate.results.words import (
-    CONSTANTS,
-    GPA,
-    Value,
-    constant_name,
-    number,
-    percent,
-    plus_minus,
-    two_digits,
-)
+from bayesplate.results.words import CONSTANTS, GPA, Value, constant_name, number, percent, plus_minus, two_digits
 
 _MAKERS = (
     ("wave_speed", "wave speed c", 1.0, "m/s"),

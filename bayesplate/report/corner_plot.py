@@ -43,9 +43,7 @@ _BRIEF = {
 
 
 def corner_figure(
-    columns: Mapping[str, Floats],
-    marked: Mapping[str, float | None] | None = None,
-    labels: Sequence[str] | None = None,
+    columns: Mapping[str, Floats], marked: Mapping[str, float | None] | None = None, labels: Sequence[str] | None = None
 ) -> Figure:
     """Every pair of columns of draws against each other; the lines hold half and nine tenths of the draws.
 

@@ -50,12 +50,7 @@ class PagePicture(NamedTuple):
 
 @drawing()
 def write_report(
-    folder: Path,
-    card: Board,
-    inference: Inference,
-    draws: Draws,
-    summary: Summary,
-    diagnosis: Diagnosis | None = None,
+    folder: Path, card: Board, inference: Inference, draws: Draws, summary: Summary, diagnosis: Diagnosis | None = None
 ) -> Path:
     """Write report.html, its figures as PNG and SVG, and the tables for other programs; returns the path of the page.
 
