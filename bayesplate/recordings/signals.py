@@ -46,3 +46,8 @@ class FrequencyResponse:
 
 
 Read = Recording | FrequencyResponse
+
+
+def in_blocks(signal: Floats, length: int) -> Floats:
+    """Consecutive blocks of a signal, (n_blocks, length), without what is left at its end."""
+    return signal[: signal.size // length * length].reshape(-1, length)
