@@ -62,12 +62,20 @@ class Errors:
 
 @dataclass(frozen=True)
 class CarryingMode:
-    """A mode that alone carries a constant or a size, so that it is left out of every error of modes left out."""
+    """A mode that alone carries a constant or a size, so that it is left out of every error of modes left out.
+
+    Attributes
+    ----------
+    leverage : float
+        Share of the mode in its own prediction, above 0.9.
+    carries : str
+        What it carries: "E_y", or the name of an effect or an input.
+    """
 
     setup: str
     label: str
-    leverage: float  # above `HIGH_LEVERAGE`
-    carries: str  # "E_y", or the name of an effect or an input
+    leverage: float
+    carries: str
 
 
 def leverages_of(

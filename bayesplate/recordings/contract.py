@@ -18,24 +18,47 @@ class LabelChance:
 
 @dataclass(frozen=True)
 class PickedRow:
-    """One peak."""
+    """One peak.
+
+    Attributes
+    ----------
+    hz, sd_hz : float
+        Frequency and its standard error.
+    noise_hz, scatter_hz, window_hz : float
+        Its parts: noise, scatter between hits and places beyond it, choice of lines.
+    sign : str
+        "+" or "-" between hammer and sensor, where their polarity is known or was found; otherwise empty.
+    amplitude : float
+        Strength over the strongest.
+    spurious_probability : float
+        That it is no mode of the board.
+    kind : str
+        What it would be then; empty where nothing speaks of it.
+    seen : float
+        Share of the widths of windows in which the search found it.
+    alike : float
+        Share of its power that is the same from hit to hit.
+    labels : tuple of LabelChance
+        The most probable first; none without a card.
+    unlabelled_probability : float or None
+        That it is none of the modes that the board of the card has, though a mode by the recordings; None without a
+        card, and for a peak that is likely no mode.
+    """
 
     hz: float
-    sd_hz: float  # of noise, scatter between hits and places beyond it, and the choice of lines
+    sd_hz: float
     noise_hz: float
     scatter_hz: float
     window_hz: float
     damping_percent: float
     damping_sd_percent: float
-    sign: str  # "+" or "-" between hammer and sensor; empty where their polarity is not known
-    amplitude: float  # strength over the strongest
-    spurious_probability: float  # that it is no mode of the board
-    kind: str  # what it would be then; empty where nothing speaks of it
-    seen: float  # share of the widths of windows in which the search found it
-    alike: float  # share of its power that is the same from hit to hit
-    labels: tuple[LabelChance, ...] = ()  # the most probable first; none without a card
-    # that it is none of the modes of the card's board, though a mode by the recordings; None without a card, and for a
-    # peak that is likely no mode
+    sign: str
+    amplitude: float
+    spurious_probability: float
+    kind: str
+    seen: float
+    alike: float
+    labels: tuple[LabelChance, ...] = ()
     unlabelled_probability: float | None = None
 
     @property
