@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.board.board import Board
+from bayesplate.effects.attached_items import fractions_of
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.estimates.wide_search import Guess
 from bayesplate.frequencies.model import SetupModel, setup_model, with_others
 from bayesplate.frequencies.peaks import PeakLikelihood
-from bayesplate.frequencies.residues import fractions_of
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.solve import Modes, solve_up_to
 from bayesplate.posterior.first_labels import Way, guess_of

@@ -48,8 +48,8 @@ from bayesplate.results.contract import json_text
 from bayesplate.results.folder import FIGURES
 
 if TYPE_CHECKING:
+    from bayesplate.arrays import Floats
     from bayesplate.recordings.hits import Hit
-    from bayesplate.recordings.sand import Floats
     from bayesplate.recordings.signals import Read
 
 FRAGMENT, PAGE, SUMMARY = "setup.toml", "recordings.html", "pick.json"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesplate.board.attached import AttachedItem
-from bayesplate.board.board import Board, density, vibrating_lengths
+from bayesplate.board.board import Board, Values, density, vibrating_lengths
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Floats
@@ -34,28 +34,13 @@ _GRID = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 @dataclass(frozen=True)
 class Item:
-    """One attached thing.
-
-    Attributes
-    ----------
-    mass : Quantity, kg
-    source : str
-        Where the mass comes from; empty if the card states it.
-    places : tuple of (float, float)
-        As fractions of the vibrating sides; several are those over which it roved.
-    radius : (float, float)
-        Of its base, over the two sides; 0 if it does not turn with the board, as on a stinger.
-    base : float, m
-        Radius of its base.
-    reach : tuple of (float, float)
-        Where the plate begins and ends along y at each place; empty where it is the whole rectangle.
-    """
-
     mass: Quantity
-    source: str
-    places: Fractions
+    source: str  # of the mass; empty if the card states it
+    places: Fractions  # several are those over which it roved
+    # of its base, over the two sides; 0 if it does not turn with the board, as on a stinger
     radius: tuple[float, float] = (0.0, 0.0)
-    base: float = 0.0
+    base: float = 0.0  # radius of its base, m
+    # where the plate begins and ends along y at each place; empty: the whole rectangle
     reach: tuple[tuple[float, float], ...] = ()
 
 
@@ -84,30 +69,32 @@ def items_on_board(board: Board, setup: Setup, item: AttachedItem) -> list[Item]
 
 def fractions_on(board: Board, setup: Setup, places: Places) -> Fractions:
     """Places as fractions of the sides that vibrate in a setup, at nominal sizes; what a clamp covers is at its rim."""
-    starts, sides = _vibrating(board, setup)
-    return tuple(
-        (float(np.clip((x - starts[0]) / sides[0], 0.0, 1.0)), float(np.clip((y - starts[1]) / sides[1], 0.0, 1.0)))
-        for x, y in places
-    )
+    return tuple(fractions_of(setup, place, board.nominal()) for place in places)
+
+
+def fractions_of(setup: Setup, place: tuple[float, float], values: Values) -> tuple[float, float]:
+    """One place as fractions of the sides that vibrate in a setup, at given sizes."""
+    starts, sides = _vibrating(values, setup)
+    x, y = ((at - start) / side for at, start, side in zip(place, starts, sides, strict=True))
+    return float(np.clip(x, 0.0, 1.0)), float(np.clip(y, 0.0, 1.0))
 
 
 def places_on(board: Board, setup: Setup, fractions: Fractions) -> Places:
     """Places on the whole board from fractions of the sides that vibrate in a setup; the inverse of `fractions_on`."""
-    starts, sides = _vibrating(board, setup)
+    starts, sides = _vibrating(board.nominal(), setup)
     return tuple((starts[0] + s * sides[0], starts[1] + t * sides[1]) for s, t in fractions)
 
 
 def radius_on(board: Board, setup: Setup, base: float) -> tuple[float, float]:
     """The radius of a base over the two sides that vibrate in a setup."""
-    _, sides = _vibrating(board, setup)
+    _, sides = _vibrating(board.nominal(), setup)
     return base / sides[0], base / sides[1]
 
 
-def _vibrating(board: Board, setup: Setup) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Where the vibrating part begins along x and y, and how long it is, m."""
-    nominal = board.nominal()
-    length_x, length_y = vibrating_lengths(nominal, setup)
-    x, y = (float(nominal[setup.input_name(edge)]) if edge in setup.clamped else 0.0 for edge in ("x0", "y0"))
+def _vibrating(values: Values, setup: Setup) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Start and length of the vibrating part along x and y, m."""
+    length_x, length_y = vibrating_lengths(values, setup)
+    x, y = (float(values[setup.input_name(edge)]) if edge in setup.clamped else 0.0 for edge in ("x0", "y0"))
     return (x, y), (float(length_x), float(length_y))
 
 

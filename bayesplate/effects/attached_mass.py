@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from bayesplate.board.attached import AttachedItem
-from bayesplate.board.board import Board, Values, density, vibrating_lengths
+from bayesplate.board.board import Board, Values, vibrating_lengths
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.setup import Setup
 from bayesplate.effects.attached_items import (
@@ -28,6 +28,7 @@ from bayesplate.effects.attached_items import (
     rotary_inertia,
 )
 from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, Mass, Scope
+from bayesplate.effects.part import vibrating_mass
 from bayesplate.plate.terms import Amount, AtPlaces
 
 HEAVIEST_ROVING = 0.02
@@ -71,12 +72,10 @@ class AttachedMass(Effect):
 
     @classmethod
     def is_implied(cls, board: Board) -> bool:
-        """Whether the card states the mass of an attached thing."""
         return any(cls.is_wanted(setup) for setup in board.setups)
 
     @classmethod
     def is_wanted(cls, setup: Setup) -> bool:
-        """Whether the setup states the mass of an attached thing."""
         return any(item.mass is not None for item in _masses(setup))
 
     @classmethod
@@ -103,7 +102,6 @@ class AttachedMass(Effect):
         return tuple(forms)
 
     def in_setup(self, board: Board, setup: Setup) -> AttachedMass:
-        """The same things at the same places of the board, held another way."""
         items = tuple(
             replace(item, places=fractions_on(board, setup, places), radius=radius_on(board, setup, item.base))
             for item, places in zip(self.items, self._places_on(board), strict=True)
@@ -111,17 +109,14 @@ class AttachedMass(Effect):
         return replace(self, owner=setup.owner, items=items)
 
     def within(self, shaped: Effect) -> AttachedMass:
-        """The same things on the true outline."""
         return replace(self, items=tuple(_within(item, shaped) for item in self.items))
 
     def _places_on(self, board: Board) -> list[Places]:
-        """Where the things are on the whole board, m."""
         own = board.setup(self.owner.name)
         return [places_on(board, own, item.places) for item in self.items]
 
     @classmethod
     def notes(cls, board: Board) -> tuple[str, ...]:
-        """That what roved and is not light is rough."""
         if cls.name not in board.effects:
             return ()
         return tuple(
@@ -133,7 +128,6 @@ class AttachedMass(Effect):
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
-        """Refused where the setup does not say what is attached, or where a heavy thing roved."""
         if not any(item.places for item in _masses(setup)):
             return "no [[setup.attached]] says what is fixed to the board and where"
         if heaviest_roving(board, setup) > HEAVIEST_ROVING:
@@ -152,7 +146,6 @@ class AttachedMass(Effect):
         return ["mass"] if len(self.items) == 1 else [f"mass_{i}" for i in range(1, len(self.items) + 1)]
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
-        """Whether each item's places mirror about the middle."""
         along_x, along_y = (all(_mirrors(item.places, axis) for item in self.items) for axis in (0, 1))
         return along_x, along_y
 
@@ -165,16 +158,12 @@ class AttachedMass(Effect):
         )
 
     def _of_item(self, key: str, item: Item) -> Iterator[Contribution]:
-        def vibrating(values: Values, setup: Setup) -> tuple[Floats, tuple[Floats, Floats]]:
-            sides = vibrating_lengths(values, setup)
-            return density(values) * values["thickness"] * sides[0] * sides[1], sides
-
         def mass(values: Values, setup: Setup) -> Floats:
-            return self.value(values, key) / vibrating(values, setup)[0]
+            return self.value(values, key) / vibrating_mass(values, setup)
 
         def inertia(values: Values, setup: Setup, axis: int) -> Floats:
-            total, sides = vibrating(values, setup)
-            return rotary_inertia(self.value(values, key)) / (total * sides[axis] ** 2)
+            side = vibrating_lengths(values, setup)[axis]
+            return rotary_inertia(self.value(values, key)) / (vibrating_mass(values, setup) * side**2)
 
         yield Mass(_mean_squares([Amount(((1.0, x, y),)) for x, y in item.places]), mass)
         if any(item.radius):
@@ -188,7 +177,7 @@ def _masses(setup: Setup) -> tuple[AttachedItem, ...]:
 
 
 def _spot(board: Board, effect: Effect) -> str:
-    """Where the last of the things is, in words."""
+    """The place of the last of the things, in words."""
     assert isinstance(effect, AttachedMass)
     x, y = effect._places_on(board)[-1][0]
     return f"at {1e3 * x:.0f}, {1e3 * y:.0f} mm"
@@ -203,7 +192,6 @@ def heaviest_roving(board: Board, setup: Setup) -> float:
 
 
 def _within(item: Item, shaped: Effect) -> Item:
-    """A thing on the plate whose outline an effect gives."""
     outline = shaped.outline()
     assert outline is not None
     places = tuple(shaped.placed(*place) for place in item.places)
@@ -230,5 +218,4 @@ def _tilts(item: Item, axis: int) -> list[Amount]:
 
 
 def _mean_squares(amounts: Sequence[Amount]) -> AtPlaces:
-    """The mean of the squares of some amounts."""
     return AtPlaces(tuple((1.0 / len(amounts), one, one) for one in amounts))

@@ -16,8 +16,8 @@ from itertools import zip_longest
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats as Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.parameter import BOARD, Owner, Parameter, shown_name
 from bayesplate.board.quantity import Quantity
@@ -29,7 +29,6 @@ Scope = Literal["board", "setup"]
 Theory = Literal["thin", "shear-flexible"]
 Release = Literal["", "value", "slope"]
 """What clamped edges let go in the presence of an effect, whose springs then hold it: nothing, deflection or slope."""
-Floats = NDArray[np.float64]
 Weight = Callable[[Values, Setup], Floats]
 """What a term weighs at values in a setup: a number or an (n_draws,) array; of several terms one more axis for them."""
 

@@ -33,7 +33,6 @@ class ClampRotation(CompliantClamp):
     releases: ClassVar[Release] = "slope"
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """The compliance D / (k_R L)."""
         return (self.parameter("compliance", _PRIOR, "1", 0.0, _SOURCE),)
 
     def contributions(self) -> tuple[Contribution, ...]:

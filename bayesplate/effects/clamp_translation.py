@@ -33,7 +33,6 @@ class ClampTranslation(CompliantClamp):
     releases: ClassVar[Release] = "value"
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """The compliance D / (k_T L^3)."""
         return (self.parameter("compliance", _PRIOR, "1", 0.0, _SOURCE),)
 
     def contributions(self) -> tuple[Contribution, ...]:

@@ -18,7 +18,6 @@ ClampedEnds = tuple[tuple[bool, bool], tuple[bool, bool]]
 
 
 def clamped_ends(setup: Setup) -> ClampedEnds:
-    """The clamped edges of a setup."""
     (x0, x1), (y0, y1) = setup.ends_x, setup.ends_y
     return (x0 == "clamped", x1 == "clamped"), (y0 == "clamped", y1 == "clamped")
 
@@ -34,31 +33,22 @@ class CompliantClamp(Effect):
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> Self:
-        """The effect on all clamped edges of the setup."""
         return cls(setup.owner, clamped_ends(setup))
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
-        """Refused where no edge is clamped."""
         return "" if any(any(at) for at in clamped_ends(setup)) else "no edge is clamped"
 
     def in_setup(self, board: Board, setup: Setup) -> Self | None:
-        """The same springs on the clamped edges of another setup."""
         return None if self.refusal(board, setup) else replace(self, owner=setup.owner, clamped=clamped_ends(setup))
 
     def springs(self, strains: tuple[str, str], stiffest: float, power: int) -> tuple[Contribution, ...]:
-        """Springs along the clamped edges of each side that has any.
+        """Springs along the clamped edges of each side, against a strain along x0 and x1, and along y0 and y1.
 
-        Parameters
-        ----------
-        strains : (str, str)
-            What the springs hold along the edges x0 and x1, and along y0 and y1.
-        stiffest : float
-            Added to the compliance: with too stiff a spring the reduced-order model loses digits.
-        power : int
-            A spring of stiffness k has the weight k / (rho h L^power): 3 if it holds the slope, 1 if the deflection.
-            The parameter `compliance` is D / (k L^(4 - power)) of the first side that has a clamped edge; k is the same
-            along all of them. It is taken as 0 where it is negative: a normal approximation may ask for that.
+        A spring of stiffness k has the weight k / (rho h L^power): 3 if it holds the slope, 1 if the deflection. The
+        parameter `compliance` is D / (k L^(4 - power)) of the first side that has a clamped edge; k is the same along
+        all of them. It is taken as 0 where it is negative: a normal approximation may ask for that. `stiffest` is added
+        to it: with too stiff a spring the reduced-order model loses digits.
         """
         first = 0 if any(self.clamped[0]) else 1
 

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.effects.base import Variation
 from bayesplate.effects.gradients import GradientAlongX
-from bayesplate.effects.part import growing_along_x
 from bayesplate.plate.fields import Group
 
 
@@ -27,7 +24,4 @@ class DensityGradient(GradientAlongX):
         "normal: density varies by a few per cent along one plank; a board is not heavier at a known end"
     )
 
-    def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
-        """Inertia that grows along x."""
-        inertia = growing_along_x(self.part, lambda values: self.value(values, "gradient"))
-        return dict.fromkeys(("mass", "rotary"), inertia)
+    groups: ClassVar[tuple[Group, ...]] = ("mass", "rotary")

@@ -24,19 +24,11 @@ _PLACES_A_SIDE = 8
 
 @dataclass(frozen=True)
 class Spot:
-    """Where an exciter may be along one side, as fractions of the vibrating part.
-
-    Attributes
-    ----------
-    low, high : float
-        The same where it is known.
-    n_nodes : int
-        Of the polynomial that the squared deflection is between them.
-    """
+    """Range along one side where an exciter may be, as fractions of the vibrating part; one place where it is known."""
 
     low: float
     high: float
-    n_nodes: int = 1
+    n_nodes: int = 1  # of the polynomial that the squared deflection is between them
 
     @property
     def nodes(self) -> Floats:
@@ -67,26 +59,14 @@ class Spot:
 
 @dataclass(frozen=True)
 class Drive:
-    """One exciter: what it weighs and how it hangs; a source is empty where the card states the value.
+    """One exciter: what it weighs and how it hangs; a source is empty where the card states the value."""
 
-    Attributes
-    ----------
-    mass, coil : (Quantity, str), kg
-        Of the whole, and of the coil with what is glued to the board.
-    suspension : (Quantity, str)
-        Stiffness in N/m, or the resonance of the magnet on its suspension in Hz.
-    is_held : bool
-        Whether the magnet is held, so that the suspension is a spring to the ground.
-    places : tuple of (float, float)
-        As fractions of the vibrating sides; several are those over which it roved, none: anywhere.
-    """
-
-    mass: tuple[Quantity, str]
-    coil: tuple[Quantity, str]
-    suspension: tuple[Quantity, str]
+    mass: tuple[Quantity, str]  # kg, of the whole
+    coil: tuple[Quantity, str]  # kg, with what is glued to the board
+    suspension: tuple[Quantity, str]  # N/m, or the resonance of the magnet on its suspension, Hz
     is_resonance: bool = False
-    is_held: bool = False
-    places: Fractions = ()
+    is_held: bool = False  # the magnet is held, so that the suspension is a spring to the ground
+    places: Fractions = ()  # several are those over which it roved, none: anywhere
 
 
 def drive_of(board: Board, setup: Setup, item: AttachedItem) -> Drive:
@@ -103,7 +83,6 @@ def drive_of(board: Board, setup: Setup, item: AttachedItem) -> Drive:
 
 
 def is_stated(item: AttachedItem) -> bool:
-    """Whether the card states what moves of an exciter."""
     return item.mass is not None or (item.magnet == "held" and item.coil is not None)
 
 
@@ -125,5 +104,5 @@ def all_over(low: float, high: float) -> list[float]:
 
 
 def range_of(ends: Ends) -> tuple[float, float]:
-    """Where along a side something may be, mirror places once, as fractions of what vibrates."""
+    """Range along a side where something may be, mirror places once, as fractions of what vibrates."""
     return (0.0, 0.5) if ends[0] == ends[1] else (0.0, 1.0)

@@ -9,22 +9,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesplate.board.board import Board, Values, density, vibrating_lengths
+from bayesplate.board.board import Board, Values
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Ends, Setup
 from bayesplate.effects.attached_items import fractions_on, places_on
 from bayesplate.effects.base import Contribution, Effect, Floats, Mass, Scope, Stiffness
-from bayesplate.effects.drives import (
-    Drive,
-    Spot,
-    all_over,
-    at_station,
-    drive_of,
-    is_stated,
-    range_of,
-    with_known_coil,
-)
+from bayesplate.effects.drives import Drive, Spot, all_over, at_station, drive_of, is_stated, range_of, with_known_coil
+from bayesplate.effects.part import vibrating_mass
 from bayesplate.plate.terms import Amount, AtPlaces
 
 _ANYWHERE = "nearly uniform over the board, mirror places once"
@@ -45,22 +37,16 @@ class Exciter(Effect):
     ground, which raises low modes; below it the magnet is a mass. The magnet's own motion is one more mode. A magnet
     that is held is no coordinate.
 
-    An exciter that roved is one plate for each place (`stations`), and what is read is the mean of the frequencies.
-    One of which nobody says where it is has its place as two parameters: the squared deflection there is a polynomial
+    An exciter that roved is one plate for each place (`stations`), and what is read is the mean of the frequencies. One
+    of which nobody says where it is has its place as two parameters: the squared deflection there is a polynomial
     between a few places, so that the place is a weight like any other. Where both ends of a side are alike, mirror
     places are one.
-
-    Attributes
-    ----------
-    ends_x, ends_y : tuple of str
-        How the edges are held.
-    orders : (int, int)
-        Highest orders of the beam functions that are read along x and along y.
     """
 
     drives: tuple[Drive, ...] = ()
     ends_x: Ends = ("free", "free")
     ends_y: Ends = ("free", "free")
+    # highest of the beam functions that are read along x and y
     orders: tuple[int, int] = (_FEWEST_ORDER, _FEWEST_ORDER)
 
     name: ClassVar[str] = "exciter"
@@ -74,20 +60,17 @@ class Exciter(Effect):
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> Exciter:
-        """The effect with the setup's exciters."""
         drives = tuple(drive_of(board, setup, item) for item in setup.attached if item.kind == cls.name)
         return cls(setup.owner, drives, setup.ends_x, setup.ends_y, _orders(setup))
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
-        """Refused where the setup has no exciter."""
         if any(item.kind == cls.name for item in setup.attached):
             return ""
         return 'no [[setup.attached]] of kind = "exciter" says that one was fixed to the board'
 
     @classmethod
     def is_implied(cls, board: Board) -> bool:
-        """Whether the board states what an exciter weighs."""
         return any(cls.is_wanted(setup) for setup in board.setups)
 
     @classmethod
@@ -104,7 +87,7 @@ class Exciter(Effect):
         return (replace(whole, drives=tuple(with_known_coil(drive) for drive in whole.drives)),)
 
     def in_setup(self, board: Board, setup: Setup) -> Exciter | None:
-        """The same exciters at the same places of the board, held another way; none where none is fixed to it."""
+        """The exciters at their places of the board, held another way; none where none is fixed to it."""
         if self.refusal(board, setup):
             return None
         own = board.setup(self.owner.name)
@@ -125,12 +108,10 @@ class Exciter(Effect):
         return replace(whole, drives=tuple(replace(drive, places=drive.places or four) for drive in whole.drives))
 
     def within(self, shaped: Effect) -> Exciter:
-        """The same exciters on the true outline."""
         drives = (replace(one, places=tuple(shaped.placed(*each) for each in one.places)) for one in self.drives)
         return replace(self, drives=tuple(drives))
 
     def stations(self) -> tuple[Exciter, ...]:
-        """The exciters at each place over which one of them roved, the others where they are."""
         n_places = max((len(drive.places) for drive in self.drives), default=0)
         if n_places < 2:
             return (self,)
@@ -140,7 +121,7 @@ class Exciter(Effect):
         )
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Of each exciter its mass, its coil, its suspension (or resonance), and its place where nobody knows it."""
+        """Mass, coil and suspension (or resonance) of each exciter, and its place where nobody knows it."""
         return tuple(parameter for i in range(len(self.drives)) for parameter in self._parameters_of(i))
 
     def _parameters_of(self, i: int) -> tuple[Parameter, ...]:
@@ -169,7 +150,7 @@ class Exciter(Effect):
 
     @property
     def _ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Where along both sides a place may be, mirror places once."""
+        """Ranges along both sides where an exciter may be, mirror places once."""
         return (range_of(self.ends_x), range_of(self.ends_y))
 
     def _spots(self, drive: Drive) -> tuple[Spot, Spot]:
@@ -225,7 +206,7 @@ class Exciter(Effect):
         inertias = squares if drive.is_held else (*squares, of_magnet)
 
         def stiffness(values: Values, setup: Setup) -> Floats:
-            whole, shares = _vibrating_mass(values, setup), self._shares(i, spots, values)
+            whole, shares = vibrating_mass(values, setup), self._shares(i, spots, values)
             magnet = self._magnet(i, values)
             pulsation = self._pulsation(i, values, magnet)
             spring = (magnet * pulsation**2 / whole)[..., None] * shares
@@ -235,14 +216,13 @@ class Exciter(Effect):
             return _joined(spring, pull, (pulsation**2)[..., None])
 
         def inertia(values: Values, setup: Setup) -> Floats:
-            whole, shares = _vibrating_mass(values, setup), self._shares(i, spots, values)
+            whole, shares = vibrating_mass(values, setup), self._shares(i, spots, values)
             coil = (self.value(values, self._key(i, "coil")) / whole)[..., None] * shares
             return coil if drive.is_held else _joined(coil, np.ones(1))
 
         return Stiffness(springs, stiffness), Mass(inertias, inertia)
 
     def _magnet(self, i: int, values: Values) -> Floats:
-        """Mass of the magnet, kg."""
         if self.drives[i].is_held and not self.drives[i].is_resonance:
             return np.ones(1)
         mass = self.value(values, self._key(i, "mass"))
@@ -270,11 +250,6 @@ def _orders(setup: Setup) -> tuple[int, int]:
     beams = [reading.beams for reading in setup.readings]
     highest = [max((one[axis] for one in beams), default=0) for axis in (0, 1)]
     return max(highest[0], _FEWEST_ORDER), max(highest[1], _FEWEST_ORDER)
-
-
-def _vibrating_mass(values: Values, setup: Setup) -> Floats:
-    length_x, length_y = vibrating_lengths(values, setup)
-    return np.asarray(density(values) * values["thickness"] * length_x * length_y)
 
 
 def _joined(*parts: Floats) -> Floats:

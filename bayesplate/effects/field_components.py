@@ -12,19 +12,16 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.random_field import ConditionedField, Degrees, Surface, legendre
 from bayesplate.board.setup import Ends
 from bayesplate.effects.base import Effect
-from bayesplate.effects.field_looks import look
 from bayesplate.effects.part import Part, vibrating_part
 from bayesplate.plate.beams import beam_functions
-
-Floats = NDArray[np.float64]
 
 CARRIED = 0.95
 """Share of the variance of the energies that the components carry, where `MOST` of them can."""
@@ -33,26 +30,27 @@ SMALLEST = 5e-4
 """Root mean square over the board below which a surface is nothing."""
 _N_BEAMS = 4
 _HELD = 1e-6
+_TOLD = 0.2
+"""Share of a surface's mean square from which on one of its polynomials is told."""
+_WHERE = {
+    (1, 0): ("towards x0", "towards x1"),
+    (0, 1): ("towards y0", "towards y1"),
+    (2, 0): ("at mid-length", "at both ends"),
+    (0, 2): ("along the middle", "along both sides"),
+    (1, 1): ("at the corners x0 y1 and x1 y0", "at the corners x0 y0 and x1 y1"),
+}
+"""Where a polynomial has its highest places, with a negative coefficient and with a positive one."""
+_MOST_TOLD = 2
 
 
 @dataclass(frozen=True)
 class FieldProfile:
-    """A profile 1 + d(x, y), with no mean of d over the board: what is expected, and what is open.
-
-    Attributes
-    ----------
-    with_mean : Surface or None
-        What d gains where the board's mean is one of its standard deviations higher; None: nothing.
-    components : tuple of Surface
-        What it gains where a parameter of standard normal prior is one.
-    mean, mean_sd : float
-        Of the mean over the board, SI.
-    """
+    """A profile 1 + d(x, y), with no mean of d over the board: what is expected, and what is open."""
 
     expected: Surface
-    with_mean: Surface | None
-    components: tuple[Surface, ...]
-    mean: float
+    with_mean: Surface | None  # what d gains where the board's mean is one of its standard deviations higher
+    components: tuple[Surface, ...]  # what d gains where a parameter of standard normal prior is one
+    mean: float  # over the board, SI
     mean_sd: float
 
     @property
@@ -77,7 +75,6 @@ class Held:
 
 
 def held_in(board: Board) -> tuple[Held, ...]:
-    """How each setup holds the board."""
     return tuple(
         Held(one.ends_x, one.ends_y, vibrating_part(board, one, "x"), vibrating_part(board, one, "y"))
         for one in board.setups
@@ -86,16 +83,10 @@ def held_in(board: Board) -> tuple[Held, ...]:
 
 @lru_cache(maxsize=64)
 def field_profile(found: ConditionedField, held: tuple[Held, ...], power: int, mean_is_known: bool) -> FieldProfile:
-    """The profile of a field, with the components that the setups' frequencies see.
+    """The profile of a field, with the components that the frequencies of the setups, as they hold the board, see.
 
-    Parameters
-    ----------
-    held : tuple of Held
-        One per setup.
-    power : int
-        With which the stiffness goes with the field, the mass going with its first: 3 for a thickness, 1 for a width.
-    mean_is_known : bool
-        Whether the mean is no parameter, so that nothing can go with it.
+    The stiffness goes with the `power` of the field, the mass with its first: 3 for a thickness, 1 for a width. A mean
+    that is known is no parameter, so that nothing can go with it.
     """
 
     def surface(coefficients: Floats) -> Surface:
@@ -174,6 +165,15 @@ def field_parameters(effect: Effect, profile: FieldProfile, source: str, more: s
         )
         for k, component in enumerate(profile.components, start=1)
     )
+
+
+def look(surface: Surface, mean: float, more: str) -> str:
+    """Words for where a surface, a fraction of a mean in m, is high, and for its size; `more`: "thicker" or "wider"."""
+    terms = sorted(zip(surface.coefficients, surface.degrees, strict=True), key=lambda one: -abs(one[0]))
+    told = [(value, degrees) for value, degrees in terms[:_MOST_TOLD] if value**2 >= _TOLD * surface.size**2]
+    places = [_WHERE[degrees][value > 0] if degrees in _WHERE else "in waves" for value, degrees in told]
+    where = " and ".join(dict.fromkeys(places)) or "in waves"
+    return f"at +1 {more} {where}, {1e3 * mean * surface.size:.2g} mm rms"
 
 
 def coordinates(profile: FieldProfile, mean: Floats, components: Sequence[Floats]) -> list[Floats]:

@@ -13,6 +13,7 @@ from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Contribution, Effect, Floats, Mass, Scope
+from bayesplate.effects.part import aspect_ratio_of
 from bayesplate.plate.air import air_mass
 from bayesplate.plate.fields import Outline
 from bayesplate.plate.terms import OnDeflections
@@ -34,22 +35,12 @@ class FluidLoading(Effect):
     """The mass of the fluid, between that of the board in the open and that of a board in a rigid wall.
 
     Nothing of its size is fitted but the baffle's share: potential flow gives it within 20 %.
-
-    Attributes
-    ----------
-    aspect_ratio : float
-        L_x / L_y of the vibrating part, at nominal sizes.
-    density : Quantity, kg m^-3
-    baffle : Quantity
-        0 in the open, 1 in a wall.
-    edge : Outline or None
-        Where the plate ends; None: the whole rectangle.
     """
 
-    aspect_ratio: float = 1.0
-    density: Quantity = DEFAULT_DENSITY
-    baffle: Quantity = UNKNOWN_BAFFLE
-    edge: Outline | None = None
+    aspect_ratio: float = 1.0  # L_x / L_y of the vibrating part, at nominal sizes
+    density: Quantity = DEFAULT_DENSITY  # kg m^-3
+    baffle: Quantity = UNKNOWN_BAFFLE  # 0 in the open, 1 in a wall
+    edge: Outline | None = None  # where the plate ends; None: the whole rectangle
 
     name: ClassVar[str] = "fluid_loading"
     scope: ClassVar[Scope] = "setup"
@@ -60,29 +51,26 @@ class FluidLoading(Effect):
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> FluidLoading:
-        """The effect with what the setup declares of the fluid."""
         declared = setup.fluid
         return cls(
             owner=setup.owner,
-            aspect_ratio=_aspect_ratio(board, setup),
+            aspect_ratio=aspect_ratio_of(board.nominal(), setup),
             density=declared.density if declared and declared.density else DEFAULT_DENSITY,
             baffle=BAFFLES[declared.baffle] if declared and declared.baffle else UNKNOWN_BAFFLE,
         )
 
     def in_setup(self, board: Board, setup: Setup) -> FluidLoading:
-        """The same fluid around the board of another setup, unless that states its own."""
+        """This fluid around the board of another setup, unless that states its own."""
         if setup.fluid is not None:
             return self.of(board, setup)
-        return replace(self, owner=setup.owner, aspect_ratio=_aspect_ratio(board, setup))
+        return replace(self, owner=setup.owner, aspect_ratio=aspect_ratio_of(board.nominal(), setup))
 
     @classmethod
     def is_implied(cls, board: Board) -> bool:
-        """Whether a setup of the board declares the fluid around it."""
         return any(setup.fluid is not None for setup in board.setups)
 
     @property
     def fluid(self) -> str:
-        """What people call it."""
         if self.density.mean < HEAVIEST_GAS:
             return "air"
         return "water" if abs(self.density.mean - WATER) < NEAR_WATER else "fluid"
@@ -103,7 +91,6 @@ class FluidLoading(Effect):
         )
 
     def within(self, shaped: Effect) -> FluidLoading:
-        """The same that ends with the plate."""
         return replace(self, edge=shaped.outline())
 
     def contributions(self) -> tuple[Contribution, ...]:
@@ -131,8 +118,3 @@ class FluidLoading(Effect):
             )
             for is_baffled in cases
         )
-
-
-def _aspect_ratio(board: Board, setup: Setup) -> float:
-    length_x, length_y = vibrating_lengths(board.nominal(), setup)
-    return float(length_x / length_y)

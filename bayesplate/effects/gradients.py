@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
@@ -9,39 +10,41 @@ from bayesplate.board.board import Board
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
-from bayesplate.effects.base import Effect, Scope
+from bayesplate.effects.base import Effect, Floats, Scope, Variation
 from bayesplate.effects.part import WHOLE, Part, vibrating_part
+from bayesplate.plate.fields import Group
 
 
 @dataclass(frozen=True)
 class GradientAlongX(Effect):
-    """A property 1 + g (s - 1/2) times its mean, s from 0 to 1 along the whole board.
+    """A property 1 + g (s - 1/2) times its mean, s from 0 to 1 along the whole board."""
 
-    Attributes
-    ----------
-    part : Part
-        What vibrates of the board along x.
-    """
-
-    part: Part = WHOLE
+    part: Part = WHOLE  # what vibrates of the board along x
 
     scope: ClassVar[Scope] = "board"
     default: ClassVar[Quantity]
     source: ClassVar[str]
+    groups: ClassVar[tuple[Group, ...]]  # of terms that the property is a factor of
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> Self:
-        """The effect on the part of the board that vibrates."""
         return cls(part=vibrating_part(board, setup, "x"))
 
     def in_setup(self, board: Board, setup: Setup) -> Self:
-        """The same gradient on the part of the board that vibrates in another setup."""
         return replace(self, part=vibrating_part(board, setup, "x"))
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Relative growth from x = 0 to the other end."""
         return (self.parameter("gradient", self.default, "1", 0.0, self.source),)
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
-        """The two ends along x differ."""
         return False, True
+
+    def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
+        """The property as at the middle of the vibrating part, and what grows along x from there."""
+        at_middle = Variation(None, lambda values: 1.0 + self.value(values, "gradient") * self.part.middle)
+        growing = Variation(_from_middle, lambda values: self.value(values, "gradient") * self.part.share)
+        return dict.fromkeys(self.groups, (at_middle, growing))
+
+
+def _from_middle(x: Floats, y: Floats) -> Floats:
+    return x - 0.5 + 0.0 * y

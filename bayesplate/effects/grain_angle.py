@@ -28,23 +28,14 @@ class GrainAngle(Effect):
     """Stiffness turned by an angle; D_x, D_y, D_s and nu_xy stay those along and across the grain.
 
     All terms keep their form, with weights that are functions of the angle; the coupling of bending with twist (D_16,
-    D_26), and of the two shear strains, joins them.
+    D_26), and of the two shear strains, joins them. Q' = T^-1 Q R T R^-1: Mascia and Lahr (2006).
 
     Where the plate mirrors about a middle line both signs ring alike, and one stands for both. A thing at a corner, or
     a thickness that was read at places, tells them apart: with 3 g on 250 g the signs are up to 50 cents apart at 3
     degrees. A search tries both there, and `notes` says of a fit that it has one.
-
-    Attributes
-    ----------
-    sign : int
-        1 or -1 where each of both is tried, from x towards y or away from it; 0 where one stands for both.
-
-    References
-    ----------
-    Mascia and Lahr (2006): Q' = T^-1 Q R T R^-1.
     """
 
-    sign: int = 0
+    sign: int = 0  # 1 or -1 where each is tried, from x towards y or away from it; 0: one stands for both
 
     name: ClassVar[str] = "grain_angle"
     scope: ClassVar[Scope] = "board"
@@ -57,12 +48,10 @@ class GrainAngle(Effect):
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> GrainAngle:
-        """The effect; it is the same in every setup."""
         return cls()
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
-        """Only wood has a grain, and fibres a direction."""
         return "the board is isotropic: turned by any angle it is the same" if board.isotropic else ""
 
     @classmethod
@@ -79,7 +68,7 @@ class GrainAngle(Effect):
 
     @classmethod
     def notes(cls, board: Board) -> tuple[str, ...]:
-        """That the other sign of the angle is another board, where nothing mirrors."""
+        """A sentence that the other sign of the angle is another board, where nothing mirrors."""
         are_both_tried = any(one.sign for one in board.chosen if isinstance(one, cls))
         if cls.name not in board.effects or are_both_tried or not _signs_differ(board):
             return ()
@@ -90,7 +79,6 @@ class GrainAngle(Effect):
         )
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Size of the angle between the side x and the grain."""
         return (self.parameter(self._key, DEFAULT_ANGLE, "rad", 0.0, _SOURCE, self._key.replace("_", " ")),)
 
     @property

@@ -25,18 +25,10 @@ _SOURCE = (
 
 @dataclass(frozen=True)
 class MembraneTension(Effect):
-    """Tension per length in the plane of the board, between opposite held edges.
+    """Tension per length in the plane of the board, between opposite held edges."""
 
-    Attributes
-    ----------
-    axis : "both", "x" or "y"
-        Along which it acts; "both" is one tension, equal along x and y.
-    edge : Outline or None
-        Where the plate ends; None: the whole rectangle.
-    """
-
-    axis: Axis = "both"
-    edge: Outline | None = None
+    axis: Axis = "both"  # along which it acts; "both" is one tension, equal along x and y
+    edge: Outline | None = None  # where the plate ends; None: the whole rectangle
 
     name: ClassVar[str] = "membrane_tension"
     scope: ClassVar[Scope] = "setup"
@@ -68,22 +60,18 @@ class MembraneTension(Effect):
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
-        """Refused where no two opposite edges are held."""
         if "free" in setup.ends_x and "free" in setup.ends_y:
             return "no two opposite edges are held, so nothing can stretch the board"
         return ""
 
     @property
     def detail(self) -> str:
-        """The side along which it acts, if not equally along both."""
         return "" if self.axis == "both" else f"along {self.axis}"
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """The tension."""
         return (self.parameter("N", _PRIOR, "N/m", 0.0, _SOURCE, words="tension"),)
 
     def within(self, shaped: Effect) -> MembraneTension:
-        """The same that ends with the plate."""
         return replace(self, edge=shaped.outline())
 
     def contributions(self) -> tuple[Contribution, ...]:
@@ -101,6 +89,5 @@ class MembraneTension(Effect):
 
 
 def _held(setup: Setup) -> tuple[Axis, ...]:
-    """Axes along which a setup is held at both ends."""
     sides: tuple[tuple[Axis, Ends], ...] = (("x", setup.ends_x), ("y", setup.ends_y))
     return tuple(axis for axis, ends in sides if "free" not in ends)

@@ -39,21 +39,12 @@ class OutlineProfile(Effect):
     The functions are those of the rectangle as wide as the widest place; what lies outside the outline is all but
     removed. Where both edges along x are free the board is taken to narrow from both alike (readings of a width do not
     say which edge recedes), otherwise from the free one. The mean width is taken to be known apart from the field.
-
-    Attributes
-    ----------
-    ends_y : tuple of str
-        Conditions at y0 and y1.
-    part_x, part_y : Part
-        What vibrates of the board; along y, of its mean width.
-    profile : FieldProfile or None
-        Of the width, along x; None: a rectangle.
     """
 
     ends_y: Ends = ("free", "free")
     part_x: Part = WHOLE
-    part_y: Part = WHOLE
-    profile: FieldProfile | None = None
+    part_y: Part = WHOLE  # of its mean width
+    profile: FieldProfile | None = None  # of the width, along x; None: a rectangle
 
     name: ClassVar[str] = "outline_profile"
     scope: ClassVar[Scope] = "board"
@@ -61,7 +52,6 @@ class OutlineProfile(Effect):
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> OutlineProfile:
-        """The effect with the board's readings of its width."""
         profile = _profile(board)
         is_rectangle = profile is None or profile.is_uniform
         parts = vibrating_part(board, setup, "x"), vibrating_part(board, setup, "y")
@@ -80,7 +70,6 @@ class OutlineProfile(Effect):
 
     @classmethod
     def notes(cls, board: Board) -> tuple[str, ...]:
-        """That readings of the width at stations serve for their mean alone, and why."""
         if not board.inputs["length_y"].has_profile:
             return ()
         told = "the length_y was read at several places: its mean is used"
@@ -91,16 +80,14 @@ class OutlineProfile(Effect):
 
     @classmethod
     def candidates(cls, board: Board, setup: Setup) -> tuple[Effect, ...]:
-        """None where the readings say that the board is a rectangle."""
+        """No form where the readings say that the board is a rectangle."""
         return super().candidates(board, setup) if cls.is_implied(board) else ()
 
     def in_setup(self, board: Board, setup: Setup) -> OutlineProfile | None:
-        """The same outline in another setup."""
         return None if self.refusal(board, setup) else self.of(board, setup)
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
-        """It needs readings with places, and an edge that is free to recede."""
         if not board.inputs["length_y"].at_x:
             return "the card gives no widths at stations: length_y_mm = { readings = [..], at_x_mm = [..] }"
         if "free" not in setup.ends_y:
@@ -108,7 +95,6 @@ class OutlineProfile(Effect):
         return ""
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """The components of what the readings leave open."""
         return () if self.profile is None else field_parameters(self, self.profile, _SOURCE, "wider")
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
@@ -118,7 +104,6 @@ class OutlineProfile(Effect):
         return False, self.ends_y[0] == self.ends_y[1]
 
     def outline(self) -> Outline | None:
-        """Where the plate begins and ends along y, as expected."""
         return None if self.profile is None else _Limits(self)
 
     def adjusted(self, values: Values) -> Values:
@@ -132,11 +117,7 @@ class OutlineProfile(Effect):
         if self.profile is None or not self.profile.components:
             return {}
         moved = tuple(
-            Variation(
-                EdgeStrip(_Limits(self, k), _Direction(self, k)),
-                partial(self._share, k=k),
-                _FIRST_ORDER_ALONE,
-            )
+            Variation(EdgeStrip(_Limits(self, k), _Direction(self, k)), partial(self._share, k=k), _FIRST_ORDER_ALONE)
             for k in range(len(self.profile.components))
         )
         return dict.fromkeys(_GROUPS, (Variation(None), *moved))
@@ -148,7 +129,7 @@ class OutlineProfile(Effect):
         return np.asarray(np.clip(steps, -_FURTHEST, _FURTHEST) / self._strip_steps)
 
     def direction(self, x: Floats, y: Floats, k: int) -> Floats:
-        """Where a component widens the board, 1, and where it narrows it, -1."""
+        """1 where a component widens the board, -1 where it narrows it."""
         return np.sign(self._step(self.part_x.on_whole(x), k)) + 0.0 * y
 
     def placed(self, x: float, y: float) -> tuple[float, float]:
@@ -159,14 +140,13 @@ class OutlineProfile(Effect):
         return x, float(np.clip(self._corner + y * self.part_y.share / self._widest_part, low, high))
 
     def as_stated(self, x: float, y: float) -> tuple[float, float]:
-        """From the corner of the outline, over the mean width."""
         if self.profile is None:
             return x, y
         return x, float((y - self._corner) * self._widest_part / self.part_y.share)
 
     @property
     def _corner(self) -> float:
-        """Where the whole board has its corner of x0 and y0, as a fraction along y of the widest width."""
+        """Place of the board's corner of x0 and y0 along y, as a fraction of the widest width."""
         return float(self.limits(np.array([-self.part_x.start / self.part_x.share]))[0][0])
 
     @property
@@ -220,8 +200,6 @@ class _Limits:
 
 @dataclass(frozen=True)
 class _Direction:
-    """Where a component widens the board."""
-
     effect: OutlineProfile
     k: int
 

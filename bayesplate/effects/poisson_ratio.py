@@ -26,17 +26,10 @@ class PoissonRatio(Effect):
 
     Its parameter is the board's input `poisson_xy` itself: once declared, every use of that input, from the weight of
     the mixed term to E from D, takes the free value.
-
-    Attributes
-    ----------
-    stated : float
-        The card's own number.
-    is_isotropic : bool
-        Whether G_xy follows from it, too.
     """
 
-    stated: float = FREE_POISSON.mean
-    is_isotropic: bool = False
+    stated: float = FREE_POISSON.mean  # the card's own number
+    is_isotropic: bool = False  # G_xy follows from it, too
 
     name: ClassVar[str] = "poisson_ratio"
     scope: ClassVar[Scope] = "board"
@@ -44,7 +37,6 @@ class PoissonRatio(Effect):
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> PoissonRatio:
-        """The effect; it is the same in every setup."""
         return cls(stated=board.inputs["poisson_xy"].mean, is_isotropic=board.isotropic)
 
     @classmethod

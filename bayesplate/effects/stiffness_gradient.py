@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 from bayesplate.board.board import Board
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
-from bayesplate.effects.base import Variation
 from bayesplate.effects.gradients import GradientAlongX
-from bayesplate.effects.part import growing_along_x
 from bayesplate.plate.fields import Group
 
 
@@ -30,11 +27,9 @@ class StiffnessGradient(GradientAlongX):
     default: ClassVar[Quantity] = Quantity.from_mean(0.0, 0.08, "normal")
     source: ClassVar[str] = "normal: E_x varies by some per cent along one plank; a board is not stiffer at a known end"
 
+    groups: ClassVar[tuple[Group, ...]] = ("along",)
+
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
         """E_x alone grows, which then is no longer E_y."""
         return "the board is isotropic: it cannot be stiffer along x alone" if board.isotropic else ""
-
-    def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
-        """E_x that grows along x."""
-        return {"along": growing_along_x(self.part, lambda values: self.value(values, "gradient"))}

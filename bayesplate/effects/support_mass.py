@@ -8,11 +8,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesplate.board.board import Board, Values, density, vibrating_lengths
+from bayesplate.board.board import Board, Values
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Contribution, Effect, Floats, Mass, Scope
+from bayesplate.effects.part import vibrating_mass
 from bayesplate.plate.fields import Outline
 from bayesplate.plate.terms import Deflections, OnDeflections
 
@@ -27,17 +28,10 @@ class SupportMass(Effect):
 
     The momentum of frame and board together stays zero, which takes (int rho h w)^2 / (M_f + m) from the mass, M_f the
     frame's and m the vibrating one. Things attached to the board are not counted in this momentum: they weigh grams.
-
-    Attributes
-    ----------
-    edge : Outline or None
-        Where the plate ends; None: the whole rectangle.
-    share : float
-        Of the rectangle that the plate is.
     """
 
-    edge: Outline | None = None
-    share: float = 1.0
+    edge: Outline | None = None  # where the plate ends; None: the whole rectangle
+    share: float = 1.0  # of the rectangle that the plate is
 
     name: ClassVar[str] = "support_mass"
     scope: ClassVar[Scope] = "setup"
@@ -46,7 +40,6 @@ class SupportMass(Effect):
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> SupportMass:
-        """The effect in a setup."""
         return cls(setup.owner)
 
     @classmethod
@@ -61,7 +54,6 @@ class SupportMass(Effect):
         return (self.parameter("mass", _PRIOR, "kg", 1e6, _SOURCE),)
 
     def within(self, shaped: Effect) -> SupportMass:
-        """The same that ends with the plate."""
         edge = shaped.outline()
         assert edge is not None
         low, high = edge((np.arange(_N_POINTS) + 0.5) / _N_POINTS)
@@ -71,8 +63,7 @@ class SupportMass(Effect):
         """Less the product of the mean deflections, with the share of the vibrating mass in frame and board."""
 
         def weight(values: Values, setup: Setup) -> Floats:
-            length_x, length_y = vibrating_lengths(values, setup)
-            vibrating = density(values) * values["thickness"] * length_x * length_y
+            vibrating = vibrating_mass(values, setup)
             return vibrating / (self.value(values, "mass") + self.share * vibrating)
 
         return (Mass(OnDeflections(partial(_mean_products, outline=self.edge)), weight),)

@@ -24,16 +24,10 @@ class SupportStiffness(Effect):
     """A uniform elastic foundation: it adds k / (rho h) to omega^2 of every mode of a thin plate.
 
     A free board's rigid motions then bounce at that frequency, below all others; they stay left out.
-
-    Attributes
-    ----------
-    edge : Outline or None
-        Where the plate ends; None: the whole rectangle.
-    stiffness : Quantity, N/m^3
     """
 
-    edge: Outline | None = None
-    stiffness: Quantity = _PRIOR
+    edge: Outline | None = None  # where the plate ends; None: the whole rectangle
+    stiffness: Quantity = _PRIOR  # N/m^3
 
     name: ClassVar[str] = "support_stiffness"
     scope: ClassVar[Scope] = "setup"
@@ -47,37 +41,29 @@ class SupportStiffness(Effect):
 
     @classmethod
     def is_implied(cls, board: Board) -> bool:
-        """Whether a setup states at which frequency the board bounces."""
         return any(map(cls.is_wanted, board.setups))
 
     @classmethod
     def is_wanted(cls, setup: Setup) -> bool:
-        """Whether the setup states that frequency."""
         return setup.bounce is not None
 
     def in_setup(self, board: Board, setup: Setup) -> Effect | None:
-        """The same support in another setup, unless that states its own."""
         return self.of(board, setup) if self.is_wanted(setup) else super().in_setup(board, setup)
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
-        """Refused where an edge is held: such a board lies on nothing."""
         if not setup.is_free:
             return "an edge is held, so the board does not lie or hang on anything else"
         return ""
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Stiffness per area."""
         source = _SOURCE if self.stiffness is _PRIOR else ""
         return (self.parameter("stiffness", self.stiffness, "N/m^3", 0.0, source),)
 
     def within(self, shaped: Effect) -> SupportStiffness:
-        """The same that ends with the plate."""
         return replace(self, edge=shaped.outline())
 
     def contributions(self) -> tuple[Contribution, ...]:
-        """The squared deflection over the board, with the weight k over rho h."""
-
         def weight(values: Values, setup: Setup) -> Floats:
             return self.value(values, "stiffness") / (density(values) * values["thickness"])
 

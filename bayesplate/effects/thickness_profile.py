@@ -42,18 +42,11 @@ class ThicknessProfile(Effect):
     Without, p = 1 + alpha_x (s - 1/2) + alpha_y (t - 1/2), s and t from 0 to 1 along the whole sides: a taper around
     the mean thickness. Powers of p are polynomials in both tapers, so each power of s and t is a term of its own and
     the sum is exact.
-
-    Attributes
-    ----------
-    part_x, part_y : Part
-        What vibrates of the board.
-    profile : FieldProfile or None
-        None: free tapers.
     """
 
     part_x: Part = WHOLE
     part_y: Part = WHOLE
-    profile: FieldProfile | None = None
+    profile: FieldProfile | None = None  # None: free tapers
 
     name: ClassVar[str] = "thickness_profile"
     scope: ClassVar[Scope] = "board"
@@ -61,7 +54,6 @@ class ThicknessProfile(Effect):
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> ThicknessProfile:
-        """The effect with the board's readings where they have places."""
         parts = vibrating_part(board, setup, "x"), vibrating_part(board, setup, "y")
         return cls(BOARD, *parts, _profile(board))
 
@@ -78,7 +70,6 @@ class ThicknessProfile(Effect):
 
     @classmethod
     def notes(cls, board: Board) -> tuple[str, ...]:
-        """That readings of the thickness at places serve for their mean alone where the effect is not declared."""
         if not board.inputs["thickness"].has_profile:
             return ()
         told = "the thickness was read at several places: its mean is used"
@@ -89,12 +80,11 @@ class ThicknessProfile(Effect):
 
     @classmethod
     def candidates(cls, board: Board, setup: Setup) -> tuple[Effect, ...]:
-        """None where the readings say that the board is equally thick everywhere."""
+        """No form where the readings say that the board is equally thick everywhere."""
         profile = _profile(board)
         return () if profile is not None and profile.is_uniform else super().candidates(board, setup)
 
     def in_setup(self, board: Board, setup: Setup) -> ThicknessProfile:
-        """The same profile on the part of the board that vibrates in another setup."""
         part_x, part_y = (vibrating_part(board, setup, axis) for axis in "xy")
         return replace(self, part_x=part_x, part_y=part_y)
 
@@ -108,13 +98,11 @@ class ThicknessProfile(Effect):
         return field_parameters(self, self.profile, _FIELD_SOURCE, "thicker")
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
-        """Neither half mirrors the other, unless the board is equally thick."""
         is_uniform = self.profile is not None and self.profile.is_uniform
         return is_uniform, is_uniform
 
     @property
     def goes_with(self) -> tuple[str, ...]:
-        """The mean thickness, where the field goes with it."""
         return ("thickness",) if self.profile is not None and self.profile.with_mean is not None else ()
 
     def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
@@ -166,7 +154,7 @@ class ThicknessProfile(Effect):
         return (*(replace(one, order=1) for one in cube if one.order == 0), *first)
 
     def _coefficient(self, values: Values, n: int, i: int, j: int) -> Floats:
-        """Of u^i v^j in the n-th power of the taper, u and v from the middle of the vibrating part."""
+        """Coefficient of u^i v^j in the n-th power of the taper, u and v from the middle of the vibrating part."""
         taper_x, taper_y = self.value(values, "taper_x"), self.value(values, "taper_y")
         middle = 1.0 + taper_x * self.part_x.middle + taper_y * self.part_y.middle
         along_x, along_y = taper_x * self.part_x.share, taper_y * self.part_y.share

@@ -23,13 +23,7 @@ _RATIO_SOURCE = "log-normal around the published G_xz / E_x 0.05-0.12 and G_yz /
 
 @dataclass(frozen=True)
 class TransverseShear(Effect):
-    """The shear-flexible plate in place of the thin one.
-
-    Attributes
-    ----------
-    xz, yz : Quantity or None, Pa
-        Transverse shear moduli; None where the material is alike in all directions, so that they are G_xy itself.
-    """
+    """The shear-flexible plate in place of the thin one; a modulus (Pa) that is None is G_xy."""
 
     xz: Quantity | None = DEFAULT_XZ
     yz: Quantity | None = DEFAULT_YZ
@@ -55,7 +49,6 @@ class TransverseShear(Effect):
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> TransverseShear:
-        """The effect with the card's thick-plate constants where it gives them."""
         if board.isotropic:
             return cls(xz=board.shear_xz, yz=board.shear_yz)
         return cls(xz=board.shear_xz or DEFAULT_XZ, yz=board.shear_yz or DEFAULT_YZ)

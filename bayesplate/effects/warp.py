@@ -9,11 +9,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesplate.board.board import Board, Values, density, vibrating_lengths
+from bayesplate.board.board import Board, Values, density
 from bayesplate.board.parameter import BOARD, Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, Scope, Stiffness
+from bayesplate.effects.part import aspect_ratio_of
 from bayesplate.plate.fields import Field
 from bayesplate.plate.membrane import MODULI, Curvature, curvature_pairs, membrane_terms
 from bayesplate.plate.terms import OnDeflections, Term
@@ -43,17 +44,10 @@ class Warp(Effect):
 
     All signs at once change nothing, and that of the twist alone nothing either: cup and twist are positive, the sign
     of the bow tells a dome from a saddle.
-
-    Attributes
-    ----------
-    rises : tuple of (str, Quantity, str)
-        Name, rise in m, and where its prior comes from (empty: the card); those that are absent are none.
-    aspect_ratio : float
-        L_x / L_y of the vibrating part.
     """
 
-    rises: tuple[tuple[Curvature, Quantity, str], ...] = ()
-    aspect_ratio: float = 1.0
+    rises: tuple[tuple[Curvature, Quantity, str], ...] = ()  # name, rise in m, source of its prior (empty: the card)
+    aspect_ratio: float = 1.0  # L_x / L_y of the vibrating part
 
     name: ClassVar[str] = "warp"
     scope: ClassVar[Scope] = "board"
@@ -69,16 +63,14 @@ class Warp(Effect):
         """The effect with what the board states of its rises, and priors for the others."""
         rises = ((name, *_rise(board, name)) for name in RISES)
         kept = tuple(one for one in rises if not (one[1].is_exact and one[1].mean == 0.0))
-        return cls(BOARD, kept, _aspect_ratio(board, setup))
+        return cls(BOARD, kept, aspect_ratio_of(board.nominal(), setup))
 
     @classmethod
     def is_implied(cls, board: Board) -> bool:
-        """Whether the board states a rise."""
         return bool(board.warp)
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
-        """Refused where nothing is stated and a usual rise would not show."""
         if board.warp or _shows(board):
             return ""
         return "the board is so thick that the warp of a sawn board would move no mode by a cent"
@@ -97,16 +89,15 @@ class Warp(Effect):
 
     @property
     def detail(self) -> str:
-        """Which rises, where not all."""
         names = [name for name, *_ in self.rises]
         return "" if len(names) == len(RISES) else " and ".join(names)
 
     def in_setup(self, board: Board, setup: Setup) -> Warp | None:
-        """The same shape of what vibrates in another setup."""
-        return None if self.refusal(board, setup) else replace(self, aspect_ratio=_aspect_ratio(board, setup))
+        if self.refusal(board, setup):
+            return None
+        return replace(self, aspect_ratio=aspect_ratio_of(board.nominal(), setup))
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """The rises that the board may have, m."""
         return tuple(self.parameter(name, rise, "m", 0.0, source) for name, rise, source in self.rises)
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
@@ -171,8 +162,3 @@ def _moduli(values: Values) -> Floats:
     D_x, D_y, D_s = (np.asarray(values[name]) for name in ("D_x", "D_y", "D_s"))
     parts = (D_x * cube, np.asarray(values["poisson_xy"]) * D_y * cube, D_y * cube, 0.25 * D_s * cube)
     return np.stack(np.broadcast_arrays(*parts), axis=-1)
-
-
-def _aspect_ratio(board: Board, setup: Setup) -> float:
-    length_x, length_y = vibrating_lengths(board.nominal(), setup)
-    return float(length_x / length_y)

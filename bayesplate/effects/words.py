@@ -6,12 +6,10 @@ from collections.abc import Sequence
 
 
 def effect_name(name: str) -> str:
-    """The name of an effect as words."""
     return name.replace("_", " ")
 
 
 def effect_names(names: Sequence[str], last: str = "and") -> str:
-    """Names of effects as words, as a list in prose."""
     return joined([effect_name(name) for name in names], last)
 
 

@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board, Values, vibrating_lengths
 from bayesplate.board.coefficients import CoefficientCard
 from bayesplate.board.material import RIGIDITIES, moduli
 from bayesplate.board.setup import Setup
 from bayesplate.board.words import setup_places
+from bayesplate.effects.part import aspect_ratio_of
 from bayesplate.effects.words import effect_names
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.frequencies.columns import columns
@@ -36,37 +37,18 @@ _GPA = 1e9
 
 @dataclass(frozen=True, eq=False)
 class CoefficientRows:
-    """Coefficients of a setup's labelled modes, in the order of its readings.
-
-    Attributes
-    ----------
-    source : "sensitivity", "training" or "published"
-    readings : (n_modes,) array of int
-        Which readings of the setup they are of: all of them, but for peaks without a sure label that are modes which a
-        printed table lacks.
-    coefficients : (n_modes, 3) array
-        Columns a, b, c.
-    rest : (n_modes,) array, N m
-        What of omega^2 / lambda the rigidities do not make, to be taken off before the fit; zero except by sensitivity
-        on a plate with effects. A training and a printed table have their plates' shear inside a, b and c.
-    aspect_ratio : float
-        L_x / L_y that they are made for.
-    theory : str
-        Of the plates behind them.
-    sentence : str
-        Where they come from.
-    r_squared : dict of float
-        By label, where a plane was fitted.
-    """
+    """Coefficients of a setup's labelled modes, in the order of its readings, and the plates that they are made for."""
 
     source: CoefficientSource
-    readings: NDArray[np.intp]
-    coefficients: NDArray[np.float64]
-    rest: NDArray[np.float64]
-    aspect_ratio: float
+    # (n_modes,): readings of the setup; a printed table may lack modes of peaks without a sure label
+    readings: Indices
+    coefficients: Floats  # (n_modes, 3): a, b, c
+    # (n_modes,), N m: what effects make of omega^2 / lambda; training and table have shear in a, b, c
+    rest: Floats
+    aspect_ratio: float  # L_x / L_y
     theory: str
     sentence: str
-    r_squared: Mapping[Label, float]
+    r_squared: Mapping[Label, float]  # where a plane was fitted
 
 
 def coefficient_rows(
@@ -77,28 +59,12 @@ def coefficient_rows(
     *,
     compared: bool = True,
 ) -> CoefficientRows:
-    """Coefficients of a setup's readings.
+    """Coefficients of a setup's readings, of a model that is solved at the values.
 
-    Parameters
-    ----------
-    board_name : str
-        For messages.
-    model : SetupModel
-        Solved at `values`.
-    values : dict of float
-        Where the modes' own coefficients are taken, and the middle of a training without a printed one.
-    source : "sensitivity", "training" or "published", optional
-        By default the published table where the setup names one, else the sensitivity of one solve.
-    compared : bool
-        Whether to solve plates of both theories to say which a published table is of; half a second where it has many
-        modes.
-
-    Raises
-    ------
-    InputError
-        If a table is asked for and none is named.
-    NotIdentifiableError
-        If a mode is recognised in fewer than three training plates.
+    By default the published table where the setup names one, else the sensitivity of one solve. `compared`: also solve
+    plates of both theories to say which a table is of, half a second where it has many modes. Raises InputError where
+    the table that is asked for is not named, and NotIdentifiableError where a mode is recognised in fewer than three
+    training plates.
     """
     if source is None:
         source = "sensitivity" if model.setup.published_coefficients is None else "published"
@@ -195,13 +161,7 @@ def _published(board_name: str, model: SetupModel, values: Values, compared: boo
 
 
 def named_table(board_name: str, setup: Setup) -> CoefficientCard:
-    """The table that a setup names.
-
-    Raises
-    ------
-    InputError
-        If it names none.
-    """
+    """The table that a setup names; InputError if it names none."""
     if setup.published_coefficients is None:
         place = f"{board_name} [setup] published_coefficients"
         raise InputError(Fault(place, "the name of a table", "nothing", "take --coefficients sensitivity or training"))
@@ -209,13 +169,7 @@ def named_table(board_name: str, setup: Setup) -> CoefficientCard:
 
 
 def coefficient_faults(board: Board) -> list[Fault]:
-    """Tables that are not of their setup's edges, aspect ratio and labels.
-
-    Returns
-    -------
-    list of Fault
-        Every one of every setup; empty where no table is named.
-    """
+    """Tables that are not of their setup's edges, aspect ratio and labels: every fault of every setup."""
     places = setup_places(f"{board.name}.toml", [setup.name for setup in board.setups])
     faults = []
     for setup, where in zip(board.setups, places, strict=True):
@@ -225,12 +179,7 @@ def coefficient_faults(board: Board) -> list[Fault]:
 
 
 def require_sides(board: Board) -> None:
-    """Refuse a board that has the aspect ratio of a printed table only with its sides exchanged.
-
-    Raises
-    ------
-    NotIdentifiableError
-    """
+    """Refuse (NotIdentifiableError) a board with the aspect ratio of a printed table once its sides are exchanged."""
     nominal = board.nominal()
     exchanged = {**nominal, "length_x": nominal["length_y"], "length_y": nominal["length_x"]}
     for setup in board.setups:
@@ -269,11 +218,7 @@ def _label_in_table(card: CoefficientCard, setup: Setup, label: Label) -> Label:
 
 
 def _distances(
-    card: CoefficientCard,
-    setup: Setup,
-    beams: Sequence[Beams],
-    rows: NDArray[np.float64],
-    thickness_ratio: float,
+    card: CoefficientCard, setup: Setup, beams: Sequence[Beams], rows: Floats, thickness_ratio: float
 ) -> dict[Theory, float]:
     """How far a table's frequencies lie from plates of each theory in the middle of its training: rms, cents."""
     constants = _constants_of(card)
@@ -291,12 +236,6 @@ def _distances(
         ratios = rows @ np.array([p, q, 1.0]) / np.array([solved[b].eigenvalue for b in beams])
         distances[theory] = float(np.sqrt(np.mean((600.0 * np.log2(ratios)) ** 2)))
     return distances
-
-
-def aspect_ratio_of(values: Values, setup: Setup) -> float:
-    """L_x / L_y of the part of a board that vibrates."""
-    length_x, length_y = vibrating_lengths(values, setup)
-    return float(length_x / length_y)
 
 
 def _thickness_ratio(values: Values, setup: Setup) -> float:

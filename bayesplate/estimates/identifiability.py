@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.material import ORTHOTROPIC, Symmetry
 from bayesplate.effects.words import joined
@@ -32,46 +32,31 @@ _HELP = {
 
 @dataclass(frozen=True, eq=False)
 class Identifiability:
-    """How well n readings determine the constants of a board, to first order at the estimate.
+    """How well n readings determine the constants of a board, to first order at the estimate."""
 
-    Attributes
-    ----------
-    condition_number : float
-        Of the weighted sensitivities d ln f / d ln D: dimensionless, free of the units of the constants.
-    covariance : (n_constants, n_constants) array
-        Of the logarithms of the free rigidities, D_x, D_y, D_s unless the board is isotropic, at the expected noise.
-    leverages : (n_modes,) array
-        Share of each reading in its own prediction, 0 to 1; they sum to the number of constants.
-    shares : (n_modes, 3) array
-        Share of D_x, D_y and D_s in each mode's energy; rows sum to 1.
-    symmetry : Symmetry
-        Of the board: which rigidities are free.
-    errors_beside_known : (n_constants,) array or None
-        Standard error of the logarithm of each free rigidity where the others are known within `OTHERS_WITHIN`: one
-        that hardly enters a mode does not spoil what the mode tells of another.
-    """
-
-    condition_number: float
-    covariance: NDArray[np.float64]
-    leverages: NDArray[np.float64]
-    shares: NDArray[np.float64]
+    condition_number: float  # of the weighted sensitivities d ln f / d ln D: free of the units of the constants
+    covariance: Floats  # (n_constants, n_constants): of ln of the free rigidities, at the expected noise
+    leverages: Floats  # (n_modes,): share of each reading in its own prediction; their sum is n_constants
+    shares: Floats  # (n_modes, 3): of D_x, D_y, D_s in each mode's energy; rows sum to 1
     symmetry: Symmetry = ORTHOTROPIC
-    errors_beside_known: NDArray[np.float64] | None = None
+    # (n_constants,) standard errors of ln D where the others are known within `OTHERS_WITHIN`: a constant that hardly
+    # enters a mode does not spoil what the mode tells of another
+    errors_beside_known: Floats | None = None
 
     @property
-    def standard_errors(self) -> NDArray[np.float64]:
-        """Of the logarithms of the free rigidities: (n_constants,) array."""
+    def standard_errors(self) -> Floats:
+        """Standard errors of ln of the free rigidities: (n_constants,) array."""
         return np.sqrt(np.diagonal(self.covariance))
 
     @property
-    def of_rigidities(self) -> NDArray[np.float64]:
+    def of_rigidities(self) -> Floats:
         """Covariance of ln D_x, ln D_y, ln D_s: (3, 3) array, of rank one where they follow one of them."""
         follows = list(self.symmetry.follows)
         return np.asarray(self.covariance[np.ix_(follows, follows)])
 
     @property
-    def errors_of_rigidities(self) -> NDArray[np.float64]:
-        """Of the logarithms of D_x, D_y, D_s: (3,) array."""
+    def errors_of_rigidities(self) -> Floats:
+        """Standard errors of ln D_x, ln D_y, ln D_s: (3,) array."""
         return np.sqrt(np.diagonal(self.of_rigidities))
 
     def blind(self) -> tuple[str, ...]:
@@ -80,40 +65,25 @@ class Identifiability:
         return tuple(n for n, error in zip(self.symmetry.free, self.standard_errors, strict=True) if not error <= limit)
 
 
-def identifiability(
-    sensitivities: NDArray[np.float64], scales: NDArray[np.float64], symmetry: Symmetry = ORTHOTROPIC
-) -> Identifiability:
-    """First-order identifiability from sensitivities and the relative uncertainties of the readings.
+def identifiability(sensitivities: Floats, scales: Floats, symmetry: Symmetry = ORTHOTROPIC) -> Identifiability:
+    """First-order identifiability from (n_modes, 3) d ln f / d ln D and the relative uncertainties of the readings.
 
-    Parameters
-    ----------
-    sensitivities : (n_modes, 3) array
-        d ln f / d ln D.
-    scales : (n_modes,) array
-        Relative uncertainty of each reading.
-    symmetry : Symmetry
-        Of the board.
-
-    Returns
-    -------
-    Identifiability
-        With infinite variances where the readings leave a direction open.
+    Variances are infinite where the readings leave a direction open.
     """
     n = symmetry.n
     weighted = symmetry.along(sensitivities) / scales[:, None]
     left, singular, right = np.linalg.svd(weighted, full_matrices=False)
     seen = singular > 1e-10 * singular[0]
-    with np.errstate(divide="ignore"):
-        inverse = np.where(seen, 1.0 / singular, np.inf) if seen.sum() == n else np.full(n, np.inf)
-    covariance = (right.T * inverse**2) @ right if np.isfinite(inverse).all() else np.diag(np.full(n, np.inf))
-    condition = float(singular[0] / singular[-1]) if seen.sum() == n else float("inf")
+    tells_all = seen.sum() == n
+    covariance = (right.T * (1.0 / singular) ** 2) @ right if tells_all else np.diag(np.full(n, np.inf))
+    condition = float(singular[0] / singular[-1]) if tells_all else float("inf")
     leverages = np.sum(left[:, seen] ** 2, axis=1)
     beside = _errors_beside_known(weighted.T @ weighted)
     return Identifiability(condition, covariance, leverages, 2.0 * sensitivities, symmetry, beside)
 
 
-def _errors_beside_known(information: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of each constant, where the others have a 95 % interval of `OTHERS_WITHIN`: (n_constants,) array."""
+def _errors_beside_known(information: Floats) -> Floats:
+    """Standard error of ln of each constant where the others have a 95 % interval of `OTHERS_WITHIN`."""
     precision = (1.96 / np.log(OTHERS_WITHIN)) ** 2
     errors = []
     for i in range(len(information)):
@@ -126,12 +96,7 @@ def _errors_beside_known(information: NDArray[np.float64]) -> NDArray[np.float64
 
 
 def require_labels(board: Board) -> None:
-    """Refuse a board whose labelled modes are too few for its constants, or a setup without any.
-
-    Raises
-    ------
-    NotIdentifiableError
-    """
+    """Refuse (NotIdentifiableError) too few labelled modes for the constants, or a setup without any."""
     for setup in board.setups:
         if not setup.readings:
             n = len(setup.peaks)
@@ -149,12 +114,7 @@ def require_labels(board: Board) -> None:
 
 
 def require_identifiable(board: Board, found: Identifiability) -> None:
-    """Refuse readings that leave a constant open, naming it and what would help.
-
-    Raises
-    ------
-    NotIdentifiableError
-    """
+    """Refuse (NotIdentifiableError) readings that leave a constant open, naming it and what would help."""
     if not found.blind():
         return
     spread = _factors(found.standard_errors)
@@ -178,7 +138,7 @@ def require_identifiable(board: Board, found: Identifiability) -> None:
     )
 
 
-def _factors(errors: NDArray[np.float64]) -> NDArray[np.float64]:
+def _factors(errors: Floats) -> Floats:
     """Factor within which 95 % lie, from standard errors of logarithms."""
     with np.errstate(over="ignore"):
         return np.asarray(np.exp(1.96 * errors))
@@ -193,12 +153,9 @@ def _modes(board: Board) -> str:
 
 
 def remarks(board: Board, found: Identifiability, carrying: str | None = None) -> tuple[str, ...]:
-    """Sentences on what is weakly known, for the table and the summary; empty where there is nothing to say.
+    """Sentences on what is weakly known, for the table and the summary.
 
-    Parameters
-    ----------
-    carrying : str, optional
-        What a fit says of modes that alone carry something; before there is one, their leverages here say it.
+    `carrying` is what a fit says of modes that alone carry something; before there is one, their leverages here say it.
     """
     sentences = [_weakest(found)]
     names = [
@@ -249,6 +206,5 @@ def _weakest(found: Identifiability) -> str:
 
 
 def _per_cent(error: float) -> str:
-    """A relative error to two digits."""
     error *= 100
     return f"{error:.{max(1 - int(np.floor(np.log10(min(error, 10.0)))), 0)}f} %"

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.reading import Peak, Reading
 from bayesplate.board.setup import Setup
 from bayesplate.frequencies.peaks import PeakLikelihood
@@ -21,19 +21,11 @@ LIKELY = 0.5
 """Probability above which a label is proposed: no two peaks can each be the same mode with more."""
 
 
-def with_labels(setup: Setup, peaks: PeakLikelihood, probabilities: NDArray[np.float64], least: float) -> Setup:
+def with_labels(setup: Setup, peaks: PeakLikelihood, probabilities: Floats, least: float) -> Setup:
     """A setup with labels for the peaks that are one mode with a probability above the least one.
 
-    Parameters
-    ----------
-    setup : Setup
-        Labels that were proposed for it before are forgotten.
-    peaks : PeakLikelihood
-        Of this setup.
-    probabilities : (n_peaks, n_modes) array
-        Of each peak to be each mode.
-    least : float
-        At least one half, so that no two peaks have the same label.
+    Labels that were proposed before are forgotten; `probabilities` is (n_peaks, n_modes), and the least one at least
+    one half, so that no two peaks have the same label.
     """
     likely = [_likely(peaks.labels, row, least) for row in probabilities]
     of_reading = {int(at): label for at, label in zip(peaks.readings, likely, strict=True) if at >= 0}
@@ -68,10 +60,9 @@ def _without_doubles(given: Mapping[int, Label], found: Mapping[int, Label]) -> 
 
 
 def _at(setup: Setup, reading: Reading, label: Label) -> Reading:
-    """A reading with another label."""
     return replace(reading, label=label, beams=(label.m - setup.first_label.m, label.n - setup.first_label.n))
 
 
-def _likely(labels: Sequence[Label | None], probabilities: NDArray[np.float64], least: float) -> Label | None:
+def _likely(labels: Sequence[Label | None], probabilities: Floats, least: float) -> Label | None:
     best = int(np.argmax(probabilities))
     return labels[best] if probabilities[best] > least else None

@@ -10,15 +10,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.board.setup import Setup
 from bayesplate.frequencies.model import SetupModel, setup_model
 from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.frequencies.system import system_of
-from bayesplate.frequencies.terms import rayleigh_coefficients, rigidity_columns
+from bayesplate.frequencies.terms import rigidity_columns
+from bayesplate.plate.beams import product_coefficients
 
 MOST_STEPS = 40
 _LONGEST_STEP = 0.7
@@ -33,68 +34,36 @@ _PULL = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """A point estimate of the rigidities, and how well the readings determine it.
+    """A point estimate of the rigidities, and how well the readings determine it."""
 
-    Attributes
-    ----------
-    rigidities : (3,) array, N m
-        D_x, D_y, D_s.
-    values : dict of float
-        The rigidities and the nominal inputs by name.
-    models : tuple of SetupModel
-        One a setup, solved at the estimate, whether the steps settled there or not.
-    sensitivities : (n_modes, 3) array
-        d ln f / d ln D of all readings, setup after setup.
-        Of an isotropic board too, whose own fit moves along their sum: `Symmetry.along`.
-    residuals : (n_modes,) array
-        ln measured - ln predicted.
-    scales : (n_modes,) array
-        Relative uncertainty of each reading that weighs it, see `reading_scales`.
-    """
-
-    rigidities: NDArray[np.float64]
-    values: Mapping[str, NDArray[np.float64]]
-    models: tuple[SetupModel, ...]
-    sensitivities: NDArray[np.float64]
-    residuals: NDArray[np.float64]
-    scales: NDArray[np.float64]
+    rigidities: Floats  # (3,), N m
+    values: Mapping[str, Floats]  # the rigidities and the nominal inputs
+    models: tuple[SetupModel, ...]  # one a setup, solved at the estimate, settled or not
+    # (n_modes, 3) d ln f / d ln D, setup after setup; see `Symmetry.along` for an isotropic board
+    sensitivities: Floats
+    residuals: Floats  # (n_modes,): ln measured - ln predicted
+    scales: Floats  # (n_modes,): of `reading_scales`
     converged: bool
 
 
-def reading_scales(board: Board) -> NDArray[np.float64]:
+def reading_scales(board: Board) -> Floats:
     """Relative uncertainty of each reading at the median noise of its setup, rounding included: (n_modes,) array."""
     return reading_sd(board.setups, [setup.noise.median for setup in board.setups])
 
 
-def log_measured(board: Board) -> NDArray[np.float64]:
+def log_measured(board: Board) -> Floats:
     """ln of the measured frequencies (Hz), setup after setup: (n_modes,) array."""
     return np.log(np.concatenate([setup.measured for setup in board.setups]))
 
 
 def weighted_least_squares(
-    board: Board,
-    most_steps: int = MOST_STEPS,
-    start: NDArray[np.float64] | None = None,
-    accepted: float = _CONVERGED,
+    board: Board, most_steps: int = MOST_STEPS, start: Floats | None = None, accepted: float = _CONVERGED
 ) -> Estimate:
     """Rigidities that minimise the weighted squares of relative frequency errors over all setups.
 
-    Parameters
-    ----------
-    board : Board
-        Every setup with at least one reading.
-    most_steps : int
-        After which they end, settled or not.
-    start : (3,) array, optional
-        Rigidities to begin with, N m; by default rough ones from the readings.
-    accepted : float
-        What ln D may be off by when they end.
-
-    Returns
-    -------
-    Estimate
-        `converged` is False where the steps did not settle. Where they go round, as at a veering whose names swap back
-        and forth, it is the best of the round. A direction that the readings do not determine keeps its starting value.
+    Steps begin at `start` (N m), by default rough rigidities from the readings, and end where ln D is off by less than
+    `accepted`. Where they go round, as at a veering whose names swap back and forth, the best of the round is the
+    estimate. A direction that the readings do not determine keeps its starting value.
     """
     inputs, symmetry = board.nominal(), board.symmetry
     nu_xy = inputs["poisson_xy"]
@@ -104,7 +73,7 @@ def weighted_least_squares(
     target, scales = log_measured(board), reading_scales(board)
     settled, previous = False, np.inf
     tried: list[Estimate] = []
-    before: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    before: tuple[Floats, Floats] | None = None
     for _ in range(most_steps):
         values = inputs | symmetry.rigidities(np.exp(log_next), nu_xy)
         rigidities = np.array([float(values[name]) for name in RIGIDITIES])
@@ -142,8 +111,8 @@ def _round(tried: Sequence[Estimate]) -> Sequence[Estimate]:
     return ()
 
 
-def _overshoot(before: tuple[NDArray[np.float64], NDArray[np.float64]], wanted: NDArray[np.float64]) -> float:
-    """By how much a step is too long, at least 1: what the last one, taken as it was, left of what was wanted before.
+def _overshoot(before: tuple[Floats, Floats], wanted: Floats) -> float:
+    """Factor, at least 1, by which a step is too long, from what the last one left of what was wanted.
 
     Near a veering the slopes turn within a step; where the residuals are large there, steps go to and fro and hardly
     shrink. The secant through the last two of them tells by how much they overshoot.
@@ -173,7 +142,7 @@ def has_settled(step: float, previous: float, accepted: float = _CONVERGED) -> b
     return remaining < accepted or previous <= step < _SMALL
 
 
-def starting_rigidities(board: Board) -> NDArray[np.float64]:
+def starting_rigidities(board: Board) -> Floats:
     """Rough rigidities from Rayleigh quotients of beam-function products, which need no constants: (3,) array, N m.
 
     A weak pull towards a plate that bends alike both ways keeps within reach what the modes do not tell.
@@ -191,7 +160,7 @@ def starting_rigidities(board: Board) -> NDArray[np.float64]:
     return np.asarray(columns @ (alike * np.maximum(constants, 1e-2 * constants.max())))
 
 
-def _rayleigh_rows(setup: Setup, inputs: Values) -> NDArray[np.float64]:
-    products = rayleigh_coefficients(setup)
+def _rayleigh_rows(setup: Setup, inputs: Values) -> Floats:
+    products = product_coefficients(setup.ends_x, setup.ends_y)
     columns = rigidity_columns(inputs, setup)
     return np.stack([products[:, i, j] for i, j in (reading.beams for reading in setup.readings)]) @ columns

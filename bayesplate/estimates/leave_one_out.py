@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import effect_name, joined
@@ -33,42 +33,25 @@ HIGH_LEVERAGE = 0.9
 
 @dataclass(frozen=True, eq=False)
 class Leverages:
-    """How much each mode decides its own prediction, to first order.
+    """How much each reading decides its own prediction, to first order."""
 
-    Attributes
-    ----------
-    values : (n_readings,) array
-        Share of a reading in its own prediction, 0 to 1; of a mode that was read in several sessions, of these readings
-        together.
-    carries : (n_readings,) array of int
-        Which parameter the mode alone carries, the constants first; -1: none, because others tell it as well, or there
-        are too few modes to leave one out.
-    """
-
-    values: NDArray[np.float64]
-    carries: NDArray[np.intp]
+    # (n_readings,), 0 to 1; of a mode that was read in several sessions, of these readings together
+    values: Floats
+    # (n_readings,): parameter that the mode alone carries, constants first; -1: none, or too few modes to leave one out
+    carries: Indices
 
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """ln measured - ln predicted of every mode, by one estimator.
+    """ln measured - ln predicted of every mode, by one estimator."""
 
-    Attributes
-    ----------
-    in_sample : (n_modes,) array
-        Against the fit of all modes.
-    left_out : (n_modes,) array
-        Against a refit that has not seen the mode; not a number where the other modes leave a constant open, so that
-        the refit runs out of reach, and everywhere if no more modes are given than constants.
-    leverages : Leverages
-        At the fit of all modes.
-    """
+    in_sample: Floats  # (n_modes,)
+    # (n_modes,): by a refit without the mode; nan where the others leave a constant open, and everywhere if there are
+    # no more modes than constants
+    left_out: Floats
+    leverages: Leverages  # at the fit of all modes
 
-    in_sample: NDArray[np.float64]
-    left_out: NDArray[np.float64]
-    leverages: Leverages
-
-    def at(self, readings: NDArray[np.intp], n_readings: int) -> Errors:
+    def at(self, readings: Indices, n_readings: int) -> Errors:
         """The errors among those of more readings, by their indices; what the others have is not a number."""
         in_sample, left_out, values = (np.full(n_readings, none) for none in (np.nan, np.nan, 0.0))
         carries = np.full(n_readings, -1, dtype=np.intp)
@@ -96,29 +79,12 @@ class CarryingMode:
 
 
 def leverages_of(
-    columns: NDArray[np.float64],
-    scales: NDArray[np.float64],
-    modes: Sequence[Sequence[int]] | None = None,
-    n_open: int = 3,
+    columns: Floats, scales: Floats, modes: Sequence[Sequence[int]] | None = None, n_open: int = 3
 ) -> Leverages:
-    """Leverages of readings that are fitted by weighted squares.
+    """Leverages of readings that are fitted by weighted squares; zero where the fit has no slopes.
 
-    Parameters
-    ----------
-    columns : (n_readings, n_free) array
-        d ln f by the logarithms of the free rigidities, ln D_x, ln D_y, ln D_s, and by the standard coordinates of what
-        else is free, whose priors count as one more observation each.
-    scales : (n_readings,) array
-        Relative uncertainty of each; infinite where a reading is not used.
-    modes : sequence of sequence of int, optional
-        Readings of each mode; by default one each.
-    n_open : int
-        Number of free rigidities.
-
-    Returns
-    -------
-    Leverages
-        Of nothing where the fit has no slopes.
+    `columns` is (n_readings, n_free): d ln f by ln of the `n_open` free rigidities, and by the standard coordinates of
+    what else is free, whose priors count as one more observation each. A scale is infinite where a reading is not used.
     """
     weighted = np.nan_to_num(columns / scales[:, None])
     if not np.isfinite(weighted.T @ weighted).all():
@@ -139,13 +105,7 @@ def leverages_of(
 
 
 def carrying_modes(board: Board, found: Leverages, names: Sequence[str]) -> tuple[CarryingMode, ...]:
-    """The modes of a board that alone carry something, in the order of its readings.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Of the parameters, the constants first.
-    """
+    """The modes of a board that alone carry one of the named parameters, of which the constants come first."""
     return tuple(
         CarryingMode(setup, label, float(leverage), names[column])
         for (setup, label), leverage, column in zip(_readings(board), found.values, found.carries, strict=True)
@@ -162,7 +122,7 @@ def united(*found: Iterable[CarryingMode]) -> tuple[CarryingMode, ...]:
 
 
 def indices_of(modes: Iterable[CarryingMode], board: Board) -> tuple[int, ...]:
-    """Where the readings of modes stand among all of a board."""
+    """Indices of the readings of some modes among all readings of a board."""
     named = {(one.setup, one.label) for one in modes}
     return tuple(i for i, reading in enumerate(_readings(board)) if reading in named)
 
@@ -181,43 +141,32 @@ def carrying_sentence(modes: Sequence[CarryingMode]) -> str:
 
 
 def _readings(board: Board) -> list[tuple[str, str]]:
-    """Setup and label of every reading."""
     return [(setup.name, str(label)) for setup in board.setups for label in setup.labels]
 
 
 def prediction_errors(
     predict: Predict,
-    target: NDArray[np.float64],
+    target: Floats,
     misfit: Misfit,
-    starts: NDArray[np.float64],
+    starts: Floats,
     bounds: Bounds | None = None,
     modes: Sequence[Sequence[int]] | None = None,
-    scales: NDArray[np.float64] | None = None,
+    scales: Floats | None = None,
 ) -> Errors:
     """Errors of the most likely constants, in sample and with each mode left out in turn.
 
-    Parameters
-    ----------
-    predict, misfit, bounds
-        As for `bayesplate.estimates.refit.most_likely`.
-    target : (n_modes,) array
-        ln of the measured frequencies.
-    starts : (n_starts, n_free) array
-        Within the bounds. Each fit begins at the one where its own sum of squares is lowest, or at the fit of all
-        modes: Student's likelihood may have another peak without the mode.
-    modes : sequence of sequence of int, optional
-        Readings of each mode; by default one each.
-    scales : (n_modes,) array, optional
-        Relative uncertainties by which the leverages weigh the readings; by default those of normal errors.
+    Each fit begins at that of (n_starts, n_free) starts where its own sum of squares is lowest, or at the fit of all
+    modes: Student's likelihood may have another peak without the mode. `target` is ln of the measured frequencies,
+    `modes` the readings of each mode, by default one each, and `scales` weigh the readings in the leverages, by default
+    as normal errors.
     """
-
     n = n_constants(predict)
 
-    def best(starts: NDArray[np.float64], squares: NDArray[np.float64]) -> NDArray[np.float64]:
+    def best(starts: Floats, squares: Floats) -> Floats:
         lost = squares.sum(axis=1) + np.sum(starts[:, n:] ** 2, axis=1)
         return np.asarray(starts[np.argmin(np.where(np.isfinite(lost), lost, np.inf))])
 
-    def squared(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def squared(x: Floats) -> Floats:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a start may be no plate
             return misfit(predict(x))[0] ** 2
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import Moduli, moduli
 from bayesplate.estimates.coefficients import CoefficientRows, CoefficientSource, coefficient_rows
@@ -16,42 +16,19 @@ from bayesplate.frequencies.columns import inverse_lambda
 
 @dataclass(frozen=True, eq=False)
 class PaperSystem:
-    """The linear system psi = X d of a board.
+    """The linear system psi = X d of a board."""
 
-    Attributes
-    ----------
-    psi : (n_modes,) array, N m
-        omega^2 / lambda of the measured frequencies, lambda = 1 / (rho h A^2), less what effects give of it.
-    coefficients : (n_modes, 3) array
-        X: columns a, b, c.
-    values : dict of float
-        Nominal inputs, for the moduli.
-    origins : tuple of CoefficientRows
-        Where the coefficients come from, one per setup.
-    """
+    # (n_modes,), N m: measured omega^2 / lambda, lambda = 1 / (rho h A^2), less what effects give of it
+    psi: Floats
+    coefficients: Floats  # X, (n_modes, 3): a, b, c
+    values: Values  # nominal inputs, for the moduli
+    origins: tuple[CoefficientRows, ...] = ()  # one a setup
 
-    psi: NDArray[np.float64]
-    coefficients: NDArray[np.float64]
-    values: Values
-    origins: tuple[CoefficientRows, ...] = ()
+    def solve(self, rows: Indices | slice = slice(None)) -> Floats:
+        """Unweighted least squares of the modes `rows`, (..., n_some) for many subsets: (..., 3) d_x, d_y, d_s in N m.
 
-    def solve(self, rows: NDArray[np.intp] | slice = slice(None)) -> NDArray[np.float64]:
-        """Unweighted least squares of some of the modes: d_x, d_y, d_s in N m.
-
-        Parameters
-        ----------
-        rows : (..., n_some) array of int or slice
-            Which modes, of many subsets of one size at once if there are several; all by default.
-
-        Returns
-        -------
-        (..., 3) array
-            The shortest solution where a subset leaves something open; not a number where it has fewer modes than
-            three, as an isotropic board may.
-
-        References
-        ----------
-        Ducceschi et al., eq. (13).
+        Ducceschi et al., eq. (13). The shortest solution where a subset leaves something open; not a number where it
+        has fewer modes than three, as an isotropic board may.
         """
         coefficients, psi = self.coefficients[rows], self.psi[rows]
         if psi.shape[-1] < coefficients.shape[-1]:
@@ -59,15 +36,11 @@ class PaperSystem:
         cutoff = np.finfo(np.float64).eps * max(coefficients.shape[-2:])
         return np.asarray((np.linalg.pinv(coefficients, cutoff) @ psi[..., None])[..., 0])
 
-    def moduli(self, constants: NDArray[np.float64], nu_yx: float | None = None) -> Moduli:
-        """Elastic moduli of (..., 3) rigidities, Pa.
+    def moduli(self, constants: Floats, nu_yx: float | None = None) -> Moduli:
+        """Elastic moduli of (..., 3) rigidities, Pa; Ducceschi et al., eq. (14).
 
         With `nu_yx` given, the Poisson factor 1 - nu_xy nu_yx is fixed as the paper does; otherwise nu_yx follows from
         the estimate itself.
-
-        References
-        ----------
-        Ducceschi et al., eq. (14).
         """
         D_x, D_y, D_s = np.moveaxis(np.asarray(constants, dtype=float), -1, 0)
         h, nu_xy = self.values["thickness"], self.values["poisson_xy"]
@@ -78,34 +51,13 @@ class PaperSystem:
 
     @property
     def condition_number(self) -> float:
-        """Of the matrix X."""
         return float(np.linalg.cond(self.coefficients))
 
 
 def paper_system(
     board: Board, estimate: Estimate, source: CoefficientSource | None = None, *, compared: bool = True
 ) -> PaperSystem:
-    """The paper's linear system of a board.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        Where the modes' own coefficients are taken.
-    source : "sensitivity", "training" or "published", optional
-        By default the published table where a setup names one, else the modes' own coefficients.
-    compared : bool
-        Whether the origins say how far a published table lies from solved plates; see `coefficient_rows`.
-
-    Returns
-    -------
-    PaperSystem
-        Of all readings, but for peaks without a sure label that are modes which a printed table lacks.
-
-    Raises
-    ------
-    InputError
-        If a named table does not hold a label of the setup, or is of other edges or another aspect ratio.
-    """
+    """The paper's linear system of all readings of a board; of the source and `compared` see `coefficient_rows`."""
     values = board.nominal()
     origins = tuple(
         coefficient_rows(board.name, model, estimate.values, source, compared=compared) for model in estimate.models

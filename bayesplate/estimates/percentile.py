@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Bools, Floats
 from bayesplate.board.material import MODULI
 from bayesplate.estimates.paper import PaperSystem
 
@@ -25,38 +25,21 @@ MOST_MODES = 16
 
 @dataclass(frozen=True, eq=False)
 class PercentileEstimate:
-    """Mean and spread of the trimmed estimates of each modulus.
+    """Mean and spread of the trimmed estimates of each modulus, Pa."""
 
-    Attributes
-    ----------
-    estimates : (n_subsets, 3) array, Pa
-        E_x, E_y, G_xy of every subset, before trimming.
-    kept : (n_subsets, 3) array of bool
-        What the trimming leaves.
-    mean, sd : dict of float, Pa
-    """
-
-    estimates: NDArray[np.float64]
-    kept: NDArray[np.bool_]
+    estimates: Floats  # (n_subsets, 3) E_x, E_y, G_xy, before trimming
+    kept: Bools  # (n_subsets, 3)
     mean: Mapping[str, float]
     sd: Mapping[str, float]
 
     @property
     def n_subsets(self) -> int:
-        """Number of subsets of modes."""
         return int(self.estimates.shape[0])
 
 
 def percentile_estimate(system: PaperSystem) -> PercentileEstimate | None:
-    """The paper's estimate of E_x, E_y, G_xy from all subsets of the modes.
+    """E_x, E_y, G_xy from all subsets of the modes; None for fewer modes than constants, or more than `MOST_MODES`.
 
-    Returns
-    -------
-    PercentileEstimate or None
-        None for fewer modes than constants, or more than `MOST_MODES`.
-
-    References
-    ----------
     Ducceschi et al., section 5 and the table of results.
     """
     n_modes = system.psi.size
@@ -76,7 +59,7 @@ def percentile_estimate(system: PaperSystem) -> PercentileEstimate | None:
     return PercentileEstimate(estimates, kept, means, sds)
 
 
-def _trimmed(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _trimmed(values: Floats) -> Bools:
     """Which values are positive and lie between the two percentiles of the positive ones."""
     positive = values > 0
     if not positive.any():

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, density
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.board.prior import PriorCard
@@ -16,11 +16,9 @@ from bayesplate.board.reading import NO_OFFSET, Reading
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.estimates.least_squares import log_measured, starting_rigidities
 from bayesplate.frequencies.prior_bands import prior_draws, with_rigidities
-from bayesplate.frequencies.terms import rayleigh_coefficients, term_weights
+from bayesplate.frequencies.terms import term_weights
 from bayesplate.labels import Label
-from bayesplate.plate.beams import N_BEAMS
-
-Floats = NDArray[np.float64]
+from bayesplate.plate.beams import N_BEAMS, product_coefficients
 
 FASTEST = 15_000.0
 """Speed of sound in m/s that stiffness and density may imply: 5,000 in spruce and steel, 13,000 in carbon fibre."""
@@ -31,32 +29,17 @@ SLOWEST = 50.0
 
 @dataclass(frozen=True)
 class Suspect:
-    """One mistake that makes all readings wrong together, and the question to ask.
-
-    Attributes
-    ----------
-    frequency : float
-        What the frequencies on the card are, over what they would be in Hz.
-    wrong : tuple of (str, float)
-        Inputs of the board, and what the card says of each over what it would be.
-    exchanged : tuple of str
-        Two inputs, or two rigidities, that stand for each other.
-    is_transposed : bool
-        Whether all labels (m,n) are written as (n,m).
-    first_label : (int, int)
-        Where the labels begin, if not where the card says.
-    """
+    """One mistake that makes all readings wrong together, and the question to ask."""
 
     question: str
-    frequency: float = 1.0
-    wrong: tuple[tuple[str, float], ...] = ()
-    exchanged: tuple[str, ...] = ()
-    is_transposed: bool = False
-    first_label: Label = NO_OFFSET
+    frequency: float = 1.0  # what the frequencies on the card are, over what they would be in Hz
+    wrong: tuple[tuple[str, float], ...] = ()  # inputs, and what the card says of each over what it would be
+    exchanged: tuple[str, ...] = ()  # two inputs, or two rigidities
+    is_transposed: bool = False  # labels (m,n) are written as (n,m)
+    first_label: Label = NO_OFFSET  # where the labels begin, if not where the card says
 
     @property
     def is_of_a_unit(self) -> bool:
-        """Whether it is one of units or of decimal places."""
         return self.frequency != 1.0 or bool(self.wrong)
 
     @property
@@ -66,7 +49,6 @@ class Suspect:
         return float(self.frequency * wrong.get("length_x", 1.0) ** 2 / wrong.get("thickness", 1.0))
 
     def mended(self, values: Mapping[str, Floats]) -> dict[str, Floats]:
-        """Inputs and rigidities as they would be: dict of array."""
         stated = {name: value for name, value in values.items() if name not in RIGIDITIES or "E_x" not in values}
         found = with_rigidities(stated | {name: values[name] / factor for name, factor in self.wrong})
         coupling = found["poisson_xy"] * found["D_y"]
@@ -126,24 +108,16 @@ _WITHIN = (0.025, 0.975)
 
 @dataclass(frozen=True, eq=False)
 class PriorPredictive:
-    """What the prior of a board foretells of its readings.
+    """What the prior of a board foretells of its readings."""
 
-    Attributes
-    ----------
-    draws : (n_draws, n_readings) array, ln Hz
-        Logarithms of the frequencies, setup after setup; readings of one draw share its constants.
-    """
-
-    draws: Floats
+    draws: Floats  # (n_draws, n_readings) ln f (Hz), setup after setup; a row shares its constants
 
     @property
     def median(self) -> Floats:
-        """Median of ln f of each reading: (n_readings,) array, ln Hz."""
         return np.median(self.draws, axis=0)
 
     @property
     def spread(self) -> Floats:
-        """Standard deviation of ln f of each reading: (n_readings,) array."""
         return self.draws.std(axis=0)
 
     def distance(self, log_frequencies: Floats) -> float:
@@ -172,20 +146,11 @@ def prior_predictive(
 ) -> list[PriorPredictive | None]:
     """Frequencies of a board's labelled modes under its prior, from Rayleigh quotients of beam-function products.
 
-    A few per cent off each frequency, of the bare thin plate; inputs that are uncertain are drawn too.
-
-    Parameters
-    ----------
-    suspects : sequence of Suspect
-        Mistakes to be mended first; by default none, which is the board as it is stated.
-
-    Returns
-    -------
-    list of PriorPredictive or None
-        One per suspect; None where a label would name no mode, or no draw is a material.
+    A few per cent off each frequency, of the bare thin plate; inputs that are uncertain are drawn too. One result for
+    each mistake that is mended first; None where a label would name no mode, or no draw is a material.
     """
     values = prior_draws(board, prior, rng, _N_DRAWS)
-    products = [rayleigh_coefficients(setup) for setup in board.setups]
+    products = [product_coefficients(setup.ends_x, setup.ends_y) for setup in board.setups]
     return [_predicted(board, products, values, suspect) for suspect in suspects]
 
 
@@ -213,17 +178,12 @@ def require_plausible(board: Board, prior: PriorCard, rng: np.random.Generator) 
 
     Asked where the readings are out of the prior's reach, or would need a material that there is not, and mending one
     of `SUSPECTS` brings them within it. Refused in any case where no material carries sound so fast or so slowly.
-
-    Raises
-    ------
-    InputError
-        If a unit is the likeliest mistake, or no material carries sound so and there is no other suspect.
-    NotIdentifiableError
-        If the likeliest mistake is that two sides, constants or orders stand for each other.
+    InputError for units and for the impossible, NotIdentifiableError for sides, constants or orders that stand for each
+    other.
     """
     if not all(setup.readings for setup in board.setups):  # refused later, or still to be measured
         return
-    speed, ratio = _speed_and_ratio(board)
+    speed, ratio = speed_and_ratio(board)
     is_material = bool(board.nominal()["poisson_xy"] ** 2 * ratio < 1.0)
     fault = _contradiction(board, prior, speed, rng) if is_material else _no_material(board, ratio)
     if fault is None:
@@ -237,8 +197,7 @@ def require_plausible(board: Board, prior: PriorCard, rng: np.random.Generator) 
     questions = [one.question for one in likeliest]
     if not is_material and not likeliest:
         questions = _strays(board, prior, rng)
-    remedies = (*questions, fault.remedy)
-    asked = replace(fault, remedy="; ".join(filter(None, remedies)))
+    asked = replace(fault, remedy="; ".join(filter(None, (*questions, fault.remedy))))
     if any(one.is_of_a_unit for one in likeliest):
         raise InputError(asked)
     if likeliest or not is_material:
@@ -277,7 +236,7 @@ def _strays(board: Board, prior: PriorCard, rng: np.random.Generator) -> list[st
 
 
 def _no_material(board: Board, ratio: float) -> Fault:
-    """That no material has such constants: a larger ratio than nu_xy allows."""
+    """The fault that the ratio of the constants is larger than nu_xy allows: no material is like that."""
     wanted = (
         f"a plate of a material: nu_xy nu_yx is below 1, so E_y below {board.nominal()['poisson_xy'] ** -2:.3g} E_x"
     )
@@ -285,7 +244,7 @@ def _no_material(board: Board, ratio: float) -> Fault:
 
 
 def _contradiction(board: Board, prior: PriorCard, speed: float, rng: np.random.Generator) -> Fault | None:
-    """That the readings want sound faster or slower than any material carries it, or are out of the prior's reach."""
+    """The fault that no material carries sound as the readings want, or that they are out of the prior's reach."""
     place = f"{board.name}.toml frequencies_hz"
     if not SLOWEST < speed < FASTEST:
         wanted = f"those of a material that carries sound at {SLOWEST:g} to {FASTEST:g} m/s"
@@ -302,13 +261,8 @@ def _contradiction(board: Board, prior: PriorCard, speed: float, rng: np.random.
     return Fault(place, wanted, got, "or another prior, if nothing is wrong")
 
 
-def plate_speed(board: Board) -> float:
-    """Speed of sound in the stiffer direction that the readings imply, sqrt(12 D / rho h^3), m/s; a rough one."""
-    return _speed_and_ratio(board)[0]
-
-
-def _speed_and_ratio(board: Board) -> tuple[float, float]:
-    """The same, and D_y / D_x that the readings imply, from 0.01 to 100."""
+def speed_and_ratio(board: Board) -> tuple[float, float]:
+    """Speed of sound in the stiffer direction, sqrt(12 D / rho h^3) in m/s, and D_y / D_x, from rough rigidities."""
     values = board.nominal()
     D_x, D_y, _ = starting_rigidities(board)
     return float(np.sqrt(12.0 * max(D_x, D_y) / (density(values) * values["thickness"] ** 3))), float(D_y / D_x)

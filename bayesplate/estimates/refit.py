@@ -6,13 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Bools, Floats
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.reading_errors import ReadingErrors
 
-Floats = NDArray[np.float64]
 Predict = Callable[[Floats], Floats]
 """From (n_draws, n_free) parameters to (n_draws, n_modes) logarithms of frequencies.
 
@@ -47,28 +46,11 @@ class Bounds:
 
     @property
     def are_open(self) -> bool:
-        """Whether there are no limits at all."""
         return not (np.isfinite(self.lower).any() or np.isfinite(self.upper).any())
 
 
 def refit(predict: Predict, target: Floats, scales: Floats, start: Floats, bounds: Bounds | None = None) -> Floats:
-    """Parameters that minimise the weighted squares of ln measured - ln predicted.
-
-    Parameters
-    ----------
-    predict : callable
-        See `Predict`.
-    target : (n_modes,) array
-        ln of the measured frequencies.
-    scales : (n_modes,) array
-        Relative uncertainties.
-    start : (n_free,) array
-        Within the bounds.
-
-    Returns
-    -------
-    (n_free,) array
-    """
+    """Parameters that minimise the weighted squares of ln measured - ln predicted: (n_free,) array."""
     return most_likely(predict, normal_misfit(target, scales), start, bounds)
 
 
@@ -90,31 +72,12 @@ def deviance_misfit(errors: Sequence[ReadingErrors], noise: Sequence[float] | Fl
 
 
 def most_likely(
-    predict: Predict,
-    misfit: Misfit,
-    start: Floats,
-    bounds: Bounds | None = None,
-    left_out: Sequence[int] = (),
+    predict: Predict, misfit: Misfit, start: Floats, bounds: Bounds | None = None, left_out: Sequence[int] = ()
 ) -> Floats:
-    """Parameters that minimise the squares of a misfit, the constants within reach of the start.
+    """Parameters, (n_free,), that minimise the squares of a misfit, the constants within reach of the start.
 
-    A step to where the law gives no frequency, or beyond reach, is refused and a shorter one tried.
-
-    Parameters
-    ----------
-    predict : callable
-        See `Predict`.
-    misfit : callable
-        See `Misfit`.
-    start : (n_free,) array
-        Within the bounds.
-    left_out : sequence of int, optional
-        Readings that are not used.
-
-    Returns
-    -------
-    (n_free,) array
-        Not numbers where the law gives no frequency at the start.
+    A step to where the law gives no frequency, or beyond reach, is refused and a shorter one tried; the result is nan
+    where the law gives no frequency at the start. The readings `left_out` are not used.
     """
     from scipy.optimize import least_squares
 
@@ -141,11 +104,8 @@ def most_likely(
         return np.asarray(least_squares(residuals, start, jacobian, bounds=limits, x_scale="jac").x)
 
 
-def has_come_to_rest(fitted: Floats, starts: Floats, n: int) -> NDArray[np.bool_]:
-    """Whether fits, (..., n_free) arrays of which n are constants, ended well within reach of where they began.
-
-    Where one has not, the readings do not tell the constants.
-    """
+def has_come_to_rest(fitted: Floats, starts: Floats, n: int) -> Bools:
+    """Whether (..., n_free) fits ended well within reach of their starts: else nothing tells the n constants."""
     return np.asarray(_distance(fitted, starts, n) <= _EDGE * _REACH)
 
 

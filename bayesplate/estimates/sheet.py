@@ -6,16 +6,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesplate.board.board import Board, Values, vibrating_lengths
+from bayesplate.arrays import Floats
+from bayesplate.board.board import Board, Values
 from bayesplate.board.material import MODULI, RIGIDITIES
-from bayesplate.estimates.combined import COMBINED, combination, combined_shapes, corner_signs
+from bayesplate.effects.part import aspect_ratio_of
 from bayesplate.frequencies.columns import columns
 from bayesplate.frequencies.laws import cents
+from bayesplate.frequencies.model import SetupModel
 from bayesplate.frequencies.spectrum import NamedMode, spectrum
 from bayesplate.frequencies.system import Limits, System
-from bayesplate.plate.solve import Modes
+from bayesplate.plate.naming import reaching
+from bayesplate.plate.solve import Modes, collect, solve_classes
+
+COMBINED = ("alpha", "beta", "gamma")
+"""Combined modes for D_x, D_y and D_s: mixtures of modes that would each answer to one constant alone."""
 
 NUMBERS_OF_MODES = (12, 16, 20)
 """The first that holds every measured label; beyond the last the highest are not shown."""
@@ -24,6 +29,8 @@ LOWEST_COMBINED = 12
 """Modes that are combined where too few were measured: the lowest six of a long board hardly bend one way."""
 
 _GRID = 121
+N_POINTS = 61
+"""Along each side of the shapes of labelled modes: half a sheet's, for panels of half its size."""
 _TWO_THIRDS = 0.967
 """Standard deviations of a normal distribution on either side of its middle that hold two thirds of it."""
 _BY_PRIOR = "by the prior alone"
@@ -32,29 +39,13 @@ _BY_MODES = "by what the measured modes tell"
 
 @dataclass(frozen=True, eq=False)
 class SheetMode:
-    """One mode.
-
-    Attributes
-    ----------
-    name : str
-        Its label, or "cannot tell".
-    band_hz : tuple of float or None
-        Where it is expected two times in three: by the prior alone, or by the modes measured so far.
-    shares : (4,) array
-        Share of D_x, D_y, D_s and of effects in its energy.
-    coefficients : (3,) array
-        The paper's a, b, c.
-    shape : (n_x, n_y) array
-        As `sampled` at `points`.
-    """
-
-    name: str
+    name: str  # its label, or "cannot tell"
     hertz: float
     measured_hz: float | None
-    band_hz: tuple[float, float] | None
-    shares: NDArray[np.float64]
-    coefficients: NDArray[np.float64]
-    shape: NDArray[np.float64]
+    band_hz: tuple[float, float] | None  # where it is expected two times in three
+    shares: Floats  # (4,): of D_x, D_y, D_s and of effects in its energy
+    coefficients: Floats  # (3,): the paper's a, b, c
+    shape: Floats  # (n_x, n_y): as `sampled` at `points`
 
     @property
     def miss_cents(self) -> float | None:
@@ -69,44 +60,24 @@ class CombinedMode:
     name: str
     modulus: str
     weights: Mapping[str, float]
-    shape: NDArray[np.float64]
+    shape: Floats
 
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """Everything that a sheet of one setup shows.
-
-    Attributes
-    ----------
-    first_label : str
-        At which this laboratory's names begin.
-    aspect_ratio : float
-        L_x / L_y of the part that vibrates, L_y where it is widest.
-    basis : str
-        At which constants the modes are computed.
-    modes : tuple of SheetMode
-        In the order of frequency.
-    combined : tuple of CombinedMode
-        Empty where the modes do not tell the constants apart.
-    likely : str
-        What the bands come from; empty where there are none.
-    limits : ((n,) array, (n,) array) or None
-        Where the board begins and ends along y at `points` of its length, as fractions of its widest width; None: a
-        rectangle.
-    isotropic : bool
-        Whether the board has no grain.
-    """
+    """Everything that a sheet of one setup shows."""
 
     title: str
     setup: str
     edges: Mapping[str, str]
     first_label: str
-    aspect_ratio: float
+    aspect_ratio: float  # L_x / L_y of the part that vibrates, L_y where it is widest
     theory: str
-    basis: str
-    modes: tuple[SheetMode, ...]
-    combined: tuple[CombinedMode, ...]
-    likely: str = ""
+    basis: str  # at which constants the modes are computed
+    modes: tuple[SheetMode, ...]  # in the order of frequency
+    combined: tuple[CombinedMode, ...]  # empty where the modes do not tell the constants apart
+    likely: str = ""  # what the bands come from
+    # where the board begins and ends along y at `points`, as fractions of its widest width; None: a rectangle
     limits: Limits | None = None
     isotropic: bool = False
 
@@ -120,52 +91,28 @@ class Sheet:
 
 @dataclass(frozen=True, eq=False)
 class Precision:
-    """What the modes measured so far foretell of the others.
+    """What the modes measured so far foretell of the others."""
 
-    Attributes
-    ----------
-    covariance : (3, 3) array
-        Of ln D_x, ln D_y, ln D_s.
-    noise : dict of float
-        Relative, by setup.
-    """
+    covariance: Floats  # (3, 3): of ln D_x, ln D_y, ln D_s
+    noise: Mapping[str, float]  # relative, by setup
 
-    covariance: NDArray[np.float64]
-    noise: Mapping[str, float]
-
-    def band(self, frequency: float, shares: NDArray[np.float64], setup: str) -> tuple[float, float]:
-        """Where a reading is expected two times in three, to first order: Hz.
-
-        Parameters
-        ----------
-        frequency : float, Hz
-        shares : (3,) array
-            Of D_x, D_y, D_s in the mode's energy: twice the sensitivities of ln f.
-        """
+    def band(self, frequency: float, shares: Floats, setup: str) -> tuple[float, float]:
+        """Band, Hz, that holds a reading two times in three, to first order, from (3,) shares in the energy."""
         variance = 0.25 * shares @ self.covariance @ shares + self.noise[setup] ** 2
         factor = float(np.exp(_TWO_THIRDS * np.sqrt(variance)))
         return frequency / factor, frequency * factor
 
 
-def points(n: int = _GRID) -> NDArray[np.float64]:
-    """Where shapes are sampled along each side, as fractions of it, a hair within the edges: (n,) array."""
+def points(n: int = _GRID) -> Floats:
+    """Points of each side, (n,) fractions of it, at which shapes are sampled, all a hair within the edges."""
     return np.linspace(1e-3, 1.0 - 1e-3, n)
 
 
-def sampled(modes: Modes, limits: Limits | None, grid: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Deflections of modes within the outline.
+def sampled(modes: Modes, limits: Limits | None, grid: Floats) -> Floats:
+    """Deflections of modes, (n_modes, n, n), positive next to the corner of x1 and y1.
 
-    Parameters
-    ----------
-    limits : ((n,) array, (n,) array) or None
-        Of the plate at the grid (`System.limits`).
-    grid : (n,) array
-        Fractions of the length, and of the width at each of its points.
-
-    Returns
-    -------
-    (n_modes, n, n) array
-        Positive next to the corner of x1 and y1.
+    The grid is in fractions of the length, and of the width at each of its points; `limits` are those of the plate
+    there.
     """
     if limits is None:
         shapes = modes.displacement(grid, grid)
@@ -189,18 +136,9 @@ def sheet(
 ) -> Sheet:
     """Solve a setup and gather what its sheet shows.
 
-    Parameters
-    ----------
-    values : dict of float
-        D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
-    basis : str
-        One clause: at which constants.
-    bands : dict, optional
-        Factors on a frequency between which the prior expects it, by label.
-    precision : Precision, optional
-        Of the estimate at which the modes are computed; it gives the bands of the modes that were not measured.
-    numbers : sequence of int
-        Of modes, rising: the first that holds every measured label is solved, or the last.
+    `basis` says at which constants in one clause. `bands`: factors on a frequency between which the prior expects it,
+    by label. `precision`: of the estimate at which the modes are computed, for the bands of the modes that were not
+    measured. The first of the `numbers` of modes that holds every measured label is solved, or the last.
     """
     setup = system.setup
     measured = {str(reading.label): reading.frequency.mean for reading in setup.readings}
@@ -212,7 +150,6 @@ def sheet(
     shares = found.shares(np.array([float(values[name]) for name in RIGIDITIES]))
     limits = system.limits(points())
     shapes = sampled(modes, limits, points())
-    length_x, length_y = vibrating_lengths(system.adjusted(values), setup)
     rows = tuple(
         SheetMode(
             name=mode.name,
@@ -230,7 +167,7 @@ def sheet(
         for i, mode in enumerate(named)
     )
     title = board.title or board.name
-    ratio = float(length_x / length_y)
+    ratio = aspect_ratio_of(system.adjusted(values), setup)
     first = str(setup.first_label)
     likely = "" if all(row.band_hz is None for row in rows) else _BY_MODES if precision is not None else _BY_PRIOR
     mixtures = _combined(rows)
@@ -261,3 +198,51 @@ def _combined(modes: tuple[SheetMode, ...]) -> tuple[CombinedMode, ...]:
         CombinedMode(name, modulus, {m.name: float(w) for m, w in zip(used, row, strict=True)}, shape)
         for name, modulus, row, shape in zip(COMBINED, MODULI, mixtures, shapes, strict=True)
     )
+
+
+def combination(coefficients: Floats) -> Floats:
+    """How much of each mode makes each combined mode, (3, n_modes): the inverse of X = (a, b, c) by Moore and Penrose.
+
+    Its product with X is the unit matrix: the combined psi are d_x, d_y and d_s (Ducceschi et al., section 3).
+    ValueError if the modes do not separate the three constants.
+    """
+    if coefficients.shape[0] < 3 or np.linalg.matrix_rank(coefficients) < 3:
+        raise ValueError(f"combined modes: wanted modes that tell three constants apart, got {len(coefficients)} modes")
+    return np.asarray(np.linalg.pinv(coefficients))
+
+
+def combined_shapes(coefficients: Floats, shapes: Floats) -> Floats:
+    """Shapes of the combined modes alpha, beta and gamma, (3, n_x, n_y), from (n_modes, n_x, n_y) shapes on one grid.
+
+    Each mode enters with unit norm, positive next to the corner of x1 and y1: the paper does not state its signs, and
+    the combined shapes depend on them.
+    """
+    norms = np.sqrt(np.sum(shapes**2, axis=(1, 2)))
+    units = shapes * (corner_signs(shapes) / norms)[:, None, None]
+    return np.asarray(np.tensordot(combination(coefficients), units, axes=1))
+
+
+def corner_signs(shapes: Floats) -> Floats:
+    """Sign of each shape next to the corner of x1 and y1, where held edges may be zero themselves."""
+    n_x, n_y = shapes.shape[1] // 10 + 2, shapes.shape[2] // 10 + 2
+    near = shapes[:, -n_x:, -n_y:].sum(axis=(1, 2))
+    return np.where(near < 0, -1.0, 1.0)
+
+
+def labelled_shapes(models: Sequence[SetupModel], values: Values) -> dict[str, dict[str, Floats]]:
+    """Shapes of every labelled mode by setup and label, as `sampled` at `points(N_POINTS)`.
+
+    A label means a rank within a symmetry class, as in the likelihood.
+    """
+    grid = points(N_POINTS)
+    result = {}
+    for model in models:
+        weights = model.system.weights(values).at(0)
+        modes = collect(model.plate, solve_classes(model.plate, weights, reaching(model.places)))
+        where = {place: i for i, place in enumerate(zip(modes.parities, modes.ranks.tolist(), strict=True))}
+        shapes = sampled(modes, model.system.limits(grid), grid)
+        result[model.setup.name] = {
+            str(label): shapes[where[place.parity, place.rank]]
+            for label, place in zip(model.setup.labels, model.places, strict=True)
+        }
+    return result

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.material import MODULI, moduli
 from bayesplate.effects import effects_of
@@ -19,11 +19,10 @@ SMALLEST = 0.005
 """Relative rise of a constant below which nothing is said."""
 
 
-def rise_with_air(board: Board, estimate: Estimate) -> NDArray[np.float64]:
-    """Relative rise of E_x, E_y and G_xy with open air of 1.2 kg/m3 around every setup: (3,) array.
+def rise_with_air(board: Board, estimate: Estimate) -> Floats:
+    """Relative rise of E_x, E_y and G_xy, (3,), with open air of 1.2 kg/m3 around every setup.
 
-    The board's modes in air against those without, and the weighted least squares that make up for it. Zeros where a
-    fluid is declared: whatever it is, it is in the model.
+    Zeros where a fluid is declared: whatever it is, it is in the model.
     """
     if FluidLoading.name in board.effects:
         return np.zeros(len(MODULI))

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, density
 from bayesplate.board.material import MODULI, RIGIDITIES, moduli
 from bayesplate.board.prior import PriorCard
-
-Floats = NDArray[np.float64]
 
 MOST_ORTHOTROPIC = 100.0
 """E_x over E_y that no plate reaches: 10 to 20 in spruce, up to 70 in balsa."""
@@ -28,13 +26,7 @@ _USUAL = (0.001, 0.999)
 
 
 def unusual(board: Board, prior: PriorCard, rigidities: Floats) -> tuple[str, ...]:
-    """What is unusual about a board's density and about the constants that its readings imply, a sentence each.
-
-    Parameters
-    ----------
-    rigidities : (3,) array, N m
-        D_x, D_y, D_s, as by least squares.
-    """
+    """What is unusual about a board's density and the constants that its readings imply; rigidities in N m."""
     values = board.nominal() | dict(zip(RIGIDITIES, rigidities, strict=True))
     elastic = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
     by_name = values | elastic._asdict()

@@ -19,8 +19,8 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import RIGIDITIES, moduli
 from bayesplate.board.prior import PriorCard
@@ -39,7 +39,6 @@ from bayesplate.plate.terms import Parity
 if TYPE_CHECKING:
     from scipy.interpolate import RegularGridInterpolator
 
-Floats = NDArray[np.float64]
 
 NOISES = (0.08, 0.04, 0.02, 0.01)
 """Relative, one after the other; the last is what the tables err by, with a usual noise."""
@@ -67,44 +66,28 @@ _JUMP, _JITTER = 0.7, 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """A region of the constants in which one way to take the peaks is likely.
+    """A region of the constants in which one way to take the peaks is likely."""
 
-    Attributes
-    ----------
-    values : dict of float
-        Rigidities at its middle (N m), and the nominal inputs.
-    log_rigidities : (n_draws, n_constants) array
-        ln of the free rigidities of draws from it.
-    noise : float
-        Relative, at which the peaks may be taken for modes there.
-    """
-
-    values: Values
-    log_rigidities: Floats
-    noise: float
+    values: Values  # at its middle
+    log_rigidities: Floats  # (n_draws, n_constants): ln of the free rigidities of draws from it
+    noise: float  # relative, at which the peaks may be taken for modes there
 
     @property
     def rigidities(self) -> Floats:
-        """Those at its middle, N m: (3,) array."""
+        """D_x, D_y, D_s at its middle, N m: (3,) array."""
         return np.array([self.values[name] for name in RIGIDITIES])
 
-    def is_far_from(self, other: Guess) -> bool:
-        """Whether the constants are others altogether."""
-        return bool(np.abs(np.log(self.rigidities / other.rigidities)).max() > FAR)
+
+def are_far_apart(first: Floats, second: Floats) -> bool:
+    """Whether two sets of ln D are other constants altogether."""
+    return bool(np.abs(first - second).max() > FAR)
 
 
 def search_widely(board: Board, prior: PriorCard, rng: np.random.Generator) -> list[Guess]:
-    """Regions of the prior in which the peaks of a board are likely, the likeliest first.
+    """Regions of the prior in which the peaks of a board are likely: of smaller noise, then likelier ones first.
 
-    Parameters
-    ----------
-    board : Board
-        Labels tell the symmetry class of their peak here, and nothing else.
-
-    Returns
-    -------
-    list of Guess
-        Those under a smaller noise first; empty where no draw has a frequency for every mode.
+    Labels tell the symmetry class of their peak here, and nothing else. Empty where no draw has a frequency for each
+    mode.
     """
     nominal = board.nominal()
     log_prior = _density(prior, nominal)
@@ -154,7 +137,9 @@ def _guesses(by_noise: Sequence[Sequence[Guess]]) -> list[Guess]:
     for ways in by_noise:
         n_regions = 0
         for at, way in enumerate(ways):
-            is_elsewhere = n_regions < MOST_REGIONS and all(way.is_far_from(other) for other in guesses)
+            is_elsewhere = n_regions < MOST_REGIONS and all(
+                are_far_apart(np.log(way.rigidities), np.log(other.rigidities)) for other in guesses
+            )
             n_regions += is_elsewhere
             if is_elsewhere or (at < MOST_FOUND and way.noise <= LOUD):
                 guesses.append(way)
@@ -202,22 +187,12 @@ def _guess(nominal: Values, members: Floats, noise: float) -> Guess:
 
 @dataclass(frozen=True, eq=False)
 class _Modes:
-    """The modes of a plate in one setup, and the peaks of the setups that are like it.
-
-    Attributes
-    ----------
-    reduced : ReducedOrderModel
-        Of the modes at some members of a population.
-    scale : float
-        ln D_s at which it is evaluated.
-    peaks : tuple of PeakLikelihood
-        Of each setup.
-    """
+    """The modes of a plate in one setup, and the peaks of the setups that are like it."""
 
     system: System
     nominal: Values
-    reduced: ReducedOrderModel
-    scale: float
+    reduced: ReducedOrderModel  # of the modes at some members of a population
+    scale: float  # ln D_s at which it is evaluated
     peaks: tuple[PeakLikelihood, ...]
 
     @classmethod
@@ -257,23 +232,18 @@ class _Modes:
 
 @dataclass(frozen=True, eq=False)
 class _Tabled:
-    """The likelihood of the peaks of all setups where a population is.
+    """The likelihood of the peaks of all setups where a population is."""
 
-    Attributes
-    ----------
-    every : tuple of (RegularGridInterpolator, tuple of PeakLikelihood)
-        Frequencies of setups that are alike, and the peaks of each.
-    """
-
+    # frequencies of setups that are alike, and the peaks of each
     every: tuple[tuple[RegularGridInterpolator, tuple[PeakLikelihood, ...]], ...]
 
     def log_likelihood(self, x: Floats, noise: float) -> Floats:
-        """Of the peaks at (n, 3) ln D: (n,) array, minus infinity where the table has no plate."""
+        """ln of the likelihood of all peaks at (n, 3) ln D: (n,), minus infinity where the table has no plate."""
         noises = np.full(len(x), noise)
         each = [one.log_likelihood(there, noises) for there, peaks in self._there(x) for one in peaks]
         return np.nan_to_num(np.sum(each, axis=0), nan=-np.inf, neginf=-np.inf)
 
-    def assignments(self, x: Floats, noise: float) -> NDArray[np.intp]:
+    def assignments(self, x: Floats, noise: float) -> Indices:
         """The likeliest mode of each peak at each member, -1 for none: (n, n_peaks) array, setup by setup."""
         ways = []
         for there, peaks in self._there(x):
@@ -320,12 +290,11 @@ def _values(nominal: Values, ratios: Floats, scale: float) -> Values:
 
 
 def _symmetric(system: System) -> System:
-    """Without the effects that break the plate's symmetry: they cost much, and move its frequencies by little."""
+    """The system without effects that break its symmetry: they cost much, and move its frequencies by little."""
     return replace(system, effects=tuple(effect for effect in system.effects if all(effect.keeps_symmetry())))
 
 
 def _alike(setups: Iterable[Setup]) -> list[list[Setup]]:
-    """Setups that hold the plate alike, together."""
     found: list[tuple[Setup, list[Setup]]] = []
     for setup in setups:
         held = replace(setup, name="", readings=(), peaks=(), noise=DEFAULT_NOISE, hammer=None)
@@ -343,7 +312,7 @@ def _as_peaks(setup: Setup) -> tuple[Peak, ...]:
 
 
 def _places(model: SetupModel, n_peaks: int) -> tuple[Place, ...]:
-    """So many modes of each symmetry class that the peaks are among them."""
+    """The lowest modes of each symmetry class, enough to hold the peaks."""
     n_each = -(-int(_MODES_PER_PEAK * n_peaks + _SPARE) // len(model.plate.classes))
     return tuple(Place(one.parity, rank, 1.0) for one in model.plate.classes for rank in range(n_each))
 

@@ -36,9 +36,8 @@ from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from bayesplate.arrays import Bools, Floats
 
 LOG_NOTHING = float(np.log(1e-18))
 """Of a ratio that changes no sum of one and more; smaller ones come to numbers that processors are slow with."""
@@ -48,24 +47,16 @@ _LOG_MOST = 300.0
 
 @dataclass(frozen=True, eq=False)
 class Near:
-    """Which peaks of a row are near each mode.
-
-    Attributes
-    ----------
-    first, end : lists of n_modes int
-        The first of these peaks, and the one after the last: none where the end is not beyond the first.
-    low : list of n_modes int
-        The first of them and of those near the modes to come.
-    """
+    """Which peaks of a row are near each mode."""
 
     n_peaks: int
-    first: list[int]
-    end: list[int]
-    low: list[int]
+    first: list[int]  # of each mode: the first of these peaks
+    end: list[int]  # and the one after the last: none where it is not beyond the first
+    low: list[int]  # the first of them and of those near the modes to come
 
     @classmethod
-    def of(cls, is_near: NDArray[np.bool_]) -> Near:
-        """From which peaks any draw has near which modes: an (n_peaks, n_modes) array."""
+    def of(cls, is_near: Bools) -> Near:
+        """Rows from an (n_peaks, n_modes) array: which peaks any draw has near which modes."""
         # Every mode is near a peak after all others, then to one before them: so one is found for each.
         near = np.ones((len(is_near) + 1, is_near.shape[1]), dtype=np.bool_)
         near[:-1] = is_near
@@ -78,7 +69,7 @@ class Near:
 
     @cached_property
     def starts(self) -> list[int]:
-        """Where the pairs of each mode begin among those of the row, and where the last ones end: n_modes + 1 int."""
+        """Index of the first pair of each mode among those of the row, and of the end: n_modes + 1 int."""
         counts = (end - first if end > first else 0 for first, end in zip(self.first, self.end, strict=True))
         return list(accumulate(counts, initial=0))
 
@@ -89,37 +80,22 @@ class Near:
         return [peak for peak, _ in pairs], [mode for _, mode in pairs]
 
     def modes(self, peak: int) -> list[int]:
-        """Those that a peak is near."""
         ends = zip(self.first, self.end, strict=True)
         return [mode for mode, (first, end) in enumerate(ends) if first <= peak < end]
 
 
 class _Passage(NamedTuple):
-    """What a mode does that peaks are near, and where in the table.
+    """What a mode does that peaks are near, and where in the table."""
 
-    Attributes
-    ----------
-    rows : list of (int, slice, slice)
-        Rows of these peaks; in each which peaks they are, and which pairs with the mode.
-    tops : (int, int)
-        The most peaks of each row of which the table had sums before.
-    window : (slice, slice)
-        The part of the table that this mode and those to come ask for.
-    log_growth : float
-        ln of the number by which the mode multiplies a sum, at most.
-    doubtful : tuple of int
-        Which peaks of unknown sign have an axis of the table, one after the other between its two and the draws.
-    opening, closing : list of int
-        Those that have it from this mode on, and up to it.
-    """
-
+    # row of these peaks; in it which peaks they are, and which pairs with the mode
     rows: list[tuple[int, slice, slice]]
-    tops: tuple[int, int]
-    window: tuple[slice, slice]
-    log_growth: float
+    tops: tuple[int, int]  # the most peaks of each row of which the table had sums before
+    window: tuple[slice, slice]  # the part of the table that this mode and those to come ask for
+    log_growth: float  # ln of the number by which the mode multiplies a sum, at most
+    # peaks of unknown sign that have an axis of the table, in order between its two and the draws
     doubtful: tuple[int, ...]
-    opening: list[int]
-    closing: list[int]
+    opening: list[int]  # those that have it from this mode on
+    closing: list[int]  # those that have it up to this mode
 
     def along(self, table: Floats, row: int) -> Floats:
         """The part of a table that is asked for, up to the most peaks of a row: these along the first axis."""
@@ -133,20 +109,11 @@ class Assignments:
     """What peaks say of modes at many draws: both in the order of frequency, the modes in that of each draw.
 
     The draws come last: a run over modes then adds whole rows of them.
-
-    Attributes
-    ----------
-    near : sequence of Near
-        One for each row.
-    ratios : sequence of (n_pairs, n_draws) array
-        r_ij of the pairs of each.
-    unsigned : tuple of (int, int)
-        The places in both rows of each peak of unknown sign.
     """
 
-    near: Sequence[Near]
-    ratios: Sequence[Floats]
-    unsigned: Sequence[tuple[int, int]] = ()
+    near: Sequence[Near]  # one for each row
+    ratios: Sequence[Floats]  # (n_pairs, n_draws): r_ij of the pairs of each row
+    unsigned: Sequence[tuple[int, int]] = ()  # places in both rows of each peak of unknown sign
 
     def log_sum(self) -> Floats:
         """ln of the sum of the products of r_ij over all assignments and all signs that peaks may have: (n_draws,)."""
@@ -242,7 +209,7 @@ class Assignments:
 
     @property
     def _last(self) -> tuple[int, int]:
-        """Where in the table the sum over all is."""
+        """Place in the table of the sum over all."""
         a, b = self._passages[-1].window if self._passages else (slice(1), slice(1))
         return a.stop - 1, b.stop - 1
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Values, density, vibrating_lengths
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.board.setup import Setup
@@ -14,50 +14,33 @@ from bayesplate.frequencies.system import System
 
 
 class Columns(NamedTuple):
-    """omega^2 / lambda = a D_x + b D_y + c D_s + rest, exact at the point where the modes were computed.
+    """omega^2 / lambda = a D_x + b D_y + c D_s + rest, exact at the point where the modes were computed."""
 
-    Attributes
-    ----------
-    coefficients : (n_modes, 3) array
-        Columns a, b, c.
-    rest : (n_modes,) array, N m
-        What shear and other effects give; zero for the bare thin plate.
-    """
+    coefficients: Floats  # (n_modes, 3): a, b, c
+    rest: Floats  # (n_modes,), N m: of shear and other effects; zero for the bare thin plate
 
-    coefficients: NDArray[np.float64]
-    rest: NDArray[np.float64]
-
-    def shares(self, rigidities: NDArray[np.float64]) -> NDArray[np.float64]:
+    def shares(self, rigidities: Floats) -> Floats:
         """Share of D_x, D_y, D_s and of all the rest in each mode's energy: (n_modes, 4) array, rows sum to 1."""
         parts = np.column_stack([self.coefficients * rigidities, self.rest])
         return np.asarray(parts / parts.sum(axis=1, keepdims=True))
 
 
-def columns(system: System, values: Values, stiffness: NDArray[np.float64]) -> Columns:
-    """Coefficients of modes from their energies in the terms of the plate.
-
-    Parameters
-    ----------
-    values : dict of float
-        D_x, D_y, D_s (N m), the board's inputs and the effects' parameters, where the modes were computed.
-    stiffness : (n_modes, n_terms) array
-        phi' K_i phi of the mass-normalised modes.
-
-    References
-    ----------
-    Ducceschi et al., eq. (10) and (12).
-    """
+def columns(system: System, values: Values, stiffness: Floats) -> Columns:
+    """Coefficients of modes from their (n_modes, n_terms) energies phi' K_i phi: Ducceschi et al., eq. (10, 12)."""
     per_lambda = inverse_lambda(values, system.setup)
-    total = stiffness @ system.weights(values).stiffness[0] * per_lambda
-    found = []
-    for name in RIGIDITIES:
-        without = system.weights({**values, name: 0.0 * values[name]}).stiffness[0]
-        found.append((total - stiffness @ without * per_lambda) / float(values[name]))
-    coefficients = np.column_stack(found)
+    total, without = (one * per_lambda for one in with_and_without(system, values, stiffness))
     constants = np.array([float(values[name]) for name in RIGIDITIES])
+    coefficients = (total[:, None] - without) / constants
     rest = total - coefficients @ constants
     rest[np.abs(rest) < 1e-9 * total] = 0.0
     return Columns(coefficients, rest)
+
+
+def with_and_without(system: System, values: Values, stiffness: Floats) -> tuple[Floats, Floats]:
+    """omega^2 of modes, (n_modes,) s^-2, and what is left of it without D_x, D_y or D_s, (n_modes, 3)."""
+    zeroed = (system.weights({**values, name: 0.0 * values[name]}).stiffness[0] for name in RIGIDITIES)
+    without = np.column_stack([stiffness @ weights for weights in zeroed])
+    return stiffness @ system.weights(values).stiffness[0], without
 
 
 def inverse_lambda(values: Values, setup: Setup) -> float:

@@ -8,8 +8,8 @@ from functools import lru_cache, reduce
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Values
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Effect, Theory, Variation
@@ -18,8 +18,6 @@ from bayesplate.plate.fields import EdgeStrip, Fabric, Field, Group, layout
 from bayesplate.plate.shear import SHEAR_FLEXIBLE
 from bayesplate.plate.terms import Weights
 from bayesplate.plate.thin import THIN
-
-Floats = NDArray[np.float64]
 
 _GROUPS: tuple[Group, ...] = ("along", "bending", "shear", "mass", "rotary")
 
@@ -45,7 +43,10 @@ def _joined(effects: tuple[Effect, ...]) -> dict[Group, list[Joined]]:
         return {}
     whole = [{"along": each.get("bending", _UNIFORM), **each} for each in varying]
     every = {group: product(*(each.get(group, _UNIFORM) for each in whole)) for group in _GROUPS}
-    return {group: [joined for joined in each if _order(joined) <= HIGHEST_ORDER] for group, each in every.items()}
+    return {
+        group: [joined for joined in each if sum(one.order for one in joined) <= HIGHEST_ORDER]
+        for group, each in every.items()
+    }
 
 
 def fabric_of(effects: Sequence[Effect]) -> Fabric:
@@ -82,22 +83,10 @@ def in_plane(effects: Sequence[Effect], values: Values) -> Field | None:
 
 
 def over_fields(base: Weights, effects: Sequence[Effect], theory: Theory, values: Values, setup: Setup) -> Weights:
-    """Weights of the plate's own terms in the presence of effects, once for each field that they take.
+    """Weights of the plate's own terms in the presence of effects, once for each field, in the order of `layout`.
 
-    The part of the modulus along the grain takes fields of its own, and is turned with the grain as all the rest.
-
-    Parameters
-    ----------
-    base : Weights
-        (n_draws, n_own) arrays, of the plate's own terms once each, without effects.
-    effects : sequence of Effect
-        As given to `fabric_of`.
-    values : dict of array
-
-    Returns
-    -------
-    Weights
-        In the order of `bayesplate.plate.fields.layout`.
+    `base` has each term once, without effects. The part of the modulus along the grain takes fields of its own, and is
+    turned with the grain as all the rest.
     """
     varying = _joined(tuple(effects))
     whole = _reweighed(base, effects, values, setup)
@@ -129,10 +118,6 @@ def over_fields(base: Weights, effects: Sequence[Effect], theory: Theory, values
 
 def _reweighed(base: Weights, effects: Sequence[Effect], values: Values, setup: Setup) -> Weights:
     return reduce(lambda weights, effect: effect.reweigh(weights, values, setup), effects, base)
-
-
-def _order(joined: Joined) -> int:
-    return sum(one.order for one in joined)
 
 
 def _fields(joined: Joined) -> tuple[Field | EdgeStrip | None, ...]:
@@ -174,8 +159,6 @@ class _Sum:
 
 @dataclass(frozen=True)
 class _Product:
-    """Two fields multiplied."""
-
     first: Field
     second: Field
 

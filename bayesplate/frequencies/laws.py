@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.plate.reduced import ReducedOrderModel
 from bayesplate.plate.terms import Weights
 
@@ -18,32 +18,14 @@ _LARGEST = 1e150
 """Weight above which a draw is no plate: its matrices, or products of them, would not be finite."""
 
 
-class Law(Protocol):
-    """omega^2 of the wanted modes from the weights of the terms."""
-
-    @property
-    def name(self) -> LawName:
-        """ "linear" or "exact"."""
-
-    def squared(self, weights: Weights) -> NDArray[np.float64]:
-        """omega^2 in s^-2: (n_draws, n_modes) array."""
-
-
 @dataclass(frozen=True, eq=False)
 class LinearLaw:
-    """omega^2 as a ratio of weighted energies of the modes at the estimate: the paper's law.
+    """omega^2 as a ratio of weighted energies of the modes at the estimate: the paper's law."""
 
-    Attributes
-    ----------
-    stiffness : (n_modes, n_terms) array
-    mass : (n_modes, n_masses) array
-    """
+    stiffness: Floats  # (n_modes, n_terms)
+    mass: Floats  # (n_modes, n_masses)
 
-    stiffness: NDArray[np.float64]
-    mass: NDArray[np.float64]
-    name: LawName = "linear"
-
-    def squared(self, weights: Weights) -> NDArray[np.float64]:
+    def squared(self, weights: Weights) -> Floats:
         """omega^2 in s^-2: (n_draws, n_modes) array; negative where the law has left the region it is made for."""
         return np.asarray((weights.stiffness @ self.stiffness.T) / (weights.mass @ self.mass.T))
 
@@ -53,9 +35,8 @@ class ExactLaw:
     """omega^2 as eigenvalues of a reduced-order model."""
 
     reduced: ReducedOrderModel
-    name: LawName = "exact"
 
-    def squared(self, weights: Weights) -> NDArray[np.float64]:
+    def squared(self, weights: Weights) -> Floats:
         """omega^2 in s^-2: (n_draws, n_modes) array; not a number at a draw that is no plate.
 
         Weights that are not finite never reach a solver of eigenvalues, which would end everything at such a draw.
@@ -74,16 +55,16 @@ class ExactLaw:
         return LinearLaw(*self.reduced.energies(weights))
 
 
-def log_frequency(squared: NDArray[np.float64]) -> NDArray[np.float64]:
+def log_frequency(squared: Floats) -> Floats:
     """ln f (f in Hz) from omega^2; not a number where omega^2 is not positive."""
     return 0.5 * np.log(np.where(squared > 0, squared, np.nan)) - np.log(2.0 * np.pi)
 
 
-def mean_log_frequency(each: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+def mean_log_frequency(each: Sequence[Floats]) -> Floats:
     """ln of the mean of frequencies of which ln is given, arrays of one shape."""
     return each[0] if len(each) == 1 else np.asarray(np.log(np.mean(np.exp(each), axis=0)))
 
 
-def cents(log_ratio: NDArray[np.float64]) -> NDArray[np.float64]:
+def cents(log_ratio: Floats) -> Floats:
     """1200 log2 of a frequency ratio, from its natural logarithm."""
     return np.asarray(log_ratio) * (1200.0 / np.log(2.0))

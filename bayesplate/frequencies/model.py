@@ -7,21 +7,21 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Values
 from bayesplate.board.sessions import discrepancy_names
 from bayesplate.board.setup import Setup
-from bayesplate.frequencies.laws import ExactLaw, Law, LawName, LinearLaw, log_frequency, mean_log_frequency
+from bayesplate.frequencies.columns import with_and_without
+from bayesplate.frequencies.laws import ExactLaw, LawName, LinearLaw, log_frequency, mean_log_frequency
 from bayesplate.frequencies.residues import residues_of
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
 from bayesplate.plate.beams import Beams
-from bayesplate.plate.naming import CERTAIN, Place, find, name_modes
+from bayesplate.plate.naming import CERTAIN, Place, find, name_modes, reaching
 from bayesplate.plate.plate import Plate
 from bayesplate.plate.reduction import reduced_order_model
 from bayesplate.plate.solve import Modes, solve_classes, solve_up_to
-from bayesplate.plate.terms import Parity
 
 _ABOVE = 1.15
 """Frequency up to which modes are looked for, over the highest peak: what lies higher will not come down to it."""
@@ -29,16 +29,10 @@ _ABOVE = 1.15
 
 @dataclass(frozen=True)
 class OtherMode:
-    """A mode that no reading is labelled with.
-
-    Attributes
-    ----------
-    beams : (int, int) or None
-        Orders of the beam functions that its shape resembles; None where it clearly resembles none.
-    """
+    """A mode that no reading is labelled with."""
 
     place: Place
-    beams: Beams | None
+    beams: Beams | None  # orders of the beam functions that its shape resembles; None: clearly of none
 
 
 def every_label(setup: Setup, others: Sequence[OtherMode]) -> tuple[Label | None, ...]:
@@ -49,32 +43,18 @@ def every_label(setup: Setup, others: Sequence[OtherMode]) -> tuple[Label | None
 
 @dataclass(frozen=True, eq=False)
 class SetupModel:
-    """The frequencies of a setup's labelled modes as a function of constants and sizes.
-
-    Attributes
-    ----------
-    system : System
-        The setup and its effects.
-    places : tuple of Place
-        Where each labelled mode stands at the estimate; from there on a label means this rank of this class.
-    exact : ExactLaw or None
-        None until `with_exact` has built it.
-    others : tuple of OtherMode
-        Modes without a label, up to above the highest peak; none until `with_others` has found them.
-    residues : (n_modes + n_others,) array or None
-        Residue of each mode between hammer and sensor over the largest that its shape could give; None where the places
-        are not known.
-    roved : tuple of SetupModel
-        The same modes with what roved at its further places: a frequency is the mean over all of them.
-    """
+    """The frequencies of a setup's labelled modes as a function of constants and sizes."""
 
     system: System
     plate: Plate
+    # of each labelled mode at the estimate; from there on a label means this rank of this class
     places: tuple[Place, ...]
     linear: LinearLaw
-    exact: ExactLaw | None = None
-    others: tuple[OtherMode, ...] = ()
-    residues: NDArray[np.float64] | None = None
+    exact: ExactLaw | None = None  # None until `with_exact`
+    others: tuple[OtherMode, ...] = ()  # modes without a label, up to above the highest peak; none until `with_others`
+    # (n_modes + n_others,), over the largest that each shape could give; None: places not known
+    residues: Floats | None = None
+    # the modes with what roved at its further places: a frequency is the mean over all
     roved: tuple[SetupModel, ...] = ()
 
     @property
@@ -89,11 +69,9 @@ class SetupModel:
 
     @property
     def setup(self) -> Setup:
-        """The setup."""
         return self.system.setup
 
-    def law(self, name: LawName) -> Law:
-        """The law of that name."""
+    def law(self, name: LawName) -> LinearLaw | ExactLaw:
         if name == "linear":
             return self.linear
         if self.exact is None:
@@ -102,32 +80,25 @@ class SetupModel:
 
     @property
     def every_place(self) -> tuple[Place, ...]:
-        """Places of the labelled modes, then of the others."""
         return (*self.places, *(other.place for other in self.others))
 
-    def log_frequencies(self, values: Values, law: LawName) -> NDArray[np.float64]:
+    def log_frequencies(self, values: Values, law: LawName) -> Floats:
         """ln f of each labelled mode: (n_draws, n_modes) array; not a number where the law gives no frequency."""
         return self.every_log_frequency(values, law)[:, : len(self.places)]
 
-    def every_log_frequency(self, values: Values, law: LawName) -> NDArray[np.float64]:
-        """The same of the labelled modes, then of the others: (n_draws, n_modes + n_others) array."""
+    def every_log_frequency(self, values: Values, law: LawName) -> Floats:
+        """ln f of the labelled modes, then of the others: (n_draws, n_modes + n_others) array."""
         own = log_frequency(self.law(law).squared(self.system.weights(values)))
         return mean_log_frequency([own, *(one.every_log_frequency(values, law) for one in self.roved)])
 
     @cached_property
     def _discrepancy_names(self) -> dict[int, tuple[str, str]]:
-        """By mode: the parameters whose product is its discrepancy."""
+        """Names of the two parameters whose product is the discrepancy of a mode, by mode."""
         names = {i: discrepancy_names(self.setup, label) for i, label in enumerate(self.every_label) if label}
         return {i: both for i, both in names.items() if both is not None}
 
-    def discrepancies(self, values: Values) -> NDArray[np.float64]:
-        """ln f of the board less that of its plate, of all modes.
-
-        Returns
-        -------
-        (n_draws, n_every) array
-            A single zero where no session shares any.
-        """
+    def discrepancies(self, values: Values) -> Floats:
+        """ln f of the board less that of its plate, (n_draws, n_every); a single zero where no session shares any."""
         known = {i: names for i, names in self._discrepancy_names.items() if names[1] in values}
         if not known:
             return np.zeros((1, 1))
@@ -138,14 +109,13 @@ class SetupModel:
         return found
 
     def tangent(self, values: Values) -> SetupModel:
-        """The same with the linear law of the modes that the exact law has at one draw of values."""
+        """A model with the linear law of the modes that the exact law has at one draw of values."""
         assert self.exact is not None
         linear = self.exact.tangent(self.system.weights(values))
         return replace(self, linear=linear, roved=tuple(one.tangent(values) for one in self.roved))
 
     @cached_property
     def every_label(self) -> tuple[Label | None, ...]:
-        """Labels of the labelled modes, then of the others."""
         return every_label(self.setup, self.others)
 
     @property
@@ -154,13 +124,7 @@ class SetupModel:
         return (*(reading.beams for reading in self.setup.readings), *(other.beams for other in self.others))
 
     def labelled_as(self, setup: Setup) -> SetupModel:
-        """The same modes where other readings have labels: columns change their places, and nothing is solved.
-
-        Parameters
-        ----------
-        setup : Setup
-            This one with other labels, each of a mode that the model has.
-        """
+        """A model of the same modes where other readings have labels, each of a mode that it has: nothing is solved."""
         beams = self.every_beams
         labelled = [beams.index(reading.beams) for reading in setup.readings]
         return self._labelled_as(setup, labelled, [i for i in range(len(beams)) if i not in labelled])
@@ -181,45 +145,24 @@ class SetupModel:
             roved=tuple(one._labelled_as(setup, labelled, rest) for one in self.roved),
         )
 
-    def sensitivities(self, values: Values) -> NDArray[np.float64]:
+    def sensitivities(self, values: Values) -> Floats:
         """d ln f / d ln D at the point where the model was made: (n_modes, 3) array, columns D_x, D_y, D_s.
 
         Half the share of each constant in the mode's energy: for the bare thin plate rows sum to one half.
         """
         if self.roved:
             return np.asarray(np.mean([one.sensitivities(values) for one in self.stations], axis=0))
-        stiffness = self.linear.stiffness[: len(self.places)]
-        total = stiffness @ self.system.weights(values).stiffness[0]
-        columns = []
-        for name in ("D_x", "D_y", "D_s"):
-            without = self.system.weights({**values, name: 0.0 * values[name]}).stiffness[0]
-            columns.append(0.5 * (1.0 - stiffness @ without / total))
-        return np.column_stack(columns)
+        total, without = with_and_without(self.system, values, self.linear.stiffness[: len(self.places)])
+        return 0.5 * (1.0 - without / total[:, None])
 
 
 def setup_model(
     system: System, values: Values, plate: Plate | None = None, as_before: SetupModel | None = None
 ) -> SetupModel:
-    """Solve a setup at given constants and sizes, and find its labelled modes.
+    """Solve a setup at given constants and sizes, and find its labelled modes; with its linear law.
 
-    Parameters
-    ----------
-    values : dict of float
-        D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
-    plate : Plate, optional
-        Matrices to use again; by default those of the production mesh for these values.
-    as_before : SetupModel, optional
-        A model whose labels keep their ranks; by default they are found by the shapes.
-
-    Returns
-    -------
-    SetupModel
-        With its linear law.
-
-    Raises
-    ------
-    KeyError
-        If a label is no mode of the plate.
+    Labels keep their ranks in the model `as_before`; otherwise they are found by the shapes (KeyError if there is
+    none). The plate is by default that of the production mesh.
     """
     before = [None] * len(system.stations) if as_before is None else [one.places for one in as_before.stations]
     first, *further = (
@@ -249,10 +192,7 @@ def _setup_model(system: System, values: Values, plate: Plate, places: tuple[Pla
 def _ranked_model(system: System, values: Values, plate: Plate, places: tuple[Place, ...]) -> SetupModel:
     """The model in which each label means the mode at its place."""
     weights = system.weights(values).at(0)
-    n_modes: dict[Parity, int] = {}
-    for place in places:
-        n_modes[place.parity] = max(n_modes.get(place.parity, 0), place.rank + 1)
-    energies = {parity: one.coefficients() for parity, one in solve_classes(plate, weights, n_modes).items()}
+    energies = {parity: one.coefficients() for parity, one in solve_classes(plate, weights, reaching(places)).items()}
     stiffness, mass = (
         np.reshape([energies[one.parity][side][one.rank] for one in places], (len(places), weights[side].size))
         for side in (0, 1)
@@ -261,30 +201,12 @@ def _ranked_model(system: System, values: Values, plate: Plate, places: tuple[Pl
 
 
 def with_others(model: SetupModel, values: Values) -> SetupModel:
-    """Add the modes that peaks may be: all without a label up to above the highest peak or reading, at least one.
-
-    Parameters
-    ----------
-    values : dict of float
-        Where it was made.
-
-    Returns
-    -------
-    SetupModel
-        With their linear law, without an exact one.
-    """
+    """Add the modes without a label, at least one, up to above the highest peak, with their linear law."""
     found, modes = _with_others(model, values)
     roved = tuple(_with_others(one, values, len(modes.eigenvalues))[0] for one in model.roved)
-    n = min(len(one.others) for one in (found, *roved))
-    return replace(_with_few(found, n), roved=tuple(_with_few(one, n) for one in roved))
-
-
-def _with_few(model: SetupModel, n: int) -> SetupModel:
-    """The model with no more than its lowest other modes."""
-    n_every = len(model.places) + n
-    linear = LinearLaw(model.linear.stiffness[:n_every], model.linear.mass[:n_every])
-    residues = None if model.residues is None else model.residues[:n_every]
-    return replace(model, others=model.others[:n], linear=linear, residues=residues)
+    n_labelled, n_others = len(model.places), min(len(one.others) for one in (found, *roved))
+    rest = range(n_labelled, n_labelled + n_others)
+    return replace(found, roved=roved)._labelled_as(model.setup, list(range(n_labelled)), list(rest))
 
 
 def _with_others(model: SetupModel, values: Values, n_least: int = 0) -> tuple[SetupModel, Modes]:
@@ -316,22 +238,13 @@ def _with_others(model: SetupModel, values: Values, n_least: int = 0) -> tuple[S
     return replace(model, linear=linear, exact=None, others=others, residues=residues), modes
 
 
-def log_frequencies_of_board(models: Sequence[SetupModel], values: Values, law: LawName) -> list[NDArray[np.float64]]:
-    """ln f of all modes of each setup, with the discrepancies of the board from its plate that sessions share.
-
-    Returns
-    -------
-    list of (n_draws, n_every) array
-    """
+def log_frequencies_of_board(models: Sequence[SetupModel], values: Values, law: LawName) -> list[Floats]:
+    """ln f of all modes of each setup, (n_draws, n_every), with the discrepancies that sessions share."""
     return [model.every_log_frequency(values, law) + model.discrepancies(values) for model in models]
 
 
 def with_exact(
-    model: SetupModel,
-    centre: Values,
-    around: Sequence[Values],
-    held_out: Sequence[Values],
-    tolerance: float,
+    model: SetupModel, centre: Values, around: Sequence[Values], held_out: Sequence[Values], tolerance: float
 ) -> SetupModel:
     """Add the exact law, trained at `centre` and `around` it and checked at the points `held_out`, in cents."""
     reduced = reduced_order_model(
@@ -344,3 +257,11 @@ def with_exact(
     )
     roved = tuple(with_exact(one, centre, around, held_out, tolerance) for one in model.roved)
     return replace(model, exact=ExactLaw(reduced), roved=roved)
+
+
+def full_log_frequencies(model: SetupModel, values: Values) -> Floats:
+    """ln f (Hz) of a setup's labelled modes, (n_modes,), solved at given constants instead of taken from a law."""
+    if model.roved:
+        return mean_log_frequency([full_log_frequencies(one, values) for one in model.stations])
+    solved = solve_classes(model.plate, model.system.weights(values).at(0), reaching(model.places))
+    return log_frequency(np.array([solved[place.parity].eigenvalues[place.rank] for place in model.places]))

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
+from bayesplate.board.reading import Peak, Reading
 from bayesplate.board.setup import Setup
 from bayesplate.frequencies.assignment import LOG_NOTHING, Assignments, Near
 from bayesplate.frequencies.model import SetupModel, every_label
@@ -16,8 +17,7 @@ from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.frequencies.residues import share_seen, sign_probabilities
 from bayesplate.labels import Label
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.intp]
+Rows = Indices
 
 _MOST_UNSIGNED = 6
 """Peaks of unknown sign up to which each is tried with both."""
@@ -32,17 +32,10 @@ _SIGNS = {"+": 1, "-": -1, "": 0}
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """Peaks that keep their order among the modes: all, or those that may be of one sign.
+    """Peaks that keep their order among the modes: all, or those that may be of one sign."""
 
-    Attributes
-    ----------
-    peaks : (n_own,) array of int
-    log_sign : (n_own, n_modes) array
-        ln of the probability that a mode has the sign of a peak.
-    """
-
-    peaks: Rows
-    log_sign: Floats
+    peaks: Rows  # (n_own,)
+    log_sign: Floats  # (n_own, n_modes): ln of the probability that a mode has the sign of a peak
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,55 +45,27 @@ class PeakLikelihood:
     A peak is no mode with a prior probability s, its own or that of its setup, and then lies anywhere up to the highest
     one; otherwise it is one of the modes that no certain label has taken, about which it scatters as a reading does. Of
     n peaks n s are expected to be none: each that is weighs n s, for it may stand anywhere among the others, while a
-    mode has one place. A mode
-    leaves no peak with a prior probability, which is higher the nearer hammer or sensor stand to its nodal lines, or if
-    it lies above the highest peak. Where the signs of residues are known, on the card and from the shapes, a peak of
-    the other sign is not that mode, and peaks and modes keep their order within a sign only; a mode with so small a
-    residue that it may have either sign may be a peak of either. A label that may be wrong is right with the
-    probability that the card gives, and otherwise any other mode's.
-
-    Attributes
-    ----------
-    errors : ReadingErrors
-        Of the peaks, in the order of frequency.
-    readings, bare : (n_peaks,) array of int
-        Which of the setup's readings, and which of its peaks without a label, each one is; -1 for none.
-    columns : (n_modes,) array of int
-        The modes that peaks may be, among all of the setup's model: the labelled ones first.
-    labels : tuple of Label or None
-        Of these modes.
-    log_prior : (n_peaks, n_modes) array
-        ln of what is known of each pair beforehand: seen, no spurious peak, its label.
-    log_alone : (n_peaks,) array
-        ln of the probability of each peak if it is no mode.
-    missed : (n_modes,) array
-        Probability that a mode below the highest peak left none.
-    orders : tuple of Order
-        One of all, or one per sign, which share the peaks of unknown sign.
-    log_highest : float
-        ln of the highest frequency that was read, Hz.
+    mode has one place. A mode leaves no peak with a prior probability, which is higher the nearer hammer or sensor
+    stand to its nodal lines, or if it lies above the highest peak. Where the signs of residues are known, on the card
+    and from the shapes, a peak of the other sign is not that mode, and peaks and modes keep their order within a sign
+    only; a mode with so small a residue that it may have either sign may be a peak of either. A label that may be wrong
+    is right with the probability that the card gives, and otherwise any other mode's.
     """
 
-    errors: ReadingErrors
-    readings: Rows
-    bare: Rows
-    columns: Rows
+    errors: ReadingErrors  # of the peaks, in the order of frequency
+    readings: Rows  # (n_peaks,): which of the setup's readings each one is; -1: none
+    bare: Rows  # (n_peaks,): which of its peaks without a label; -1: none
+    columns: Rows  # (n_modes,): modes that peaks may be, among all of the model: the labelled ones first
     labels: tuple[Label | None, ...]
-    log_prior: Floats
-    log_alone: Floats
-    missed: Floats
-    orders: tuple[Order, ...]
-    log_highest: float
+    log_prior: Floats  # (n_peaks, n_modes): ln of what is known of each pair: seen, no spurious peak, its label
+    log_alone: Floats  # (n_peaks,): ln of the probability of each peak if it is no mode
+    missed: Floats  # (n_modes,): probability that a mode below the highest peak left none
+    orders: tuple[Order, ...]  # one of all, or one a sign, which share the peaks of unknown sign
+    log_highest: float  # ln of the highest frequency that was read, Hz
 
     @classmethod
     def of(cls, model: SetupModel, robust: bool = False) -> PeakLikelihood | None:
-        """Of a setup's model that has all its modes (`with_others`); None where every reading is sure and no other is.
-
-        Parameters
-        ----------
-        robust : bool
-            Student's distribution for the noise.
-        """
+        """The likelihood of the peaks of a model with all modes (`with_others`); None if all labels are sure."""
         setup = model.setup
         if not takes_part(setup):
             return None
@@ -111,15 +76,15 @@ class PeakLikelihood:
         errors = ReadingErrors.of_peaks(setup, doubtful, robust)
         order = np.argsort(errors.frequency, kind="stable")
         errors, readings, bare = errors.at(order), readings[order], bare[order]
-        signs = np.array([_SIGNS[sign] for sign in _signs(setup, doubtful)])[order]
+        read: list[Peak | Reading] = [*setup.peaks, *(setup.readings[i] for i in doubtful)]
+        signs = np.array([_SIGNS[one.sign] for one in read])[order]
         others = np.arange(len(setup.readings), len(model.every_place))
         columns = np.concatenate([doubtful, others]).astype(np.intp)
         residues = None if model.residues is None else model.residues[columns]
         seen = np.full(columns.size, 1.0 - setup.missed)
         if residues is not None:
             seen = seen * np.where(np.isnan(residues), 1.0, share_seen(np.nan_to_num(residues)))
-        own = [*(peak.spurious for peak in setup.peaks), *(setup.readings[i].spurious for i in doubtful)]
-        spurious = np.array([setup.spurious if one is None else one for one in own])[order]
+        spurious = np.array([setup.spurious if one.spurious is None else one.spurious for one in read])[order]
         log_pair = np.log(seen) + np.log1p(-spurious)[:, None]
         every = every_label(setup, model.others)
         labels = tuple(every[column] for column in columns)
@@ -144,19 +109,9 @@ class PeakLikelihood:
         )
 
     def log_likelihood(self, every_log_frequency: Floats, noise: Floats) -> Floats:
-        """ln of the probability of all peaks together.
+        """ln of the probability of all peaks together, (n_draws,), from ln f (Hz) of all modes: (n_draws, n_every).
 
-        Parameters
-        ----------
-        every_log_frequency : (n_draws, n_every) array
-            ln f (Hz) of all modes of the setup's model.
-        noise : (n_draws,) array
-            Relative.
-
-        Returns
-        -------
-        (n_draws,) array
-            -inf where a mode has no frequency.
+        Minus infinity where a mode has no frequency.
         """
         there = every_log_frequency[:, self.columns]
         has_all = np.flatnonzero(np.isfinite(there).all(axis=1))
@@ -175,14 +130,7 @@ class PeakLikelihood:
         return np.asarray(assignments.log_sum() + log_missed.sum(axis=0) + self.log_alone.sum())
 
     def probabilities(self, every_log_frequency: Floats, noise: Floats) -> Floats:
-        """Probability that each peak is each mode, averaged over draws: (n_peaks, n_modes) array; the rest: it is none.
-
-        Parameters
-        ----------
-        every_log_frequency : (n_draws, n_every) array
-            ln f (Hz), all of them finite.
-        noise : (n_draws,) array
-        """
+        """Probability that each peak is each mode, averaged over draws: (n_peaks, n_modes); the rest: it is none."""
         total = np.zeros(self.log_prior.shape)
         for start in range(0, len(noise), _DRAWS_AT_ONCE):
             some = slice(start, start + _DRAWS_AT_ONCE)
@@ -190,7 +138,7 @@ class PeakLikelihood:
         return total / len(noise)
 
     def probabilities_of_each(self, every_log_frequency: Floats, noise: Floats) -> Floats:
-        """The same at each draw: (n_peaks, n_modes, n_draws) array."""
+        """Probability that each peak is each mode at each draw: (n_peaks, n_modes, n_draws) array."""
         modes, _, assignments = self._assignments(every_log_frequency[:, self.columns], noise)
         result = np.zeros((*self.log_prior.shape, len(noise)))
         for row, (order, pairs) in enumerate(zip(self.orders, assignments.pairs(), strict=True)):
@@ -206,16 +154,10 @@ class PeakLikelihood:
         return float(self.log_alone[at] - np.log(width))
 
     def _assignments(self, there: Floats, noise: Floats) -> tuple[Rows, Floats, Assignments]:
-        """What the peaks say of the modes in the order of each draw.
+        """The order of the modes, ln of the probability that each left no peak, and what the peaks say in that order.
 
-        Pairs that are near each other at no draw are left out.
-
-        Returns
-        -------
-        modes : (n_modes, n_draws) array of int, or (n_modes, 1) where all draws have one order
-            That order.
-        log_missed : (n_modes, n_draws) array
-            ln of the probability that each left no peak.
+        The order is (n_modes, n_draws), or (n_modes, 1) where all draws have one. Pairs that are near each other at no
+        draw are left out.
         """
         log_missed = self._log_missed(there.T, noise)
         modes = np.argsort(there[0])[:, None]
@@ -251,14 +193,7 @@ class PeakLikelihood:
         return np.asarray((most - log_missed.min(axis=1))[self._peaks])
 
     def _log_missed(self, log_frequency: Floats, noise: Floats) -> Floats:
-        """ln of the probability that each mode left no peak, none of them infinite: (n_modes, n_draws) array.
-
-        Parameters
-        ----------
-        log_frequency : (n_modes, n_draws) array
-            ln f (Hz).
-        noise : (n_draws,) array
-        """
+        """Finite ln of the probability that each mode left no peak, from ln f: (n_modes, n_draws) arrays."""
         from scipy.special import ndtr
 
         missed = np.repeat(self.missed[:, None], noise.size, axis=1)
@@ -269,7 +204,6 @@ class PeakLikelihood:
 
     @cached_property
     def _peaks(self) -> Rows:
-        """Peaks of one order after the other."""
         return np.concatenate([order.peaks for order in self.orders])
 
     @cached_property
@@ -293,16 +227,11 @@ class PeakLikelihood:
 
 
 def takes_part(setup: Setup) -> bool:
-    """Whether a setup has peaks without a label, or with a doubtful one."""
     return bool(setup.peaks) or not all(reading.is_sure for reading in setup.readings)
 
 
-def _signs(setup: Setup, doubtful: Rows) -> list[str]:
-    return [*(peak.sign for peak in setup.peaks), *(setup.readings[i].sign for i in doubtful)]
-
-
 def _orders(signs: Rows, n_modes: int, residues: Floats | None) -> Iterator[Order]:
-    """Those that may be of one sign, peaks of which it is not known among both; or all together."""
+    """One order for each sign, peaks of unknown sign in both; or one of all peaks."""
     unsigned = np.flatnonzero(signs == 0)
     log_sign = np.zeros((3, n_modes))
     is_known = residues is not None and not np.isnan(residues).any()

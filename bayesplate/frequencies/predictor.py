@@ -6,63 +6,46 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Values
 from bayesplate.frequencies.laws import LawName
 from bayesplate.frequencies.model import SetupModel, log_frequencies_of_board
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class Predictor:
-    """ln f (Hz) of modes, setup after setup, as a function of the parameters of a fit.
+    """ln f (Hz) of modes, setup after setup, as a function of the (n, n_free) parameters of a fit."""
 
-    Attributes
-    ----------
-    values : callable
-        From (n, n_free) parameters to constants and sizes by name, SI.
-    rows : (n_modes,) array of int, optional
-        Which of all modes that the models have; by default all of them.
-    n_constants : int
-        How many of the parameters, the first ones, are logarithms of free rigidities: all others have priors.
-    """
-
-    values: Callable[[Floats], Values]
+    values: Callable[[Floats], Values]  # to constants and sizes by name, SI
     models: Sequence[SetupModel]
     law: LawName
-    rows: NDArray[np.intp] | None = None
-    n_constants: int = 3
+    rows: Indices | None = None  # (n_modes,): which of all modes that the models have
+    n_constants: int = 3  # the first parameters, logarithms of free rigidities: all others have priors
 
     def __call__(self, x: Floats) -> Floats:
-        """From (n, n_free) parameters to (n, n_modes) ln f."""
+        """ln f, (n, n_modes), at (n, n_free) parameters."""
         values = self.values(x)
         every = np.concatenate(log_frequencies_of_board(self.models, values, self.law), axis=1)
         return every if self.rows is None else every[:, self.rows]
 
-    def of(self, rows: NDArray[np.intp]) -> Predictor:
-        """The same for some of the modes, by their places among all."""
+    def of(self, rows: Indices) -> Predictor:
+        """A predictor of some of the modes, by their places among all."""
         return replace(self, rows=rows)
 
     def of_labelled(self) -> Predictor:
-        """The same for the modes that have a label on the board."""
         starts = np.cumsum([0, *(len(model.every_place) for model in self.models)])[:-1]
         both = zip(starts, self.models, strict=True)
         return self.of(np.concatenate([start + np.arange(len(model.places)) for start, model in both]))
 
     def with_fixed(self, rest: Floats) -> Predictor:
-        """The same as a function of the first parameters only, the (n_rest,) others held where they are."""
+        """A predictor of the first parameters only, the (n_rest,) others held where they are."""
         return replace(self, values=lambda x: self.values(np.concatenate([x, np.tile(rest, (len(x), 1))], axis=1)))
 
     def tangent(self, at: Floats) -> Predictor:
         """The linear law of the modes at a point: equal to the exact one there, with the same slopes.
 
         Energies are stationary at a mode (Rayleigh's principle), so that one solution gives all slopes.
-
-        Parameters
-        ----------
-        at : (n_free,) array
         """
         if self.law == "linear":
             return self

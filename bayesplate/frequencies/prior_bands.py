@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import MODULI, RIGIDITIES, isotropic_moduli, rigidities
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.setup import Setup
-from bayesplate.frequencies.terms import rayleigh_coefficients, term_weights
+from bayesplate.frequencies.terms import term_weights
 from bayesplate.labels import Label
-from bayesplate.plate.beams import N_BEAMS
+from bayesplate.plate.beams import N_BEAMS, product_coefficients
 
 WITHIN = (1 / 6, 5 / 6)
 """Two times in three."""
@@ -21,7 +21,7 @@ WITHIN = (1 / 6, 5 / 6)
 _N_DRAWS = 4000
 
 
-def prior_medians(board: Board, prior: PriorCard) -> dict[str, NDArray[np.float64]]:
+def prior_medians(board: Board, prior: PriorCard) -> dict[str, Floats]:
     """Constants at the median of the prior, and the nominal inputs: dict of float."""
     medians = {name: np.asarray(density.median) for name, density in prior.constants.items()}
     return with_rigidities({**board.nominal(), **medians})
@@ -30,18 +30,13 @@ def prior_medians(board: Board, prior: PriorCard) -> dict[str, NDArray[np.float6
 def prior_bands(
     board: Board, prior: PriorCard, setup: Setup, labels: Sequence[Label], rng: np.random.Generator
 ) -> dict[str, tuple[float, float]]:
-    """Factors between which the prior expects each frequency, relative to the one at its median.
+    """Factors between which the prior expects each frequency, relative to the one at its median, by label.
 
     From Rayleigh quotients of beam-function products, draw by draw: a few per cent off each frequency, which cancel in
-    the factors.
-
-    Returns
-    -------
-    dict of (float, float)
-        By label; labels beyond the beam functions are left out.
+    the factors. Labels beyond the beam functions are left out.
     """
     values = prior_draws(board, prior, rng, _N_DRAWS)
-    products = rayleigh_coefficients(setup)
+    products = product_coefficients(setup.ends_x, setup.ends_y)
     middle = term_weights(prior_medians(board, prior), setup).stiffness[0]
     weights = term_weights(values, setup).stiffness
     bands = {}
@@ -55,15 +50,15 @@ def prior_bands(
     return bands
 
 
-def prior_draws(board: Board, prior: PriorCard, rng: np.random.Generator, n: int) -> dict[str, NDArray[np.float64]]:
+def prior_draws(board: Board, prior: PriorCard, rng: np.random.Generator, n: int) -> dict[str, Floats]:
     """Draws of the constants and of the board's inputs: dict of (n,) array, SI."""
     drawn = {name: one.sample(rng, n) for name, one in prior.constants.items()}
     inputs = {name: quantity.value(rng.standard_normal(n)) for name, quantity in board.inputs.items()}
     return with_rigidities({**inputs, **drawn})
 
 
-def with_rigidities(values: Values) -> dict[str, NDArray[np.float64]]:
-    """The same values with D_x, D_y, D_s, from the moduli where these are given: all three, or one if isotropic."""
+def with_rigidities(values: Values) -> dict[str, Floats]:
+    """Values with D_x, D_y, D_s added, from the moduli where these are given: all three, or one if isotropic."""
     if set(RIGIDITIES) <= set(values):
         return dict(values)
     if "E_y" not in values:

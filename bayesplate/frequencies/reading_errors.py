@@ -8,18 +8,17 @@ adds resolution^2 / 12 to the variance.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import log_ndtr
 
+from bayesplate.arrays import Bools, Floats, Indices
 from bayesplate.board.setup import Setup
-from bayesplate.frequencies.densities import NORMAL, STUDENT, Density
-
-Floats = NDArray[np.float64]
 
 _LOWEST = 1e-3
 """Share of a reading that its rounding interval stays above: the logarithm needs a positive end."""
@@ -27,28 +26,71 @@ _DECIMALS = 9
 """Of a rounded reading in Hz: more than anyone writes."""
 _NEAR = 1e-4
 """Share of an interval's scale about its middle where the first-order term is good to 1e-8 and a difference is not."""
+DEGREES_OF_FREEDOM = 4
+"""Of the Student distribution of `--robust`: finite variance, tails heavy enough to let one mode go."""
+
+
+@dataclass(frozen=True)
+class Density:
+    """A density of z, symmetric about zero and highest there: the normal one or Student's."""
+
+    log_peak: float  # ln p(0)
+    deviance: Callable[[Floats], Floats]  # 2 (ln p(0) - ln p(z)); z^2 for the normal density
+    slope: Callable[[Floats], Floats]  # half the deviance's derivative, -d ln p / dz
+    curvature: float  # derivative of `slope` at 0
+    log_below: Callable[[Floats], Floats]  # ln of the probability below z
+    draw: Callable[[np.random.Generator, tuple[int, ...]], Floats]
+
+    def log(self, z: Floats) -> Floats:
+        return np.asarray(self.log_peak - 0.5 * self.deviance(z))
+
+    def log_between(self, low: Floats, high: Floats) -> Floats:
+        """ln of the probability between two bounds, taken in the tail where differences do not cancel."""
+        upper = low + high > 0
+        low, high = np.where(upper, -high, low), np.where(upper, -low, high)
+        top = self.log_below(high)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(top + np.log(-np.expm1(self.log_below(low) - top)))
+
+
+def _log_student_below(t: Floats) -> Floats:
+    """ln F(t) of four degrees of freedom: with u = t / sqrt(4 + t^2), F = (1 + u)^2 (2 - u) / 4, 1 + u without loss."""
+    root = np.sqrt(4.0 + t**2)
+    u = t / root
+    one_plus = np.where(t < 0, 4.0 / (root * (root - t)), 1.0 + u)
+    return np.asarray(2.0 * np.log(one_plus) + np.log(2.0 - u) - np.log(4.0))
+
+
+NORMAL = Density(
+    log_peak=float(-0.5 * np.log(2.0 * np.pi)),
+    deviance=np.square,
+    slope=np.positive,
+    curvature=1.0,
+    log_below=log_ndtr,
+    draw=lambda rng, shape: rng.normal(size=shape),
+)
+STUDENT = Density(
+    log_peak=float(np.log(3.0 / 8.0)),
+    deviance=lambda z: 5.0 * np.log1p(z**2 / 4.0),
+    slope=lambda z: 1.25 * z / (1.0 + z**2 / 4.0),
+    curvature=1.25,
+    log_below=_log_student_below,
+    draw=lambda rng, shape: rng.standard_t(DEGREES_OF_FREEDOM, shape),
+)
 
 
 @dataclass(frozen=True, eq=False)
 class ReadingErrors:
     """How the readings of a setup err about the frequencies that a model predicts.
 
-    Attributes
-    ----------
-    frequency : (n_modes,) array, Hz
-        As read.
-    own_sd : (n_modes,) array
-        Relative standard deviation that a reading states itself; 0 if it states none.
-    resolution : (n_modes,) array, Hz
-        Step of the rounding; 0 where there is none, or where `own_sd` holds its error.
-    robust : bool
-        Student's density with four degrees of freedom in place of the normal one.
+    Predictions are ln f (Hz), (n_modes,) or (n_draws, n_modes) arrays, at a relative noise: one, or (n_draws,). Under
+    Student's density the noise is its scale.
     """
 
-    frequency: Floats
-    own_sd: Floats
-    resolution: Floats
-    robust: bool = False
+    frequency: Floats  # (n_modes,), Hz: as read
+    own_sd: Floats  # (n_modes,): relative standard deviation that a reading states itself; 0: none
+    resolution: Floats  # (n_modes,), Hz: step of the rounding; 0: none, or `own_sd` holds its error
+    robust: bool = False  # Student's density with four degrees of freedom in place of the normal one
 
     @classmethod
     def of(cls, setup: Setup, robust: bool = False) -> ReadingErrors:
@@ -64,7 +106,6 @@ class ReadingErrors:
         return cls(np.array([one.mean for one in every]), own, np.where(own == 0, setup.resolution, 0.0), robust)
 
     def at(self, kept: NDArray[Any]) -> ReadingErrors:
-        """Some of the readings, or all in another order."""
         return replace(self, frequency=self.frequency[kept], own_sd=self.own_sd[kept], resolution=self.resolution[kept])
 
     @cached_property
@@ -83,7 +124,7 @@ class ReadingErrors:
         return np.log(self.frequency + self.resolution / 2.0)
 
     @cached_property
-    def rounded(self) -> NDArray[np.bool_]:
+    def rounded(self) -> Bools:
         """Which readings are known as an interval: (n_modes,) array."""
         return self.resolution > 0
 
@@ -93,33 +134,13 @@ class ReadingErrors:
         return np.asarray(self.own_sd**2 + (self.resolution / self.frequency) ** 2 / 12.0)
 
     def sd(self, noise: ArrayLike) -> Floats:
-        """Relative standard deviation of each reading: noise, own uncertainty and rounding together.
-
-        Parameters
-        ----------
-        noise : float or (n_draws,) array
-            Relative; under Student's density it is the scale.
-
-        Returns
-        -------
-        (n_modes,) or (n_draws, n_modes) array
-        """
+        """Relative standard deviation of each reading: noise, own uncertainty and rounding together."""
         return _join(noise, np.sqrt(self.own_variance))
 
     def log_likelihood(self, predicted: Floats, noise: ArrayLike) -> Floats:
-        """Logarithm of the probability of each reading.
+        """ln of the probability of each reading: of its rounding interval, or else of the density of ln f.
 
-        Parameters
-        ----------
-        predicted : (n_modes,) or (n_draws, n_modes) array
-            ln f (Hz) of the model; not a number where it has none.
-        noise : float or (n_draws,) array
-
-        Returns
-        -------
-        (n_modes,) or (n_draws, n_modes) array
-            Of the rounding interval for rounded readings, otherwise of the density of ln f; -inf where the model has
-            no frequency.
+        Minus infinity where the model has no frequency, which is not a number.
         """
         rounded = self.rounded
         z, low, high, scale = self._standardised(predicted, noise)
@@ -128,20 +149,8 @@ class ReadingErrors:
         result[..., rounded] = self._density.log_between(low[..., rounded], high[..., rounded])
         return np.where(np.isnan(predicted), -np.inf, result)
 
-    def log_likelihood_of_pairs(self, readings: NDArray[np.intp], predicted: Floats, noise: Floats) -> Floats:
-        """Logarithm of the probability of some readings, each if it were of the mode that it is paired with.
-
-        Parameters
-        ----------
-        readings : (n_pairs,) array of int
-        predicted : (n_pairs, n_draws) array
-            ln f (Hz) of their modes.
-        noise : (n_draws,) array
-
-        Returns
-        -------
-        (n_pairs, n_draws) array
-        """
+    def log_likelihood_of_pairs(self, readings: Indices, predicted: Floats, noise: Floats) -> Floats:
+        """ln of the probability of (n_pairs,) readings if each were of the mode of the (n_pairs, n_draws) ln f."""
         if self.rounded.any():
             return np.ascontiguousarray(self.at(readings).log_likelihood(predicted.T, noise).T)
         scale = np.ascontiguousarray(_join(noise, self.own_sd).T)
@@ -150,17 +159,7 @@ class ReadingErrors:
         return np.asarray(self._density.log(z) - np.log(scale)[readings])
 
     def log_most(self, lowest: Floats, highest: Floats, least_noise: float, most_noise: float) -> Floats:
-        """The most that `log_likelihood_of_pairs` may be, or somewhat more, where it is known within ranges.
-
-        Parameters
-        ----------
-        lowest, highest : (n_modes,) array
-            ln f (Hz).
-
-        Returns
-        -------
-        (n_readings, n_modes) array
-        """
+        """The most that `log_likelihood_of_pairs` is within ranges of ln f, or more: (n_readings, n_modes)."""
         away = np.maximum(lowest - self.log_high[:, None], self.log_low[:, None] - highest)
         z = np.maximum(away, 0.0) / _join(most_noise, self.own_sd)[:, None]
         result = self._density.log(z) - np.log(_join(least_noise, self.own_sd))[:, None]
@@ -169,27 +168,12 @@ class ReadingErrors:
         return np.asarray(result)
 
     def deviance_residuals(self, predicted: Floats, noise: ArrayLike) -> tuple[Floats, Floats]:
-        """Signed roots of the deviances, and how they change with the prediction.
+        """Signed roots of the deviances 2 (max ln p - ln p), and how they change with the prediction.
 
-        Their squares are 2 (max ln p - ln p): summed, twice the negative log likelihood but for a constant. For a
-        reading that is not rounded and has normal errors they are its standardised residuals.
-
-        Parameters
-        ----------
-        predicted : (n_modes,) or (n_draws, n_modes) array
-            ln f (Hz) of the model.
-        noise : float or (n_draws,) array
-
-        Returns
-        -------
-        residuals : (n_modes,) or (n_draws, n_modes) array
-            Positive where the reading lies above the prediction; for a rounded one, the middle of its interval.
-        slopes : array of the same shape
-            Derivatives by the predicted ln f: negative, and next to zero within an interval wider than the noise.
-
-        References
-        ----------
-        McCullagh and Nelder, Generalized Linear Models, 2nd ed., 1989, section 2.4.3.
+        The sum of their squares is twice the negative log likelihood but for a constant. They are positive where a
+        reading, or the middle of its interval, lies above the prediction; without rounding and with normal errors they
+        are standardised residuals. Slopes are negative, and next to zero within an interval wider than the noise.
+        (McCullagh and Nelder, Generalized Linear Models, 2nd ed., 1989, section 2.4.3.)
         """
         z, low, high, scale = self._standardised(predicted, noise)
         residuals, slopes = np.empty(z.shape), np.empty(z.shape)
@@ -199,18 +183,7 @@ class ReadingErrors:
         return residuals, -slopes / scale
 
     def simulate(self, predicted: Floats, noise: ArrayLike, rng: np.random.Generator) -> Floats:
-        """Readings that a model would give, rounded where the measured ones are.
-
-        Parameters
-        ----------
-        predicted : (n_draws, n_modes) array
-            ln f (Hz).
-        noise : float or (n_draws,) array
-
-        Returns
-        -------
-        (n_draws, n_modes) array, Hz
-        """
+        """Readings in Hz, (n_draws, n_modes), that a model would give, rounded where the measured ones are."""
         hertz = np.exp(predicted + _join(noise, self.own_sd) * self._density.draw(rng, predicted.shape))
         steps = self.resolution[self.rounded]
         whole = np.round(hertz[..., self.rounded] / steps)
@@ -235,7 +208,7 @@ class ReadingErrors:
         return np.sign(z) * root, np.where(at_peak, np.sqrt(self._density.curvature), slopes)
 
     def _of_interval(self, low: Floats, high: Floats) -> tuple[Floats, Floats]:
-        """The same for a probability between two bounds: the derivative is for both bounds moving together."""
+        """Signed root of the deviance of an interval, and its derivative by both bounds moving together."""
         density = self._density
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         highest, found = density.log_between(-half, half), density.log_between(low, high)

@@ -7,10 +7,11 @@ with a nodal line near either place shows hardly or not at all; where both move 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesplate.board.board import Values, vibrating_lengths
+from bayesplate.arrays import Floats
+from bayesplate.board.board import Values
 from bayesplate.board.setup import Setup
+from bayesplate.effects.attached_items import fractions_of
 from bayesplate.effects.base import Effect
 from bayesplate.plate.solve import Modes
 
@@ -26,20 +27,11 @@ _SURE = 1e-3
 _GRID = np.linspace(0.0, 1.0, 21)
 
 
-def residues_of(setup: Setup, modes: Modes, values: Values, shaped: Effect | None = None) -> NDArray[np.float64] | None:
-    """Residue of each mode over the square of its largest deflection: (n_modes,) array, -1 to 1.
+def residues_of(setup: Setup, modes: Modes, values: Values, shaped: Effect | None = None) -> Floats | None:
+    """Residue of each mode over the square of its largest deflection, -1 to 1: (n_modes,) array.
 
-    Parameters
-    ----------
-    values : dict of float
-        The board's sizes.
-    shaped : Effect, optional
-        The effect that gives the plate its outline, where that is not the whole rectangle.
-
-    Returns
-    -------
-    array or None
-        None where the card does not state the hammer's place and that of one accelerometer.
+    None where the card does not state the hammer's place and that of one accelerometer. `shaped` is the effect that
+    gives the plate its outline, where that is not the whole rectangle.
     """
     if setup.hammer is None or setup.sensor is None:
         return None
@@ -49,7 +41,7 @@ def residues_of(setup: Setup, modes: Modes, values: Values, shaped: Effect | Non
 
 def deflections(
     setup: Setup, modes: Modes, values: Values, place: tuple[float, float], shaped: Effect | None = None
-) -> NDArray[np.float64]:
+) -> Floats:
     """Deflection of each mode at a place (m from the board's corner) over its largest: (n_modes,) array, -1 to 1."""
     x, y = fractions_of(setup, place, values)
     if shaped is not None:
@@ -58,7 +50,7 @@ def deflections(
     return np.asarray(at / _largest(modes, shaped))
 
 
-def _largest(modes: Modes, shaped: Effect | None) -> NDArray[np.float64]:
+def _largest(modes: Modes, shaped: Effect | None) -> Floats:
     """The largest deflection of each mode on the plate: (n_modes,) array."""
     outline = None if shaped is None else shaped.outline()
     if outline is None:
@@ -68,7 +60,7 @@ def _largest(modes: Modes, shaped: Effect | None) -> NDArray[np.float64]:
     return np.asarray(np.max(np.abs(modes.displacement_across(_GRID, places)), axis=(1, 2)))
 
 
-def share_seen(residues: NDArray[np.float64]) -> NDArray[np.float64]:
+def share_seen(residues: Floats) -> Floats:
     """Share of its chance to leave a peak that a mode keeps between hammer and sensor: (n_modes,) array, 0 to 1.
 
     It is r^2 / (r^2 + s^2) with s = `NODAL_LINE`, averaged over residues r that scatter about the computed one by s,
@@ -83,7 +75,7 @@ def share_seen(residues: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(1.0 - np.sqrt(np.pi / 2.0) * wofz(argument).real)
 
 
-def sign_probabilities(residues: NDArray[np.float64]) -> NDArray[np.float64]:
+def sign_probabilities(residues: Floats) -> Floats:
     """Probability that the residue of each mode is positive, and that it is negative: (2, n_modes) array.
 
     For a computed residue that is off by `NODAL_LINE`; one half each where none is known.
@@ -93,12 +85,3 @@ def sign_probabilities(residues: NDArray[np.float64]) -> NDArray[np.float64]:
     positive = ndtr(np.nan_to_num(residues) / NODAL_LINE)
     positive = np.where(positive < _SURE, 0.0, np.where(positive > 1.0 - _SURE, 1.0, positive))
     return np.stack([positive, 1.0 - positive])
-
-
-def fractions_of(setup: Setup, place: tuple[float, float], values: Values) -> tuple[float, float]:
-    """A place on the board (m from its corner) as fractions of the vibrating sides."""
-    fractions = []
-    for axis, position, side in zip("xy", place, vibrating_lengths(values, setup), strict=True):
-        covered = values[setup.input_name(f"{axis}0")] if f"{axis}0" in setup.clamped else 0.0
-        fractions.append(float(np.clip((position - covered) / side, 0.0, 1.0)))
-    return fractions[0], fractions[1]

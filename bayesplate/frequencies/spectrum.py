@@ -23,44 +23,19 @@ _FEWEST_MODES = 12
 
 @dataclass(frozen=True)
 class NamedMode:
-    """One mode of a setup.
-
-    Attributes
-    ----------
-    label : Label or None
-        None where no product of beam functions fits: "cannot tell".
-    frequency : float, Hz
-    correlation : float
-        With the product that the label names.
-    """
-
-    label: Label | None
-    frequency: float
-    correlation: float
+    label: Label | None  # None where no product of beam functions fits
+    frequency: float  # Hz
+    correlation: float  # with the product that the label names
 
     @property
     def name(self) -> str:
-        """The label as text."""
         return "cannot tell" if self.label is None else str(self.label)
 
 
 def spectrum(
     system: System, values: Values, n_modes: int, plate: Plate | None = None
 ) -> tuple[Modes, tuple[NamedMode, ...]]:
-    """Lowest modes of a setup at given constants and sizes.
-
-    Parameters
-    ----------
-    values : dict of float
-        D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
-    plate : Plate, optional
-        Matrices to use again; by default those of the production mesh for these values.
-
-    Returns
-    -------
-    named : tuple of NamedMode
-        In the order of frequency.
-    """
+    """Lowest modes of a setup at given constants and sizes, and their names, in the order of frequency."""
     plate = system.plate(values) if plate is None else plate
     modes = solve(plate, system.weights(values).at(0), n_modes)
     first = system.setup.first_label
@@ -72,18 +47,7 @@ def spectrum(
 
 
 def spectra(models: Sequence[SetupModel], values: Values) -> dict[str, tuple[Modes, tuple[NamedMode, ...]]]:
-    """Spectrum of every setup with a hammer, whose signs can be compared with it.
-
-    Parameters
-    ----------
-    values : dict of float
-        D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
-
-    Returns
-    -------
-    dict of (Modes, tuple of NamedMode)
-        By setup; at least two modes per reading.
-    """
+    """Spectrum of every setup with a hammer, whose signs can be compared with it; at least two modes per reading."""
     found = {}
     for model in models:
         setup = model.setup
@@ -107,15 +71,10 @@ def doubtful_labels(models: Sequence[SetupModel]) -> tuple[str, ...]:
 def sign_conflicts(
     setup: Setup, modes: Modes, named: tuple[NamedMode, ...], values: Values, shaped: Effect | None = None
 ) -> tuple[str, ...]:
-    """Labels whose measured sign of the residue differs from that of the shape.
+    """Sentences on labels whose measured sign of the residue differs from that of the shape.
 
     Only where the setup states signs and the places are known, and where neither stands near a nodal line: there the
     sign tells nothing.
-
-    Returns
-    -------
-    tuple of str
-        One sentence a conflict.
     """
     stated = {reading.label: reading.sign for reading in setup.readings if reading.sign}
     residues = residues_of(setup, modes, values, shaped) if stated else None

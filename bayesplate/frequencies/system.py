@@ -7,8 +7,8 @@ from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.setup import Ends, Setup
 from bayesplate.effects import effects_of
@@ -22,7 +22,7 @@ from bayesplate.plate.shear import SHEAR_ELEMENTS_PER_SIDE, SHEAR_FLEXIBLE
 from bayesplate.plate.terms import Weights
 from bayesplate.plate.thin import THIN
 
-Limits = tuple[NDArray[np.float64], NDArray[np.float64]]
+Limits = tuple[Floats, Floats]
 """Where a plate begins and ends along y at some points of its length, (n,) arrays, as fractions of its widest width."""
 
 
@@ -39,13 +39,7 @@ class System:
         return "shear-flexible" if any(e.theory == "shear-flexible" for e in self.effects) else "thin"
 
     def plate(self, values: Values) -> Plate:
-        """The plate on the production mesh for these values.
-
-        Parameters
-        ----------
-        values : dict of float
-            D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
-        """
+        """The plate on the production mesh for these values."""
         is_sheared = self.theory == "shear-flexible"
         finest = max((effect.refines for effect in self.effects), default=1.0)
         per_side = SHEAR_ELEMENTS_PER_SIDE if is_sheared else round(ELEMENTS_PER_SIDE * finest)
@@ -91,11 +85,8 @@ class System:
         """The effect that gives the plate its outline, where that is not the whole rectangle."""
         return next((effect for effect in self.effects if effect.outline() is not None), None)
 
-    def limits(self, x: NDArray[np.float64]) -> Limits | None:
-        """Where the plate begins and ends along y at fractions of its length, as fractions of its widest width.
-
-        None where it is a rectangle.
-        """
+    def limits(self, x: Floats) -> Limits | None:
+        """Ends of the plate along y at fractions of its length, as fractions of its widest width; None: a rectangle."""
         outline = None if self.shaped is None else self.shaped.outline()
         return None if outline is None else outline(x)
 
@@ -128,7 +119,6 @@ class System:
 
 
 def system_of(board: Board, setup: Setup) -> System:
-    """A setup of a board with the board's declared effects."""
     return System(setup, effects_of(board, setup))
 
 

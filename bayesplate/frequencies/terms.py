@@ -3,32 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Values, density, vibrating_lengths
+from bayesplate.board.material import RIGIDITIES
 from bayesplate.board.setup import Setup
-from bayesplate.plate.beams import product_coefficients
 from bayesplate.plate.shear import SHEAR_CORRECTION
 from bayesplate.plate.terms import Weights
 
 
 def term_weights(values: Values, setup: Setup) -> Weights:
-    """Weights of the thin plate's terms on the unit square.
+    """Weights of the thin plate's terms on the unit square, (n_draws, 4) as `THIN_TERMS`, and 1 for the mass.
 
-    Parameters
-    ----------
-    values : dict of array
-        D_x, D_y, D_s (N m) and the board's inputs; numbers or (n_draws,) arrays.
-
-    Returns
-    -------
-    Weights
-        (n_draws, 4) stiffness weights in the order of `bayesplate.plate.thin.THIN_TERMS`, and 1 for the mass.
-
-    References
-    ----------
-    Ducceschi et al., eq. (11): with A = L_x L_y and sigma = L_x / L_y these are D_x / sigma^2, D_y sigma^2, nu_xy D_y
-    and D_s over rho h A^2.
+    With A = L_x L_y and sigma = L_x / L_y these are D_x / sigma^2, D_y sigma^2, nu_xy D_y and D_s over rho h A^2
+    (Ducceschi et al., eq. (11)). Values are numbers or (n_draws,) arrays, D_x, D_y, D_s in N m.
     """
     length_x, length_y = vibrating_lengths(values, setup)
     mass = density(values) * values["thickness"] * length_x * length_y
@@ -45,30 +33,16 @@ def term_weights(values: Values, setup: Setup) -> Weights:
     return Weights(stiffness, np.ones((stiffness.shape[0], 1)))
 
 
-def shear_moduli(values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def shear_moduli(values: Values) -> tuple[Floats, Floats]:
     """G_xz and G_yz, Pa; one that is not there is G_xy, as in a plate that is alike in all directions."""
     of_plane = 3.0 * values["D_s"] / np.asarray(values["thickness"]) ** 3
     return np.asarray(values.get("G_xz", of_plane)), np.asarray(values.get("G_yz", of_plane))
 
 
 def shear_term_weights(values: Values, setup: Setup) -> Weights:
-    """Weights of the shear-flexible plate's terms on the unit square.
+    """Weights of the shear-flexible plate, (n_draws, 6) as `SHEAR_TERMS`, and (n_draws, 3) masses as `SHEAR_MASSES`.
 
-    Parameters
-    ----------
-    values : dict of array
-        D_x, D_y, D_s (N m), G_xz and G_yz (Pa, positive) and the board's inputs; numbers or (n_draws,) arrays.
-        G_xz and G_yz as of `shear_moduli`.
-
-    Returns
-    -------
-    Weights
-        (n_draws, 6) stiffness weights in the order of `bayesplate.plate.shear.SHEAR_TERMS`, and (n_draws, 3) mass
-        weights in that of `SHEAR_MASSES`.
-
-    References
-    ----------
-    Mindlin (1951); S_x = kappa h G_xz and S_y = kappa h G_yz with kappa = 5/6, rotary inertia rho h^3 / 12.
+    S_x = kappa h G_xz and S_y = kappa h G_yz with kappa = 5/6, rotary inertia rho h^3 / 12 (Mindlin, 1951).
     """
     thin = term_weights(values, setup)
     length_x, length_y = vibrating_lengths(values, setup)
@@ -90,19 +64,9 @@ def shear_term_weights(values: Values, setup: Setup) -> Weights:
 
 
 def along_grain(base: Weights, values: Values, setup: Setup) -> Weights:
-    """What the modulus along the grain alone gives to the weights: E_x h^3 / 12 = D_x - nu_xy^2 D_y in K_xx.
+    """What the modulus along the grain alone gives to the weights `base`: E_x h^3 / 12 = D_x - nu_xy^2 D_y in K_xx.
 
-    Parameters
-    ----------
-    base : Weights
-        Of the plate's own terms, those of `term_weights` first.
-    values : dict of array
-        As given to `term_weights`.
-
-    Returns
-    -------
-    Weights
-        Arrays of the shapes of `base`, zero in all other terms.
+    The plate's own terms stand first in `base`; all others are zero in the result.
     """
     length_x, length_y = vibrating_lengths(values, setup)
     xx, _, mix, *_ = np.moveaxis(base.stiffness, -1, 0)
@@ -111,39 +75,7 @@ def along_grain(base: Weights, values: Values, setup: Setup) -> Weights:
     return Weights(along, np.zeros_like(base.mass))
 
 
-def rayleigh_coefficients(setup: Setup) -> NDArray[np.float64]:
-    """Rayleigh quotients of all products of a setup's beam functions, by term: (4, n_beams_x, n_beams_y) array.
-
-    They need no constants, and weighted with `term_weights` they give omega^2 a few per cent too high.
-    """
-    return product_coefficients(setup.ends_x, setup.ends_y)
-
-
-def rigidity_columns(values: Values, setup: Setup) -> NDArray[np.float64]:
+def rigidity_columns(values: Values, setup: Setup) -> Floats:
     """The matrix that takes (D_x, D_y, D_s) to the stiffness weights, at given inputs: (4, 3) array."""
-    unit = {name: np.zeros(3) for name in ("D_x", "D_y", "D_s")}
-    for i, name in enumerate(unit):
-        unit[name][i] = 1.0
+    unit = dict(zip(RIGIDITIES, np.eye(3), strict=True))
     return term_weights({**values, **unit}, setup).stiffness.T
-
-
-def paper_coefficients(coefficients: NDArray[np.float64], aspect_ratio: float, nu_xy: float) -> NDArray[np.float64]:
-    """The paper's a, b, c from the coefficients of the four terms on the unit square.
-
-    Parameters
-    ----------
-    coefficients : (n_modes, 4) array
-    aspect_ratio : float
-        L_x / L_y.
-
-    Returns
-    -------
-    (n_modes, 3) array
-        Columns a, b, c of omega^2 = lambda (a D_x + b D_y + c D_s), lambda = 1 / (rho h A^2).
-
-    References
-    ----------
-    Ducceschi et al., eq. (10) and (12).
-    """
-    xx, yy, mix, xy = coefficients.T
-    return np.column_stack([xx / aspect_ratio**2, yy * aspect_ratio**2 + nu_xy * mix, xy])

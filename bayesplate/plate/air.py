@@ -18,12 +18,10 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.plate.fields import Outline
 from bayesplate.plate.terms import Deflections
-
-Floats = NDArray[np.float64]
 
 _PANELS = 20
 """Panels along each side of a square, on the coarser of two lattices; the finer has half as many again."""
@@ -33,28 +31,12 @@ _EDGE_SHARE = 0.25
 
 
 def air_mass(deflections: Deflections, aspect_ratio: float, is_baffled: bool, outline: Outline | None = None) -> Floats:
-    """Mass of the air on given deflections, both faces wet.
+    """Mass of the air on given deflections, both faces wet: (n_vectors, n_vectors) array.
 
-    Both methods are of second order in the panels, so two lattices are extrapolated to none.
-
-    Parameters
-    ----------
-    aspect_ratio : float
-        L_x / L_y, of the mean width.
-    is_baffled : bool
-        In a rigid wall, or in the open.
-    outline : Outline, optional
-        Where the plate ends, if not with the rectangle.
-
-    Returns
-    -------
-    (n_vectors, n_vectors) array
-        For a rectangle of unit area in air of unit density; it goes with the area to the power 3/2.
-
-    References
-    ----------
-    Korotkin, Added Masses of Ship Structures, 6.3, for the kernel 1/R; the limit of a strip of width b in the open is
-    pi rho b^2 / 4 per length.
+    For a rectangle of unit area and ratio L_x / L_y (of the mean width) in air of unit density; it goes with the area
+    to the power 3/2. Both methods are of second order in the panels, so two lattices are extrapolated to none.
+    (Korotkin, Added Masses of Ship Structures, 6.3, for the kernel 1/R; the limit of a strip of width b in the open is
+    pi rho b^2 / 4 per length.)
     """
     coarse, fine = (_on_lattice(deflections, aspect_ratio, is_baffled, outline, n) for n in (1.0, _REFINED))
     mass = fine + (fine - coarse) / (_REFINED**2 - 1.0)
@@ -62,11 +44,7 @@ def air_mass(deflections: Deflections, aspect_ratio: float, is_baffled: bool, ou
 
 
 def _on_lattice(
-    deflections: Deflections,
-    aspect_ratio: float,
-    is_baffled: bool,
-    outline: Outline | None,
-    refinement: float,
+    deflections: Deflections, aspect_ratio: float, is_baffled: bool, outline: Outline | None, refinement: float
 ) -> Floats:
     shape = _lattice(aspect_ratio, refinement)
     sides = np.sqrt(aspect_ratio), 1.0 / np.sqrt(aspect_ratio)
@@ -129,6 +107,6 @@ def _dipoles(shape: tuple[int, int], steps: tuple[float, float]) -> Floats:
 
 
 def _between_panels(by_offset: Floats, shape: tuple[int, int]) -> Floats:
-    """From a table over offsets, no offset in its middle, to a matrix over pairs of panels."""
+    """Matrix over pairs of panels from a table over offsets, which has no offset in its middle."""
     i, j = (index.ravel() for index in np.indices(shape))
     return by_offset[shape[0] - 1 + i[:, None] - i, shape[1] - 1 + j[:, None] - j]

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.setup import Ends
 from bayesplate.plate.line import Line, line, rigid_degrees
 
-Floats = NDArray[np.float64]
 Beams = tuple[int, int]
 """Order of the beam functions along x and y whose product a mode resembles; (0, 0) is the lowest."""
 
@@ -21,15 +20,10 @@ _N_ELEMENTS = 40
 
 @dataclass(frozen=True, eq=False)
 class BeamFunctions:
-    """The lowest modes of a side, lowest first, of unit mean square; rigid motions come first.
-
-    Attributes
-    ----------
-    coefficients : (n_functions, n_beams) array
-    """
+    """The lowest modes of a side, lowest first, of unit mean square; rigid motions come first."""
 
     side: Line
-    coefficients: Floats
+    coefficients: Floats  # (n_functions, n_beams)
 
     def at(self, points: Floats) -> Floats:
         """Values at points of [0, 1]: (n_points, n_beams) array."""
@@ -46,7 +40,6 @@ class BeamFunctions:
 
 @lru_cache(maxsize=16)
 def beam_functions(ends: Ends) -> BeamFunctions:
-    """The beam functions of a side with these ends."""
     from scipy.linalg import eigh
 
     side = line(ends, _N_ELEMENTS, is_split=False)
@@ -80,10 +73,5 @@ def product_coefficients(ends_x: Ends, ends_y: Ends) -> Floats:
     )
     ones = np.ones(N_BEAMS)
     return np.stack(
-        [
-            np.outer(bent_x, ones),
-            np.outer(ones, bent_y),
-            2.0 * np.outer(mixed_x, mixed_y),
-            np.outer(turned_x, turned_y),
-        ]
+        [np.outer(bent_x, ones), np.outer(ones, bent_y), 2.0 * np.outer(mixed_x, mixed_y), np.outer(turned_x, turned_y)]
     )

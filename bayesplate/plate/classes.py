@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.arrays import Bools, Floats, Indices
 from bayesplate.plate.beams import is_rigid
 from bayesplate.plate.forms import Elements, Forms, each_weighed
 from bayesplate.plate.terms import (
@@ -25,8 +26,6 @@ from bayesplate.plate.terms import (
     Weights,
 )
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class SymmetryClass:
@@ -36,7 +35,7 @@ class SymmetryClass:
     parity: Parity
 
     @cached_property
-    def _numbering(self) -> tuple[dict[str, NDArray[np.intp]], int]:
+    def _numbering(self) -> tuple[dict[str, Indices], int]:
         """Number of each field's unknown by its functions along x and along y, -1 where there is none; how many."""
         x, y = self.plate.x, self.plate.y
         is_sheared = len(self.plate.kinematics.fields) > 1
@@ -63,7 +62,6 @@ class SymmetryClass:
 
     @property
     def n_dof(self) -> int:
-        """Number of unknowns."""
         return self.n_on_plate + self.plate.n_beside
 
     @cached_property
@@ -103,7 +101,7 @@ class SymmetryClass:
         return local.ravel() if both[0] == both[1] else np.concatenate([local.ravel(), local.swapaxes(1, 2).ravel()])
 
     @cached_property
-    def _pattern(self) -> tuple[NDArray[np.bool_], NDArray[np.intp], NDArray[np.int32], NDArray[np.int32]]:
+    def _pattern(self) -> tuple[Bools, Indices, NDArray[np.int32], NDArray[np.int32]]:
         """Which entries of the elements count, where each is stored, and the rows and column starts of these places."""
         own = {name: self._of_elements(name) for name in self.plate.kinematics.fields}
         rows, columns = [], []
@@ -118,7 +116,7 @@ class SymmetryClass:
         indptr = np.searchsorted(places, np.arange(self.n_dof + 1) * self.n_dof)
         return kept, stored_at, (places % self.n_dof).astype(np.int32), indptr.astype(np.int32)
 
-    def _of_elements(self, name: str) -> NDArray[np.intp]:
+    def _of_elements(self, name: str) -> Indices:
         """Number of each element's unknowns of a field, in the order of `Plate.elements`: (n_elements, 16) array."""
         x, y = self.plate.x.unknowns, self.plate.y.unknowns
         found = self._numbering[0][name][x[None, :, :, None], y[:, None, None, :]]
@@ -165,7 +163,7 @@ class SymmetryClass:
         return row
 
     def _on_unknowns(self, name: str, values: Floats) -> Floats:
-        """From (..., n_x, n_y) values on a field's functions to (..., n_dof) on the unknowns."""
+        """Values on the unknowns, (..., n_dof), from (..., n_x, n_y) values on a field's functions."""
         numbers = self._numbering[0][name].ravel()
         kept = numbers >= 0
         found = np.zeros((*values.shape[:-2], self.n_dof))
@@ -179,7 +177,6 @@ class SymmetryClass:
         return np.moveaxis(padded[numbers], -1, 0)
 
     def deflections(self, vectors: Floats) -> Deflections:
-        """Deflections of (n_dof, n_vectors) vectors."""
         return Deflections(self.plate.x, self.plate.y, self.parity, self._field("w", vectors))
 
     def strains(self, names: Sequence[str], vectors: Floats) -> dict[str, Floats]:
@@ -197,19 +194,9 @@ class SymmetryClass:
         return found
 
     def on_span(self, pencils: Sequence[tuple[Any, Any]], weights: Weights, vectors: Floats) -> tuple[Floats, Floats]:
-        """Stiffness and mass of some draws on the span of vectors, with the terms that exist on deflections only.
+        """Stiffness and mass of n draws on the span of (n_dof, n_vectors) vectors: (n, n_vectors, n_vectors).
 
-        Parameters
-        ----------
-        pencils : sequence of n pairs of sparse arrays
-            As of `pencil`.
-        weights : Weights
-            (n, n_terms) and (n, n_masses) arrays.
-        vectors : (n_dof, n_vectors) array
-
-        Returns
-        -------
-        two (n, n_vectors, n_vectors) arrays
+        The pencils, as of `pencil`, are joined by the terms that exist on deflections only.
         """
         found = []
         for side, (terms, own) in enumerate(zip((self.plate.stiffness, self.plate.masses), weights, strict=True)):
@@ -279,5 +266,5 @@ def _forms(first: Floats, second: Floats, weights: Floats) -> Floats:
 
 
 def _squares(first: Floats, second: Floats, weights: Floats) -> Floats:
-    """The same of each vector with itself."""
+    """Weighted sums of products of each vector with itself."""
     return np.asarray((first * second) @ weights)

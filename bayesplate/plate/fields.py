@@ -12,11 +12,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.plate.line import N_POINTS_CUT, Line
-
-Floats = NDArray[np.float64]
 
 Field = Callable[[Floats, Floats], Floats]
 """A factor over the unit square: of points x and y, arrays that broadcast, to an array of their common shape."""
@@ -27,18 +25,10 @@ Outline = Callable[[Floats], tuple[Floats, Floats]]
 
 @dataclass(frozen=True)
 class EdgeStrip:
-    """A field on the strip between the plate's outline and a narrower one, and nowhere else.
+    """A field on the strip between the plate's outline and a narrower one, and nowhere else."""
 
-    Attributes
-    ----------
-    inner : Outline
-        Nowhere beyond the plate's own.
-    field : Field or None
-        None is uniform.
-    """
-
-    inner: Outline
-    field: Field | None = None
+    inner: Outline  # nowhere beyond the plate's own
+    field: Field | None = None  # None: uniform
 
 
 Group = Literal["along", "bending", "shear", "mass", "rotary"]
@@ -50,19 +40,12 @@ _GHOST: dict[Group, float] = {"along": 1e-5, "bending": 1e-5, "shear": 1e-5, "ma
 
 @dataclass(frozen=True, eq=False)
 class Fabric:
-    """How the plate's own properties spread over it, and whether its grain runs at an angle.
+    """How the plate's own properties spread over it, and whether its grain runs at an angle."""
 
-    Attributes
-    ----------
-    fields : mapping
-        Fields that the terms of each group take, each with a weight of its own (None: uniform); absent: uniform alone.
-    is_turned : bool
-        Whether terms that couple bending and twist, and the two shear strains, join the plate's own.
-    """
-
+    # that the terms of each group take, each with a weight of its own (None: uniform); absent: uniform alone
     fields: Mapping[Group, Sequence[Field | EdgeStrip | None]] = field(default_factory=dict)
     outline: Outline | None = None
-    is_turned: bool = False
+    is_turned: bool = False  # terms that couple bending and twist, and the two shear strains, join the plate's own
 
     def weights(self, groups: Iterable[Group], x: Line, y: Line) -> dict[Group, list[Floats]]:
         """Weights of the plate's Gauss points for each field of each group: (n_x, n_y) arrays.
@@ -92,31 +75,16 @@ UNIFORM = Fabric()
 
 
 def layout(groups: Sequence[Group], counts: Mapping[Group, int]) -> list[tuple[int, int]]:
-    """Which of the plate's own terms takes which field: every term with its first field first, then with the others.
+    """Pairs of a term's index and the index of a field that it takes: every term with its first field first.
 
-    Parameters
-    ----------
-    groups : sequence of str
-        Group of each of the plate's own terms.
-    counts : mapping
-        Number of fields of each group.
-
-    Returns
-    -------
-    list of (int, int)
-        Index of the term and of the field.
+    Given are the group of each of the plate's own terms, and the number of fields of each group.
     """
     most = max(counts[group] for group in groups)
     return [(term, k) for k in range(most) for term, group in enumerate(groups) if k < counts[group]]
 
 
 def weights_within(x: Line, y: Line, outline: Outline | None = None, factor: Field | None = None) -> Floats:
-    """Weights of the plate's Gauss points in integrals of a field within an outline; None: uniform, everywhere.
-
-    Returns
-    -------
-    (n_x, n_y) array
-    """
+    """Weights of the plate's Gauss points, (n_x, n_y), in integrals of a field (None: uniform) within an outline."""
     if outline is None:
         uniform = np.outer(x.weights, y.weights)
         return uniform if factor is None else uniform * factor(x.points[:, None], y.points)

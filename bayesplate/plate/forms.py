@@ -11,8 +11,8 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.plate.beams import N_BEAMS, Beams, is_rigid
 from bayesplate.plate.fields import weights_within
 from bayesplate.plate.line import Line
@@ -29,8 +29,6 @@ from bayesplate.plate.terms import (
     Weights,
 )
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class Elements:
@@ -45,7 +43,7 @@ class Elements:
         return all(weight >= 0.0 for term, weight in self.elsewhere if isinstance(term, AtPlaces) and term.is_on_plate)
 
     def without_negative(self) -> Elements:
-        """The same without products at places of negative weight."""
+        """The elements without products at places of negative weight."""
         kept = (
             one for one in self.elsewhere if not (isinstance(one[0], AtPlaces) and one[0].is_on_plate and one[1] < 0.0)
         )
@@ -54,13 +52,7 @@ class Elements:
 
 @dataclass(frozen=True, eq=False)
 class Forms:
-    """The terms of a plate on two sides.
-
-    Attributes
-    ----------
-    stiffness, masses : tuple of (Term, (n_x, n_y) array or None)
-        The plate's own terms first; the array weighs the Gauss points of a term over the plate.
-    """
+    """The terms of a plate on two sides, its own first; an (n_x, n_y) array weighs a term's Gauss points."""
 
     kinematics: Kinematics
     x: Line
@@ -69,7 +61,7 @@ class Forms:
     masses: tuple[tuple[Term, Floats | None], ...]
 
     def with_terms(self, stiffness: Sequence[Term], masses: Sequence[Term]) -> Self:
-        """The same with further terms, which come after its own."""
+        """A plate with further terms, which come after its own."""
         stiff, inert = (
             tuple(
                 (one, weights_within(self.x, self.y, one.outline) if isinstance(one, OverPlate) else None)
@@ -87,13 +79,11 @@ class Forms:
 
     @property
     def n_beside(self) -> int:
-        """Number of coordinates beside the plate."""
         places = (term.n_beside for term, _ in (*self.stiffness, *self.masses) if isinstance(term, AtPlaces))
         return max(places, default=0)
 
     @property
     def is_projected(self) -> bool:
-        """Whether some terms exist on given deflections only."""
         return any(isinstance(term, OnDeflections) for term, _ in (*self.stiffness, *self.masses))
 
     def parity(self, beams: Beams) -> Parity:

@@ -11,11 +11,9 @@ from functools import cached_property, lru_cache
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Bools, Floats, Indices
 from bayesplate.board.setup import Ends
-
-Floats = NDArray[np.float64]
 
 Hold = Literal["clamped", "supported", "guided", "free"]
 """What an end holds: value and slope, the value, the slope, nothing. No card can ask for a guided end: it is a clamped
@@ -32,31 +30,20 @@ _LAYER = (1 / 4, 1 / 16)
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """The functions of one side on [0, 1]; value and slope at node i are the unknowns 2 i and 2 i + 1.
+    """The functions of one side on [0, 1]; value and slope at node i are the unknowns 2 i and 2 i + 1."""
 
-    Attributes
-    ----------
-    ends : tuple of str
-        Condition at 0 and at 1: "clamped", "supported" or "free". They name the modes and tell the rigid motions.
-    held : tuple of str
-        What the functions themselves hold there: the same, or less where an effect has put springs in place of a clamp.
-    is_split : bool
-        Whether this is the first half alone.
-    """
-
-    ends: Ends
-    held: Holds
-    is_split: bool
+    ends: Ends  # of the board: they name the modes and tell the rigid motions
+    held: Holds  # what the functions hold: the same, or less where an effect has put springs in place of a clamp
+    is_split: bool  # the first half alone
     basis: Any
 
     @property
     def nodes(self) -> Floats:
-        """Where the elements meet, from 0 to 1 or to the middle."""
+        """Ends of the elements, from 0 to 1 or to the middle."""
         return np.asarray(self.basis.mesh.p[0])
 
     @property
     def n_functions(self) -> int:
-        """Number of functions, those that an end holds among them."""
         return int(self.basis.N)
 
     @property
@@ -71,7 +58,7 @@ class Line:
 
     @cached_property
     def weights(self) -> Floats:
-        """Their weights in an integral over the whole side: (n_points,) array."""
+        """Weights of the Gauss points in an integral over the whole side: (n_points,) array."""
         return self.share * np.asarray(self.basis.dx).ravel()
 
     @cached_property
@@ -82,7 +69,7 @@ class Line:
         return np.moveaxis(np.array(orders), 0, -1)
 
     @cached_property
-    def unknowns(self) -> NDArray[np.intp]:
+    def unknowns(self) -> Indices:
         """Unknowns of each element: (n_elements, 4) array."""
         return np.asarray(self.basis.element_dofs.T, dtype=np.intp)
 
@@ -115,7 +102,7 @@ class Line:
         rows[np.arange(len(nodes)), [2 * node + order for node in nodes]] = 1.0
         return rows, np.full(len(nodes), self.share)
 
-    def kept(self, parity: int, is_sheared: bool) -> NDArray[np.bool_]:
+    def kept(self, parity: int, is_sheared: bool) -> Bools:
         """Which functions the deflection has: (n_functions,) array.
 
         On a shear-flexible plate it keeps its slope at a clamp, where it stands at the angle of the shear strain.
@@ -123,7 +110,7 @@ class Line:
         held = {"clamped": (True, not is_sheared), "supported": (True, False), "guided": (False, not is_sheared)}
         return self._without([held.get(end, (False, False)) for end in self.held], parity)
 
-    def kept_strain(self, parity: int) -> NDArray[np.bool_]:
+    def kept_strain(self, parity: int) -> Bools:
         """Which functions the shear strain along this side has: where the turning is held, not its value."""
         return self._without([(end in ("clamped", "guided"), False) for end in self.held], 1 - parity)
 
@@ -133,7 +120,7 @@ class Line:
         nodes = [(0, self.held[0])] if self.is_split else [(0, self.held[0]), (last, self.held[1])]
         return [(value, value + 1) for value, end in nodes if end in ("clamped", "guided")]
 
-    def _without(self, held: list[tuple[bool, bool]], parity: int) -> NDArray[np.bool_]:
+    def _without(self, held: list[tuple[bool, bool]], parity: int) -> Bools:
         first, last = held
         if self.is_split:
             last = (parity == 1, parity == 0)
@@ -156,19 +143,11 @@ def rigid_degrees(ends: Ends) -> tuple[int, ...]:
 
 
 def graded_nodes(ends: Holds, n_elements: int) -> Floats:
-    """Equal elements, save that the one at each free end is split at a quarter and at a sixteenth of its length.
+    """Nodes of equal elements, save that the one at each free end is split at 1/4 and 1/16 of its length.
 
-    Along a free edge the twist of a shear-flexible plate dies out over about a third of the thickness times
-    sqrt(G_xy / G_xz): a layer too narrow for as many equal elements, whose frequencies lie up to 3 cents too high.
-
-    Parameters
-    ----------
-    n_elements : int
-        All elements, the split ones among them; too few to be split stay equal.
-
-    Returns
-    -------
-    (n_elements + 1,) array
+    Along a free edge the twist of a shear-flexible plate dies out over about a third of the thickness times sqrt(G_xy /
+    G_xz): a layer too narrow for as many equal elements, whose frequencies lie up to 3 cents too high. The split ones
+    count among all elements; too few to be split stay equal.
     """
     n_equal = n_elements - len(_LAYER) * ends.count("free")
     if n_equal < 3:
@@ -188,21 +167,9 @@ def line(
 ) -> Line:
     """The functions of one side; the result is shared, so it must not be changed.
 
-    Parameters
-    ----------
-    ends : tuple of str
-        Condition at 0 and at 1.
-    n_elements : int
-        Number of elements of the whole side.
-    is_sheared : bool
-        A side of a shear-flexible plate, whose elements are graded towards free ends.
-    is_split : bool
-        Whether the first half will do where both ends are alike; not so if something else on the plate tells the two
-        halves apart, or if an element lies across the middle.
-    held : tuple of str, optional
-        What the ends hold where that is less than `ends` says.
-    n_points : int
-        Gauss points per element.
+    `is_sheared`: of a shear-flexible plate, graded towards free ends. `is_split`: the first half will do where both
+    ends are alike; not so if something else on the plate tells the halves apart, or an element lies across the middle.
+    `held`: what the ends hold where that is less than `ends` says.
     """
     from skfem import Basis, ElementLineHermite, MeshLine
 

@@ -19,13 +19,12 @@ from itertools import combinations_with_replacement
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.setup import Ends
 from bayesplate.plate.fields import Field
 from bayesplate.plate.terms import Deflections
 
-Floats = NDArray[np.float64]
 Curvature = Literal["bow", "cup", "twist"]
 
 CURVATURES: tuple[Curvature, ...] = ("bow", "cup", "twist")
@@ -45,27 +44,14 @@ _DOUBLED = np.array([1.0, 1.0, 2.0])
 
 @dataclass(frozen=True, eq=False)
 class _Matrices:
-    """Sparse matrices of a membrane of unit area.
+    """Sparse matrices of a membrane of unit area."""
 
-    Attributes
-    ----------
-    stiffness : tuple of (n, n) sparse arrays
-        By the moduli.
-    loads : tuple of (n, n_w) sparse arrays
-        Of a stress along x, along y, and in shear, that goes with the deflection at the nodes.
-    mass : (n_w, n_w) sparse array
-        Integral of the product of two deflections.
-    places : (2, n_w) array
-        Where the deflections are, as fractions of the sides.
-    held : (n_held,) array of int
-        Unknowns that edges hold.
-    """
-
-    stiffness: tuple[Any, ...]
+    stiffness: tuple[Any, ...]  # (n, n), by the moduli
+    # (n, n_w): of a stress along x, along y, and in shear, that goes with the deflection at the nodes
     loads: tuple[Any, ...]
-    mass: Any
-    places: Floats
-    held: NDArray[np.intp]
+    mass: Any  # (n_w, n_w): integral of the product of two deflections
+    places: Floats  # (2, n_w): of the deflections, as fractions of the sides
+    held: Indices  # (n_held,): unknowns that edges hold
 
 
 def membrane_terms(
@@ -75,24 +61,11 @@ def membrane_terms(
     curvatures: tuple[Curvature, ...] = CURVATURES,
     thickness: Field | None = None,
 ) -> Floats:
-    """Membrane energies of deflections, by pairs of curvatures and by the moduli.
+    """Membrane energies, (n_pairs * 4, n_vectors, n_vectors), by `curvature_pairs` and by the moduli.
 
-    Parameters
-    ----------
-    aspect_ratio : float
-        L_x / L_y.
-    moduli : tuple of 4 floats
-        Q_11, Q_12, Q_22, Q_66 at which the in-plane fields are solved; their ratios count.
-    curvatures : tuple of str
-        Those that the plate has.
-    thickness : Field, optional
-        What the membrane's stiffness goes with over the plate.
-
-    Returns
-    -------
-    (n_pairs * 4, n_vectors, n_vectors) array
-        For a plate of unit area: what a unit of the product of the two curvatures (each pair once, a cross term both
-        ways; `curvature_pairs`) and of the modulus gives to the stiffness.
+    For a plate of unit area: what a unit of the product of the two curvatures (each pair once, a cross term both ways)
+    and of the modulus gives to the stiffness. The in-plane fields are solved at the `moduli` Q_11, Q_12, Q_22, Q_66, of
+    which the ratios count; the stiffness of the membrane goes with the `thickness` over the plate.
     """
     held = deflections.x.ends, deflections.y.ends, aspect_ratio, thickness
     made = _matrices(*held)
@@ -136,7 +109,7 @@ def _solved(held: _Held, moduli: tuple[float, ...], curvature: int, loads: Seque
 
 
 @lru_cache(maxsize=16)
-def _factors(held: _Held, moduli: tuple[float, ...]) -> tuple[NDArray[np.intp], Any]:
+def _factors(held: _Held, moduli: tuple[float, ...]) -> tuple[Indices, Any]:
     """Unknowns that no edge holds, and the factors of their stiffness."""
     from scipy.sparse import csc_array, diags_array
     from scipy.sparse.linalg import splu

@@ -6,15 +6,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.plate.beams import Beams, beam_functions, product_coefficients
 from bayesplate.plate.classes import SymmetryClass
 from bayesplate.plate.plate import Plate
 from bayesplate.plate.solve import ClassModes, Modes, solve_classes
 from bayesplate.plate.terms import Parity, Weights
-
-Floats = NDArray[np.float64]
 
 CERTAIN = 0.75
 """Correlation with its product of beam functions below which a mode's name is "cannot tell"."""
@@ -30,24 +28,23 @@ _AHEAD = 12
 
 @dataclass(frozen=True)
 class Place:
-    """Where a named mode stands: its class, its rank there, and how well the name fits.
-
-    Attributes
-    ----------
-    rank : int
-        Position among the elastic modes of the class, from 0.
-    correlation : float
-        Between the mode's shape and the product of beam functions, 0 to 1.
-    """
+    """The place of a named mode: its class, its rank there, and how well the name fits."""
 
     parity: Parity
-    rank: int
-    correlation: float
+    rank: int  # among the elastic modes of the class, from 0
+    correlation: float  # between its shape and the product of beam functions, 0 to 1
 
     @property
     def is_certain(self) -> bool:
-        """Whether the shape supports the name."""
         return self.correlation >= CERTAIN
+
+
+def reaching(places: Iterable[Place]) -> dict[Parity, int]:
+    """How many of the lowest modes of each class hold all places."""
+    found: dict[Parity, int] = {}
+    for place in places:
+        found[place.parity] = max(found.get(place.parity, 0), place.rank + 1)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,19 +58,9 @@ class Found:
 
 
 def name_shapes(own: SymmetryClass, vectors: Floats, on_plate: Floats) -> list[tuple[Beams, float]]:
-    """Beam product and correlation of each mode of a class, each product given to one mode only.
+    """Beam product and correlation of each mode of a class, its lowest ones, each product given to one mode only.
 
-    Parameters
-    ----------
-    vectors : (n_dof, n_modes) array
-        The lowest modes of the class, of any size.
-    on_plate : (n_modes,) array
-        Share of the kinetic energy of each that is the plate's, with all that it carries along.
-
-    Returns
-    -------
-    list of (tuple of int, float)
-        In the order of the modes.
+    `on_plate` is the share of the kinetic energy of each that is the plate's, with all that it carries along.
     """
     parts, squares = beam_parts(own, vectors)
     products, named = own.plate.elastic_products[own.parity], name_parts(fits(parts, np.diagonal(squares), on_plate))
@@ -81,17 +68,7 @@ def name_shapes(own: SymmetryClass, vectors: Floats, on_plate: Floats) -> list[t
 
 
 def beam_parts(own: SymmetryClass, vectors: Floats) -> tuple[Floats, Floats]:
-    """What deflections of a class have of each product of beam functions that bends, and their mean products.
-
-    Parameters
-    ----------
-    vectors : (n_dof, n_vectors) array
-
-    Returns
-    -------
-    (n_vectors, n_products) and (n_vectors, n_vectors) arrays
-        In the order of `Plate.elastic_products`.
-    """
+    """What deflections have of each of `elastic_products`, (n_vectors, n_products), and their mean products."""
     x, y = own.plate.x, own.plate.y
     deflections = own.strains(["w"], vectors)["w"].reshape(-1, x.points.size, y.points.size)
     along_x, along_y = (side.weights * beam_functions(side.ends).at(side.points).T for side in (x, y))
@@ -104,33 +81,15 @@ def beam_parts(own: SymmetryClass, vectors: Floats) -> tuple[Floats, Floats]:
 def fits(parts: Floats, squares: Floats, on_plate: Floats) -> Floats:
     """How well each shape fits each product: its correlation by the root of the plate's share of the motion.
 
-    A shape is measured by itself, for the water that a plate carries along may weigh ten times what it weighs, and
-    changes no shape by it. A magnet that bounces on its spring bends the plate a little, in a shape like that of the
-    lowest mode: by the share it takes no name.
-
-    Parameters
-    ----------
-    parts : (n_modes, n_products) array
-    squares : (n_modes,) array
-        Mean square of the deflection.
-    on_plate : (n_modes,) array
+    `squares` are the mean squares of the deflections: a shape is measured by itself, for the water that a plate carries
+    along may weigh ten times what it weighs, and changes no shape by it. A magnet that bounces on its spring bends the
+    plate a little, in a shape like that of the lowest mode: by the share it takes no name.
     """
     return np.asarray(parts * np.sqrt(np.maximum(on_plate, 0.0) / squares)[:, None])
 
 
 def name_parts(parts: Floats) -> list[tuple[int, float]]:
-    """Product and correlation of each mode, each product given to one mode only.
-
-    Parameters
-    ----------
-    parts : (n_modes, n_products) array
-        What each mode has of each product, 1 being the whole of it.
-
-    Returns
-    -------
-    list of (int, float)
-        Which product, and the size of its part.
-    """
+    """Product and correlation of each mode, from what it has of each (1: all); a product goes to one mode only."""
     from scipy.optimize import linear_sum_assignment
 
     rows, columns = linear_sum_assignment(parts**2, maximize=True)
@@ -148,24 +107,10 @@ def name_modes(modes: Modes) -> list[tuple[Beams, float]]:
 
 
 def find(plate: Plate, weights: Weights, wanted: Iterable[Beams]) -> dict[Beams, Found]:
-    """Find each wanted name among the modes of a plate.
+    """Each wanted name among the modes of a plate at the weights of one draw.
 
-    Parameters
-    ----------
-    weights : Weights
-        Of one draw.
-    wanted : iterable of (int, int)
-        Orders of the beam functions along x and y.
-
-    Returns
-    -------
-    dict of Found
-        For every wanted name; a name without a certain mode gets its best remaining one, with the low correlation.
-
-    Raises
-    ------
-    KeyError
-        If a name is no elastic mode of this plate or lies beyond the modes that can be resolved.
+    A name without a certain mode gets its best remaining one, with the low correlation. KeyError if a name is no
+    elastic mode of this plate or lies beyond the modes that can be resolved.
     """
     names = list(wanted)
     # With as many modes as products a class has given all its names, and with more some modes would have none.
@@ -207,14 +152,13 @@ def _expected_ranks(plate: Plate, weights: Weights, names: list[Beams]) -> dict[
 
 
 def _places(modes: ClassModes, names: Sequence[Beams]) -> dict[Beams, Place]:
-    """Those of the wanted names that some of the lowest modes of a class have."""
+    """Places of those wanted names that some of the lowest modes of a class have."""
     of_each = name_shapes(modes.own, modes.vectors, modes.on_plate)
     parity = modes.own.parity
     return {name: Place(parity, rank, fit) for rank, (name, fit) in enumerate(of_each) if name in names}
 
 
 def _with_energies(solved: Mapping[Parity, ClassModes], places: Mapping[Beams, Place]) -> dict[Beams, Found]:
-    """The modes at some places."""
     found = {}
     for parity, modes in solved.items():
         own = {name: place for name, place in places.items() if place.parity == parity}

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from bayesplate.arrays import Bools, Floats
 
 _SINGULAR = 1e-13
 """Share of the largest eigenvalue of a mass, below which the least is rounding: positive or not, it has no factor."""
@@ -26,7 +25,7 @@ def pencil_modes(stiffness: Floats, mass: Floats) -> tuple[Floats, Floats]:
     return np.where(is_mass[:, None], values, np.nan), np.swapaxes(inverse, -1, -2) @ turned
 
 
-def _whitened(stiffness: Floats, mass: Floats) -> tuple[Floats, NDArray[np.bool_], Floats]:
+def _whitened(stiffness: Floats, mass: Floats) -> tuple[Floats, Bools, Floats]:
     """Stiffness in coordinates in which the mass is one; which masses are positive; inverses of their factors.
 
     What is not finite never reaches a solver of eigenvalues, which would end everything at such a draw.

@@ -12,16 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
+from bayesplate.arrays import Floats
 from bayesplate.plate.classes import SymmetryClass
 from bayesplate.plate.fields import UNIFORM, Fabric, Group, layout
 from bayesplate.plate.forms import Forms
 from bayesplate.plate.line import Line
 from bayesplate.plate.terms import Kinematics, OverPlate, Pair, Parity, Term
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,19 +30,13 @@ class Plate(Forms):
         return tuple(SymmetryClass(self, parity) for parity in self.parities)
 
     def symmetry_class(self, parity: Parity) -> SymmetryClass:
-        """The class of that parity."""
         return next(one for one in self.classes if one.parity == parity)
 
 
 def plate_of(kinematics: Kinematics, x: Line, y: Line, fabric: Fabric = UNIFORM) -> Plate:
-    """A plate on two sides, with its own terms alone.
+    """A plate on two sides, with its own terms alone, as often as `layout` has fields for them.
 
-    Parameters
-    ----------
-    x, y : Line
-        Whole along a side along which the halves differ.
-    fabric : Fabric
-        Varying properties repeat the plate's own terms in the order of `bayesplate.plate.fields.layout`.
+    A line is whole along a side along which the halves differ.
     """
     groups = kinematics.groups(fabric.is_turned)
     weights = fabric.weights({*groups[0], *groups[1]}, x, y)

@@ -12,14 +12,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.plate.beams import Beams
 from bayesplate.plate.naming import Place, fits, name_parts
 from bayesplate.plate.pencils import pencil_modes, pencil_values, stepped
 from bayesplate.plate.terms import Parity, Weights
-
-Floats = NDArray[np.float64]
 
 SPARE = 4
 """Modes above the highest wanted one of a class that the basis is made for too."""
@@ -29,37 +27,17 @@ _BATCH = 512
 
 @dataclass(frozen=True, eq=False)
 class ReducedClass:
-    """One symmetry class on few vectors: its modes at the centre, mass-orthonormal there, and what completes them.
-
-    Attributes
-    ----------
-    stiffness : (n_terms, r, r) array
-        Projected stiffness terms.
-    masses : (n_masses, r, r) array
-        Projected mass terms.
-    n_kept : int
-        How many of the vectors, the first ones, are modes at the centre from which those of a draw are found.
-    products : tuple of (int, int)
-        Orders of the products of beam functions that name its modes.
-    parts : (r, n_products) array
-        What each vector has of these.
-    squares : (r, r) array
-        Mean products of the vectors' deflections.
-    beside : (n_masses, r, r) array
-        What each mass term gives to the coordinates beside the plate.
-    n_rigid : int
-        Rigid motions in the basis: the lowest eigenvalues, which are left out.
-    """
+    """One symmetry class on few vectors: its modes at the centre, mass-orthonormal there, and what completes them."""
 
     parity: Parity
-    stiffness: Floats
-    masses: Floats
-    n_kept: int
-    products: tuple[Beams, ...]
-    parts: Floats
-    squares: Floats
-    beside: Floats
-    n_rigid: int = 0
+    stiffness: Floats  # (n_terms, r, r)
+    masses: Floats  # (n_masses, r, r)
+    n_kept: int  # of the vectors, the first ones: modes at the centre from which those of a draw are found
+    products: tuple[Beams, ...]  # of beam functions that name its modes
+    parts: Floats  # (r, n_products): what each vector has of these
+    squares: Floats  # (r, r): mean products of the vectors' deflections
+    beside: Floats  # (n_masses, r, r): what each mass term gives to the coordinates beside the plate
+    n_rigid: int = 0  # rigid motions in the basis: the lowest eigenvalues, which are left out
 
     def eigenvalues(self, weights: Weights) -> Floats:
         """Elastic eigenvalues of many draws, increasing: (n_draws, n_kept - n_rigid) array, s^-2.
@@ -90,13 +68,10 @@ class ReducedClass:
         """Mass matrices of many draws on the basis: (n_draws, r, r) array."""
         return _weighted(weights.mass, self.masses)
 
-    def ranks(self, weights: Weights, n_modes: int, least: float = 0.0) -> NDArray[np.intp]:
-        """Which of the lowest elastic modes each of `products` names, with at least that correlation, at many draws.
+    def ranks(self, weights: Weights, n_modes: int, least: float = 0.0) -> Indices:
+        """Rank of the mode that each of `products` names with at least that correlation: (n_draws, n_products).
 
-        Returns
-        -------
-        (n_draws, n_products) array of int
-            From 0; `n_modes` where it names none of them, -1 at a draw that is no plate.
+        From 0; `n_modes` where it names none of the lowest elastic modes, -1 at a draw that is no plate.
         """
         found = np.full((len(weights.stiffness), len(self.products)), -1, dtype=np.intp)
         values, vectors = self.modes(weights, n_modes)
@@ -128,19 +103,11 @@ class ReducedClass:
 
 @dataclass(frozen=True, eq=False)
 class ReducedOrderModel:
-    """The plate on a basis of few vectors in each class that holds wanted modes.
+    """The plate on a basis of few vectors in each class that holds wanted modes."""
 
-    Attributes
-    ----------
-    places : tuple of Place
-        The wanted modes, in the caller's order.
-    worst_cents : float
-        Largest error against full solves that were held out when the basis was built.
-    """
-
-    places: tuple[Place, ...]
+    places: tuple[Place, ...]  # the wanted modes, in the caller's order
     classes: tuple[ReducedClass, ...]
-    worst_cents: float
+    worst_cents: float  # largest error against full solves that were held out
 
     def eigenvalues(self, weights: Weights) -> Floats:
         """Eigenvalue of each wanted mode for many draws: (n_draws, n_modes) array, s^-2."""
@@ -150,21 +117,12 @@ class ReducedOrderModel:
             values[:, columns] = own.eigenvalues(weights)[:, ranks]
         return values
 
-    def ranks(self, weights: Weights, least: float = 0.0) -> dict[Beams, NDArray[np.intp]]:
-        """Rank in its class of the mode that each product of beam functions names, at many draws.
+    def ranks(self, weights: Weights, least: float = 0.0) -> dict[Beams, Indices]:
+        """Rank in its class of the mode that each product names with at least that correlation: (n_draws,).
 
-        Parameters
-        ----------
-        least : float
-            Correlation of its shape with the product from which on a mode has that name.
-
-        Returns
-        -------
-        dict of (n_draws,) array of int
-            By the orders along x and y; those that name none of the lowest modes have the highest rank of all. -1 at a
-            draw that is no plate.
+        A product that names none of the lowest modes has the highest rank of all; -1 at a draw that is no plate.
         """
-        found: dict[Beams, NDArray[np.intp]] = {}
+        found: dict[Beams, Indices] = {}
         for own in self.classes:
             n_modes = max(self._of(own)[1]) + 1 + SPARE
             found |= dict(zip(own.products, own.ranks(weights, n_modes, least).T, strict=True))
@@ -179,7 +137,7 @@ class ReducedOrderModel:
         return stiffness, mass
 
     def _of(self, own: ReducedClass) -> tuple[list[int], list[int]]:
-        """Which of the wanted modes are of a class, and their ranks there."""
+        """Indices of the wanted modes that are of a class, and their ranks there."""
         both = [(i, place.rank) for i, place in enumerate(self.places) if place.parity == own.parity]
         return [i for i, _ in both], [rank for _, rank in both]
 

@@ -9,17 +9,15 @@ from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.plate.classes import SymmetryClass
-from bayesplate.plate.naming import Place, beam_parts
+from bayesplate.plate.naming import Place, beam_parts, reaching
 from bayesplate.plate.pencils import pencil_modes, pencil_values, stepped
 from bayesplate.plate.plate import Plate
 from bayesplate.plate.reduced import SPARE, ReducedClass, ReducedOrderModel
 from bayesplate.plate.solve import ClassModes, solve_classes
 from bayesplate.plate.terms import Parity, Weights
-
-Floats = NDArray[np.float64]
 
 _FEW = 9
 """Training points, the centre among them, that are always solved, all of them."""
@@ -42,31 +40,15 @@ def reduced_order_model(
     held_out: Sequence[Weights],
     tolerance: float,
 ) -> ReducedOrderModel:
-    """Project a plate on its modes at `centre` and `around` it, and check the result at the points `held_out`.
+    """Project a plate on its modes at `centre` and `around` it, and check it at the points `held_out`, in cents.
 
     Of many points around the first half will do if the error at the held-out ones stays within the tolerance and the
     basis short. While that is not so, the second half joins the basis, then half of the held-out points. The check is
     made at those that did not join: they lie as far out as the others, and none was chosen for its error, so that it is
-    an honest sample of the error over the region.
-
-    Parameters
-    ----------
-    places : sequence of Place
-        The modes wanted.
-    centre : Weights
-        At the estimate.
-    around, held_out : sequences of Weights
-        At least one is held out. Points that are no plates are left out.
-    tolerance : float, cents
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If the centre or none of the held-out points is a plate.
+    an honest sample of the error over the region. Points that are no plates are left out; LinAlgError if the centre or
+    all that are held out are none.
     """
-    n_modes: dict[Parity, int] = {}
-    for place in places:
-        n_modes[place.parity] = max(n_modes.get(place.parity, 0), place.rank + 1)
+    n_modes = reaching(places)
     n_trained = {parity: n + SPARE for parity, n in n_modes.items()}
     training = list(around)
     n_first = len(training) if len(training) < _FEW else (1 + len(training)) // 2
@@ -109,11 +91,7 @@ def _solved(plate: Plate, points: Iterable[Weights], n_modes: dict[Parity, int])
 
 
 def _reduced(
-    own: SymmetryClass,
-    middle: _Solved,
-    snapshots: Sequence[_Solved],
-    checks: Sequence[_Solved],
-    tolerance: float,
+    own: SymmetryClass, middle: _Solved, snapshots: Sequence[_Solved], checks: Sequence[_Solved], tolerance: float
 ) -> tuple[ReducedClass, float]:
     """The smallest basis of a class that is within the tolerance at the points that check it, and its error there."""
     parity = own.parity

@@ -19,11 +19,10 @@ from __future__ import annotations
 from functools import lru_cache
 
 from bayesplate.board.setup import Ends
-from bayesplate.plate.fields import Group
 from bayesplate.plate.line import line
 from bayesplate.plate.plate import Plate, plate_of
 from bayesplate.plate.terms import Derivative, Kinematics
-from bayesplate.plate.thin import THIN, THIN_TERMS, thin_groups
+from bayesplate.plate.thin import THIN, THIN_TERMS
 
 SHEAR_TERMS = (*THIN_TERMS, "shear_x", "shear_y")
 SHEAR_MASSES = ("board", "rotary_x", "rotary_y")
@@ -35,17 +34,6 @@ SHEAR_ELEMENTS_PER_SIDE = 16
 """Elements per side for `bayesplate.plate.mesh.mesh`: six modes within 0.15 cent, twelve within 0.3."""
 
 _TWIST = (Derivative(1.0, "w", 1, 1), Derivative(-0.5, "g_x", 0, 1), Derivative(-0.5, "g_y", 1, 0))
-
-
-def shear_groups(is_turned: bool = False) -> tuple[tuple[Group, ...], tuple[Group, ...]]:
-    """Group of each stiffness and of each mass term that is the shear-flexible plate's own.
-
-    Where the grain runs at an angle, the terms that couple bending with twist and the two shear strains come last.
-    """
-    bending, _ = thin_groups(is_turned)
-    own, coupling = bending[: len(THIN_TERMS)], bending[len(THIN_TERMS) :]
-    strains: tuple[Group, ...] = ("shear",) if is_turned else ()
-    return (*own, "shear", "shear", *coupling, *strains), ("mass", "rotary", "rotary")
 
 
 SHEAR_FLEXIBLE = Kinematics(
@@ -70,33 +58,20 @@ SHEAR_FLEXIBLE = Kinematics(
         ("shear_x", "shear_y"),
     ),
     masses=(("w", "w"), ("turn_x", "turn_x"), ("turn_y", "turn_y")),
-    groups=shear_groups,
+    groups_of_stiffnesses=(*THIN.groups_of_stiffnesses, "shear", "shear"),
+    turned_groups=(*THIN.turned_groups[:4], "shear", "shear", *THIN.turned_groups[4:], "shear"),
+    groups_of_masses=("mass", "rotary", "rotary"),
 )
 
 
 @lru_cache(maxsize=16)
 def shear_flexible_plate(ends_x: Ends, ends_y: Ends, n_x: int, n_y: int) -> Plate:
-    """The bare shear-flexible plate; the result is shared, so it must not be changed.
+    """The bare shear-flexible plate, its terms as `SHEAR_TERMS` and `SHEAR_MASSES`; shared, so it must not be changed.
 
     A free edge holds nothing. A supported one (a hard support) holds the deflection and the turning along the edge. A
     clamped one holds the turning across it as well, w_n = g_n: the deflection meets the clamp at the angle of the shear
-    strain.
-
-    Parameters
-    ----------
-    ends_x, ends_y : tuple of str
-        Condition at the two ends of each side: (x0, x1) and (y0, y1).
-    n_x, n_y : int
-        Numbers of elements along x and y, graded towards free edges.
-
-    Returns
-    -------
-    Plate
-        Stiffness terms in the order of `SHEAR_TERMS`, mass terms in that of `SHEAR_MASSES`.
-
-    References
-    ----------
-    Reissner (1945) and Mindlin (1951); the shear strains as unknowns in place of the turning: Endo and Kimura (2007).
+    strain. Reissner (1945) and Mindlin (1951); the shear strains as unknowns in place of the turning: Endo and Kimura
+    (2007).
     """
     x, y = (line(ends, n, is_sheared=True) for ends, n in ((ends_x, n_x), (ends_y, n_y)))
     return plate_of(SHEAR_FLEXIBLE, x, y)

@@ -9,15 +9,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.plate.beams import product_coefficients
 from bayesplate.plate.classes import SymmetryClass
 from bayesplate.plate.forms import Elements
 from bayesplate.plate.plate import Plate
 from bayesplate.plate.terms import Parity, Weights
-
-Floats = NDArray[np.float64]
 
 _SPARE_FOR_PROJECTED = 8
 _FIRST_OF_CLASS = 8
@@ -32,28 +30,15 @@ _SHIFT = -1e-2
 
 @dataclass(frozen=True, eq=False)
 class ClassModes:
-    """Lowest elastic modes of one symmetry class.
-
-    Attributes
-    ----------
-    eigenvalues : (n_modes,) array
-        omega^2, s^-2, increasing; rigid motions are left out.
-    vectors : (n_dof, n_modes) array
-        Mass-normalised.
-    rigid : (n_dof, n_rigid) array
-        The class's rigid motions, mass-normalised.
-    on_plate : (n_modes,) array
-        Share of the kinetic energy of each mode that is not of coordinates beside the plate.
-    """
+    """Lowest elastic modes of one symmetry class."""
 
     own: SymmetryClass
-    eigenvalues: Floats
-    vectors: Floats
-    rigid: Floats
-    on_plate: Floats
+    eigenvalues: Floats  # (n_modes,): omega^2, s^-2, increasing; rigid motions are left out
+    vectors: Floats  # (n_dof, n_modes), mass-normalised
+    rigid: Floats  # (n_dof, n_rigid): the rigid motions, mass-normalised
+    on_plate: Floats  # (n_modes,): share of the kinetic energy that is not of coordinates beside the plate
 
-    def of(self, ranks: Sequence[int] | NDArray[np.intp]) -> ClassModes:
-        """Some of the modes."""
+    def of(self, ranks: Sequence[int] | Indices) -> ClassModes:
         own = list(ranks)
         return replace(
             self, eigenvalues=self.eigenvalues[own], vectors=self.vectors[:, own], on_plate=self.on_plate[own]
@@ -68,19 +53,9 @@ class ClassModes:
 
 
 def solve_classes(plate: Plate, weights: Weights, n_modes: Mapping[Parity, int]) -> dict[Parity, ClassModes]:
-    """Lowest elastic modes of some symmetry classes.
+    """The lowest elastic modes, `n_modes` of each symmetry class, at the weights of one draw.
 
-    Parameters
-    ----------
-    weights : Weights
-        Of one draw.
-    n_modes : dict of int
-        How many of each class.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If the weights are those of no plate.
+    LinAlgError if the weights are those of no plate.
     """
     elements = plate.elements(weights)
     return {parity: _solved(plate.symmetry_class(parity), elements, weights, n) for parity, n in n_modes.items()}
@@ -150,25 +125,13 @@ def _shift_below(own: SymmetryClass, weights: Weights) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Modes of a plate in the order of their frequencies.
-
-    Attributes
-    ----------
-    eigenvalues : (n_modes,) array
-        omega^2, s^-2.
-    parities : tuple of Parity
-        Symmetry class of each mode.
-    ranks : (n_modes,) array of int
-        Position of each mode among the elastic modes of its class, from 0.
-    classes : dict of ClassModes
-        The modes of each symmetry class, at least these.
-    """
+    """Modes of a plate in the order of their frequencies."""
 
     plate: Plate
-    eigenvalues: Floats
+    eigenvalues: Floats  # (n_modes,): omega^2, s^-2
     parities: tuple[Parity, ...]
-    ranks: NDArray[np.intp]
-    classes: Mapping[Parity, ClassModes]
+    ranks: Indices  # (n_modes,): among the elastic modes of its class, from 0
+    classes: Mapping[Parity, ClassModes]  # the modes of each symmetry class, at least these
 
     @property
     def coefficients(self) -> Floats:
@@ -188,7 +151,6 @@ class Modes:
 
     @cached_property
     def by_class(self) -> dict[Parity, ClassModes]:
-        """These modes, class by class."""
         found = {}
         for parity in dict.fromkeys(self.parities):
             found[parity] = self.classes[parity].of(self.ranks[self.rows(parity)])
@@ -200,7 +162,6 @@ class Modes:
         return np.concatenate([of_class[parity] for parity in self.by_class])[order]
 
     def rows(self, parity: Parity) -> list[int]:
-        """Which of the modes are of a class."""
         return [i for i, one in enumerate(self.parities) if one == parity]
 
     def displacement(self, x: Floats, y: Floats) -> Floats:
@@ -208,20 +169,15 @@ class Modes:
         return self.in_order({p: one.own.deflections(one.vectors).on(x, y) for p, one in self.by_class.items()})
 
     def displacement_across(self, x: Floats, y: Floats) -> Floats:
-        """The same at points y, (n_x, n_y), of their own at each x, (n_x,)."""
+        """Shapes at points y, (n_x, n_y), of their own at each x, (n_x,)."""
         return self.in_order({p: one.own.deflections(one.vectors).across(x, y) for p, one in self.by_class.items()})
 
 
 def solve(plate: Plate, weights: Weights, n_modes: int) -> Modes:
-    """Lowest `n_modes` elastic modes of a plate.
+    """Lowest `n_modes` elastic modes of a plate at the weights of one draw.
 
     Each class is solved for a few modes more than its share, and for more again until no class can hide a mode below
     the highest that is returned.
-
-    Parameters
-    ----------
-    weights : Weights
-        Of one draw.
     """
     asked = dict.fromkeys(plate.parities, -(-n_modes // len(plate.parities)) + 2)
     solved = solve_classes(plate, weights, asked)

@@ -10,12 +10,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.plate.fields import Group, Outline, weights_within
 from bayesplate.plate.line import Line
-
-Floats = NDArray[np.float64]
 
 
 class Weights(NamedTuple):
@@ -28,7 +26,6 @@ class Weights(NamedTuple):
     mass: Floats
 
     def at(self, draw: int) -> Weights:
-        """The weights of one draw."""
         return Weights(self.stiffness[draw], self.mass[draw])
 
 
@@ -56,25 +53,19 @@ Pair = tuple[str, str]
 
 
 class Kinematics(NamedTuple):
-    """How a plate deforms.
+    """How a plate deforms."""
 
-    Attributes
-    ----------
-    fields : tuple of str
-        What is unknown: the deflection "w", then the shear strains if there are any.
-    strains : mapping
-        By name; "turn_x" and "turn_y" are how the cross-sections turn.
-    stiffnesses, masses : tuple of Pair
-        Of each of the plate's own terms, those that a turned grain adds last.
-    groups : callable
-        From whether the grain runs at an angle to the group of each of the plate's own stiffness and mass terms.
-    """
-
-    fields: tuple[str, ...]
-    strains: Mapping[str, Strain]
-    stiffnesses: tuple[Pair, ...]
+    fields: tuple[str, ...]  # unknowns: the deflection "w", then the shear strains if there are any
+    strains: Mapping[str, Strain]  # "turn_x" and "turn_y" are how the cross-sections turn
+    stiffnesses: tuple[Pair, ...]  # of the plate's own terms, those that a turned grain adds last
     masses: tuple[Pair, ...]
-    groups: Callable[[bool], tuple[tuple[Group, ...], tuple[Group, ...]]]
+    groups_of_stiffnesses: tuple[Group, ...]
+    turned_groups: tuple[Group, ...]  # of the stiffnesses where the grain runs at an angle
+    groups_of_masses: tuple[Group, ...]
+
+    def groups(self, is_turned: bool) -> tuple[tuple[Group, ...], tuple[Group, ...]]:
+        """Group of each stiffness and of each mass term that is the plate's own."""
+        return self.turned_groups if is_turned else self.groups_of_stiffnesses, self.groups_of_masses
 
 
 @dataclass(frozen=True)
@@ -109,26 +100,18 @@ class AtPlaces:
 
     @property
     def is_on_plate(self) -> bool:
-        """Whether all amounts are deflections."""
         return self.n_beside == 0
 
     @property
     def n_beside(self) -> int:
-        """How many coordinates beside the plate there must be."""
         return 1 + max(one.beside for _, *both in self.products for one in both)
 
 
 @dataclass(frozen=True)
 class OnDeflections:
-    """Terms that exist on given deflections only, for they reach all over the plate.
+    """Terms that exist on given deflections only, for they reach all over the plate."""
 
-    Attributes
-    ----------
-    project : callable
-        From `Deflections` to the terms' (n_terms, n_vectors, n_vectors) matrices.
-    """
-
-    project: Callable[[Deflections], Floats]
+    project: Callable[[Deflections], Floats]  # to (n_terms, n_vectors, n_vectors) matrices
     n_terms: int = 1
 
 
@@ -137,31 +120,26 @@ Term = OverPlate | AlongEdges | AtPlaces | OnDeflections
 
 @dataclass(frozen=True, eq=False)
 class Deflections:
-    """Deflections of one symmetry class as functions on the plate.
-
-    Attributes
-    ----------
-    coefficients : (n_vectors, n_functions_x, n_functions_y) array
-    """
+    """Deflections of one symmetry class as functions on the plate."""
 
     x: Line
     y: Line
     parity: Parity
-    coefficients: Floats
+    coefficients: Floats  # (n_vectors, n_functions_x, n_functions_y)
 
     def on(self, x: Floats, y: Floats) -> Floats:
-        """On a lattice, x and y fractions of the sides: (n_vectors, n_x, n_y) array."""
+        """Values on a lattice, x and y fractions of the sides: (n_vectors, n_x, n_y) array."""
         along_x, along_y = self.x.shapes(x, self.parity.x).toarray(), self.y.shapes(y, self.parity.y).toarray()
         return np.asarray(along_x @ self.coefficients @ along_y.T)
 
     def across(self, x: Floats, y: Floats) -> Floats:
-        """At points y, (n_x, n_y), of their own at each x, (n_x,): (n_vectors, n_x, n_y) array."""
+        """Values at points y, (n_x, n_y), of their own at each x, (n_x,): (n_vectors, n_x, n_y) array."""
         along_x = self.x.shapes(x, self.parity.x).toarray()
         along_y = self.y.shapes(y.ravel(), self.parity.y).toarray().reshape(*y.shape, -1)
         return np.einsum("xi,nij,xyj->nxy", along_x, self.coefficients, along_y, optimize=True)
 
     def integrals(self, outline: Outline | None) -> Floats:
-        """Over the plate, or what an outline leaves of it: (n_vectors,) array; zero where they are odd."""
+        """Integrals over the plate, or what an outline leaves of it: (n_vectors,) array; zero where they are odd."""
         if any(self.parity[axis] and side.is_split for axis, side in enumerate((self.x, self.y))):
             return np.zeros(len(self.coefficients))
         grid = self.x.derivatives[0] @ self.coefficients @ self.y.derivatives[0].T

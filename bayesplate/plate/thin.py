@@ -10,20 +10,11 @@ from __future__ import annotations
 from functools import lru_cache
 
 from bayesplate.board.setup import Ends
-from bayesplate.plate.fields import Group
 from bayesplate.plate.line import line
 from bayesplate.plate.plate import Plate, plate_of
 from bayesplate.plate.terms import Derivative, Kinematics
 
 THIN_TERMS = ("xx", "yy", "mix", "xy")
-
-
-def thin_groups(is_turned: bool = False) -> tuple[tuple[Group, ...], tuple[Group, ...]]:
-    """Group of each stiffness and of each mass term that is the thin plate's own.
-
-    Where the grain runs at an angle, the modulus along it has a part in every term.
-    """
-    return (("along",) * 6 if is_turned else ("along", "bending", "bending", "bending")), ("mass",)
 
 
 THIN = Kinematics(
@@ -49,28 +40,16 @@ THIN = Kinematics(
         ("bend_y", "twice_twist"),
     ),
     masses=(("w", "w"),),
-    groups=thin_groups,
+    groups_of_stiffnesses=("along", "bending", "bending", "bending"),
+    turned_groups=("along",) * 6,  # the modulus along a turned grain has a part in every term
+    groups_of_masses=("mass",),
 )
 
 
 @lru_cache(maxsize=16)
 def thin_plate(ends_x: Ends, ends_y: Ends, n_x: int, n_y: int) -> Plate:
-    """The bare thin plate; the result is shared, so it must not be changed.
+    """The bare thin plate, its terms as `THIN_TERMS`; the result is shared, so it must not be changed.
 
-    Parameters
-    ----------
-    ends_x, ends_y : tuple of str
-        Condition at the two ends of each side: (x0, x1) and (y0, y1).
-    n_x, n_y : int
-        Numbers of elements along x and y.
-
-    Returns
-    -------
-    Plate
-        Stiffness terms in the order of `THIN_TERMS`.
-
-    References
-    ----------
     Ducceschi et al., eq. (1) and (2), as energies.
     """
     return plate_of(THIN, line(ends_x, n_x), line(ends_y, n_y))

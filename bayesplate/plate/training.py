@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.material import rigidities
 from bayesplate.board.setup import Ends
 from bayesplate.errors import NotIdentifiableError
@@ -42,14 +42,7 @@ _GRID = 24
 
 @dataclass(frozen=True)
 class TrainingConstants:
-    """Material of the plate in the middle of the training set; Pa.
-
-    Attributes
-    ----------
-    E_x, E_y, G_xy : float, Pa
-    G_xz, G_yz : float or None, Pa
-        Of the shear-flexible plate; the thin one does not read them.
-    """
+    """Material of the plate in the middle of the training set, Pa; the thin plate reads no G_xz and G_yz."""
 
     E_x: float
     E_y: float
@@ -61,46 +54,22 @@ class TrainingConstants:
 
 @dataclass(frozen=True, eq=False)
 class TrainingPlate:
-    """One plate of the set.
-
-    Attributes
-    ----------
-    factors : tuple of float
-        Of E_x and of E_y.
-    p, q : float
-        D_x / D_s and D_y / D_s.
-    squared : (n_modes,) array
-        Non-dimensional omega_bar^2 of its lowest modes, increasing.
-    mac : (n_reference, n_modes) array
-        Modal assurance criterion between the reference modes, in the order of `Training.modes`, and its own.
-    matches : dict of int
-        Which of its modes each reference mode is; one that cannot be recognised is absent.
-    """
-
-    factors: tuple[float, float]
-    p: float
-    q: float
-    squared: NDArray[np.float64]
-    mac: NDArray[np.float64]
-    matches: Mapping[Beams, int]
+    factors: tuple[float, float]  # of E_x and E_y
+    p: float  # D_x / D_s
+    q: float  # D_y / D_s
+    squared: Floats  # (n_modes,): non-dimensional omega_bar^2, increasing
+    mac: Floats  # (n_reference, n_modes): modal assurance criterion between reference modes and its own
+    matches: Mapping[Beams, int]  # which of its modes each reference mode is, where it can be recognised
 
 
 @dataclass(frozen=True)
 class TrainedMode:
-    """Plane omega_bar^2 = a p + b q + c through the plates in which the mode was recognised.
-
-    Attributes
-    ----------
-    a, b, c : float
-        Not negative.
-    r_squared : float
-        Coefficient of determination.
-    """
+    """Plane omega_bar^2 = a p + b q + c, none negative, through the plates in which the mode was recognised."""
 
     a: float
     b: float
     c: float
-    r_squared: float
+    r_squared: float  # coefficient of determination
     n_plates: int
 
 
@@ -110,10 +79,6 @@ class Training:
 
     modes: Mapping[Beams, TrainedMode]
     plates: tuple[TrainingPlate, ...]
-
-    def plate(self, factors: tuple[float, float]) -> TrainingPlate:
-        """The plate with the given factors of E_x and E_y."""
-        return next(plate for plate in self.plates if plate.factors == factors)
 
 
 def train(
@@ -125,34 +90,11 @@ def train(
     theory: Theory,
     beams: Sequence[Beams],
 ) -> Training:
-    """Train the linear frequency model as the paper does.
+    """Train the linear frequency model as the paper does, for modes by their orders of beam functions.
 
-    Parameters
-    ----------
-    ends_x, ends_y : tuple of str
-        Condition at (x0, x1) and (y0, y1).
-    aspect_ratio : float
-        L_x / L_y.
-    thickness_ratio : float
-        h / L_x; without influence on the thin plate.
-    constants : TrainingConstants
-        Pa.
-    beams : sequence of (int, int)
-        The modes wanted, as orders of the beam functions along x and y.
-
-    Raises
-    ------
-    KeyError
-        If a mode is none of the reference plate's.
-    NotIdentifiableError
-        If a mode is recognised in fewer than three plates.
-    ValueError
-        If the shear-flexible plate is asked for without its shear moduli.
-
-    References
-    ----------
     Ducceschi et al., section 3.1, tables 1 and 2 and figure 2. They do not say when a shape counts as recognised: here
-    when its MAC exceeds `LOWEST_MAC` and is the largest of its row and of its column.
+    when its MAC exceeds `LOWEST_MAC` and is the largest of its row and of its column. KeyError if a mode is none of the
+    reference plate's, NotIdentifiableError if it is recognised in fewer than three plates.
     """
     plate = training_matrices(ends_x, ends_y, theory)
     weights = {
@@ -181,9 +123,7 @@ def training_weights(
 ) -> Weights:
     """Weights whose eigenvalues are omega_bar^2 = omega^2 rho h A^2 / D_s, for E_x and E_y times the given factors.
 
-    References
-    ----------
-    Ducceschi et al., eq. (7) to (11).
+    Ducceschi et al., eq. (7) to (11); the ratios are L_x / L_y and h / L_x.
     """
     E_x, E_y = constants.E_x * factors[0], constants.E_y * factors[1]
     D_x, D_y, D_s = (float(D) for D in rigidities(E_x, E_y, constants.G_xy, 1.0, constants.nu_xy))
@@ -201,7 +141,6 @@ def training_weights(
 
 
 def training_matrices(ends_x: Ends, ends_y: Ends, theory: Theory) -> Plate:
-    """Matrices of the training plates."""
     assemble = thin_plate if theory == "thin" else shear_flexible_plate
     return assemble(ends_x, ends_y, SHEAR_ELEMENTS_PER_SIDE, SHEAR_ELEMENTS_PER_SIDE)
 
@@ -214,7 +153,7 @@ def _modes_to_hold(plate: Plate, weights: Weights, highest: float) -> int:
     return n_modes
 
 
-def _sampled(modes: Modes) -> NDArray[np.float64]:
+def _sampled(modes: Modes) -> Floats:
     """Shapes on a grid of cell centres, where sums stand for integrals: (n_modes, n_points) array of unit norm."""
     points = (np.arange(_GRID) + 0.5) / _GRID
     shapes = modes.displacement(points, points).reshape(len(modes.eigenvalues), -1)
@@ -226,7 +165,7 @@ def _tracked(
     weights: Weights,
     aspect_ratio: float,
     modes: Modes,
-    reference: NDArray[np.float64],
+    reference: Floats,
     beams: Sequence[Beams],
 ) -> TrainingPlate:
     mac = (reference @ _sampled(modes).T) ** 2

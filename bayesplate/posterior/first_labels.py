@@ -23,7 +23,7 @@ from bayesplate.estimates.identifiability import identifiability
 from bayesplate.estimates.labelling import LIKELY, with_labels
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.unusual import MOST_ORTHOTROPIC
-from bayesplate.estimates.wide_search import FAR, Guess, search_widely
+from bayesplate.estimates.wide_search import Guess, are_far_apart, search_widely
 from bayesplate.frequencies.model import setup_model, with_others
 from bayesplate.frequencies.peaks import PeakLikelihood, takes_part
 from bayesplate.frequencies.system import system_of
@@ -75,7 +75,7 @@ class Way:
 
     def is_far_from(self, other: Way) -> bool:
         """Whether the constants are others altogether."""
-        return bool(np.abs(self.log_rigidities - other.log_rigidities).max() > FAR)
+        return are_far_apart(self.log_rigidities, other.log_rigidities)
 
 
 @dataclass(frozen=True, eq=False)

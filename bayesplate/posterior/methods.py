@@ -13,7 +13,7 @@ from bayesplate.board.material import MODULI, RIGIDITIES, moduli, rigidities
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.paper import PaperSystem
 from bayesplate.estimates.percentile import percentile_estimate
-from bayesplate.frequencies.full import full_log_frequencies
+from bayesplate.frequencies.model import full_log_frequencies
 from bayesplate.posterior.draws import Draws, posterior_mean_values
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.reweighting import weighted_mean

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from bayesplate.board.board import Board
 from bayesplate.estimates.least_squares import Estimate
-from bayesplate.frequencies.densities import STUDENT
-from bayesplate.frequencies.reading_errors import reading_sd
+from bayesplate.frequencies.reading_errors import STUDENT, reading_sd
 
 Floats = NDArray[np.float64]
 

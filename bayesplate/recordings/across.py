@@ -16,14 +16,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.modes_found import Mode
 from bayesplate.recordings.plausibility import Peak
 from bayesplate.recordings.spectra import Rows, Spectra
 
-Floats = NDArray[np.float64]
 Group = dict[int, Peak]
 """One mode: from the number of a set of records to the peak that it shows of it."""
 
@@ -78,7 +77,7 @@ def modes_across(spectra: Spectra, sets: Sequence[Rows], shown: Sequence[Sequenc
 
 
 def _name(spectra: Spectra, records: Rows) -> str:
-    """Of a set: the file if it is all of it, else the hit."""
+    """Name of a set of records: the file if the set is all of it, else the hit."""
     name = spectra.names[records[0]]
     is_whole = records.size == np.sum(spectra.files == spectra.files[records[0]])
     return name.rpartition(" hit ")[0] or name if is_whole else name
@@ -93,7 +92,7 @@ def _laid_over(hertz: Sequence[Floats]) -> tuple[int, list[float], list[int]]:
 
 
 def _offset(own: Floats, other: Floats) -> tuple[float, int]:
-    """By what a recording's modes lie above another's as a whole (relative), and how many are the other's then."""
+    """Relative offset of a recording's modes from another's as a whole, and how many are the other's then."""
     if not own.size or not other.size:
         return 0.0, 0
     off = np.abs(np.log(own)[None, :, None] - _OFFSETS[:, None, None] - np.log(other)).min(axis=2)
@@ -175,7 +174,7 @@ def _excess(parts: Sequence[Floats]) -> Floats:
 
 
 def _common(several: Sequence[Sequence[Floats]]) -> Floats:
-    """The same averaged over all modes that have several parts: (2,) array."""
+    """Variance between parts beyond their own, averaged over all modes that have several: (2,) array."""
     known = [(len(parts) - 1.0, _excess(parts)) for parts in several if len(parts) > 1]
     total = sum(spare for spare, _ in known)
     return np.asarray(sum(spare * excess for spare, excess in known) / total) if known else np.zeros(2)

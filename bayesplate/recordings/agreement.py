@@ -10,12 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Bools, Complex, Floats
 from bayesplate.recordings.local_fit import STEADY, Window, refined
 from bayesplate.recordings.spectra import Rows, Spectra
-
-Floats = NDArray[np.float64]
 
 _MOST_PEAKS, _FEWEST, _MOST_RECORDS = 12, 2, 8
 _PROMINENCE = 12.0
@@ -63,7 +61,7 @@ def _middle(squares: Floats) -> float:
 
 
 def _poles(spectra: Spectra, lowest: float, highest: float) -> Iterator[tuple[Floats, Floats, Rows]]:
-    """Of each strong peak: poles (n, 2) of the records that show it, over its decay rate; variances; their files."""
+    """For each strong peak the (n, 2) poles of the records that show it, over its decay rate; variances; files."""
     from scipy.signal import find_peaks, peak_widths
 
     values = spectra.values / spectra.noise
@@ -86,9 +84,7 @@ def _poles(spectra: Spectra, lowest: float, highest: float) -> Iterator[tuple[Fl
             yield poles / decay, variances / decay**2, spectra.files[told]
 
 
-def _pole(
-    spectra: Spectra, values: NDArray[np.complex128], near: NDArray[np.bool_], start: Floats
-) -> tuple[Floats, Floats] | None:
+def _pole(spectra: Spectra, values: Complex, near: Bools, start: Floats) -> tuple[Floats, Floats] | None:
     """Frequency and decay rate of a record's only mode near a peak, and their variances; None if that tells little."""
     fit = refined(Window(spectra.frequency[near], values[:, None], np.zeros((0, 2))), start)
     ((_, decay),) = fit.poles

@@ -7,11 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.errors import Fault
 from bayesplate.recordings.hits import LEAST_DURATION
-from bayesplate.recordings.signals import FrequencyResponse, Read, Recording
-
-Floats = NDArray[np.float64]
+from bayesplate.recordings.signals import FrequencyResponse, Read, Recording, in_blocks
 
 SILENT = 1e-5
 """Of full scale: less than the last bit of 16."""
@@ -113,9 +112,8 @@ def is_pulse(signal: Floats, rate: float) -> bool:
 
 def is_cut_to_silence(signal: Floats, rate: float) -> bool:
     """Whether a noise gate shows: much of a recording holds one and the same number."""
-    block = max(round(_GATE_BLOCK * rate), 2)
-    n = signal.size // block
-    return bool(n and np.mean(np.ptp(signal[: n * block].reshape(n, block), axis=1) == 0.0) > _GATED)
+    blocks = in_blocks(signal, max(round(_GATE_BLOCK * rate), 2))
+    return bool(len(blocks) and np.mean(np.ptp(blocks, axis=1) == 0.0) > _GATED)
 
 
 def clipped_samples(signal: Floats, full_scale: float) -> int:
@@ -177,7 +175,7 @@ def _level_fault(one: Recording, signal: Floats, name: str) -> Fault | None:
 
 
 def _fall_beside(side: Floats, first: int, stop: int) -> float:
-    """By how much a wave falls before and after a run at its top, within as many samples: the smaller of the two."""
+    """The smaller fall of a wave before and after a run at its top, within as many samples."""
     length = stop - first
     beside = [part for part in (side[max(first - length, 0) : first], side[stop : stop + length]) if part.size]
     return min((float(side[first] - part.min()) for part in beside), default=0.0)
@@ -198,11 +196,10 @@ def _correlation(one: Floats, other: Floats) -> float:
 
 def _powers(signal: Floats, rate: float) -> tuple[float, float, float]:
     """Power of the loudest block, the median after it, and that of the quiet; all 0 where nothing comes after."""
-    block = max(round(_BLOCK * rate), 1)
-    n = signal.size // block
-    if n <= _AFTER[1]:
+    blocks = in_blocks(signal, max(round(_BLOCK * rate), 1))
+    if len(blocks) <= _AFTER[1]:
         return 0.0, 0.0, 0.0
-    power = np.mean((signal[: n * block] - np.median(signal)).reshape(n, block) ** 2, axis=1)
+    power = np.mean((blocks - np.median(signal)) ** 2, axis=1)
     loudest = int(np.argmax(power[: -_AFTER[1]]))
     after = power[loudest + _AFTER[0] : loudest + _AFTER[1]]
     return float(power[loudest]), float(np.median(after)), float(np.quantile(power, 0.1))

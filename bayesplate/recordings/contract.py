@@ -63,12 +63,11 @@ class PickedRow:
 
     @property
     def is_likely(self) -> bool:
-        """Whether it is a mode rather than not, by the recordings."""
         return self.spurious_probability < 0.5
 
     @property
     def mode_probability(self) -> float:
-        """That it is a mode of the board, by the recordings and by the modes that the board has."""
+        """Probability of a mode of the board, by the recordings and by the modes that the board has."""
         return (1.0 - self.spurious_probability) * (1.0 - (self.unlabelled_probability or 0.0))
 
     def may_be(self, most: int) -> dict[str, float]:

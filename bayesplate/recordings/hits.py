@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.recordings.onsets import heard_as, onsets, soft_onsets
-from bayesplate.recordings.signals import Recording
-
-Floats = NDArray[np.float64]
+from bayesplate.recordings.signals import Recording, in_blocks
 
 LEAST_DURATION = 0.25
 """s; a shorter decay does not tell neighbouring modes of a board apart."""
@@ -72,7 +70,6 @@ def find_hits(recording: Recording) -> list[Hit]:
 
 
 def usable(hits: Sequence[Hit]) -> list[Hit]:
-    """Those without a fault."""
     return [hit for hit in hits if not hit.fault]
 
 
@@ -98,7 +95,7 @@ def _fault(recording: Recording, onset: int, start: int, stop: int, end: str) ->
 
 
 def _fall(response: Floats, rate: float, onset: int, start: int, stop: int) -> float:
-    """By how many dB a sound falls from its first tenth to its last, at the frequencies that the hit has raised.
+    """Fall of a sound in dB from its first tenth to its last, at the frequencies that the hit has raised.
 
     Hum, a steady tone and rumble were there before the hit, and do not fall.
     """
@@ -120,14 +117,14 @@ def _powers(part: Floats, n: int) -> Floats:
 
 
 def _gated(heard: Floats, rate: float) -> int | None:
-    """Where a noise gate cuts a decay off: it falls suddenly, far and for good; None where none does."""
+    """Sample at which a noise gate cuts a decay off: it falls suddenly, far and for good; None where none does."""
     block = max(round(_GATE_BLOCK * rate), 1)
-    n = heard.size // block
-    steps = np.abs(np.diff(heard))
+    blocks, steps = in_blocks(heard, block), np.abs(np.diff(heard))
+    n = len(blocks)
     if n < 3 * _GATE_BLOCKS or not steps.any():
         return None
     least = max(float(steps[steps > 0.0].min()) ** 2, 1e-300)  # what is rounded to nothing is not cut off
-    level = np.log10(np.mean((heard[: n * block] - np.median(heard)).reshape(n, block) ** 2, axis=1) + least)
+    level = np.log10(np.mean((blocks - np.median(heard)) ** 2, axis=1) + least)
     later = np.maximum.accumulate(level[::-1])[::-1]  # the loudest from there on
     at = np.arange(_GATE_BLOCKS, n - 2 * _GATE_BLOCKS)
     falls = level[at] - later[at + _GATE_BLOCKS] > _GATE_FALL

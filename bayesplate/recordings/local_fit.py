@@ -18,11 +18,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from bayesplate.arrays import Complex, Floats
 
 DEGREE = 2
 """Of the polynomial that stands for what lies beyond the window."""
@@ -46,28 +44,15 @@ _LEAST_OWN = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """Lines of all records in a band of frequencies.
-
-    Attributes
-    ----------
-    values : (n_lines, n_records) complex array
-        Spectra, each record over the standard deviation of its noise.
-    fixed : (n_fixed, 2) array, Hz
-        Frequency and decay rate of strong modes outside, which reach in with tails.
-    unlike : float
-        Share of a line that no simple mode describes, for no mode of a real board is simple to the last digit.
-    floor : float
-        Share of the window's highest line that other lines may be off by.
-    least_variance : float
-        Below which the variance of a record's noise is not put; 1 is what was expected of it.
-    """
+    """Lines of all records in a band of frequencies."""
 
     frequency: Floats
-    values: Complex
-    fixed: Floats
+    values: Complex  # (n_lines, n_records): spectra over the standard deviation of each record's noise
+    fixed: Floats  # (n_fixed, 2), Hz: frequency and decay rate of strong modes outside, which reach in with tails
+    # share of a line that no simple mode describes: no mode of a real board is simple to the last digit
     unlike: float = 0.0
-    floor: float = 0.0
-    least_variance: float = 0.0
+    floor: float = 0.0  # share of the window's highest line that other lines may be off by
+    least_variance: float = 0.0  # of a record's noise; 1 is what was expected of it
 
     @cached_property
     def weights(self) -> Floats:
@@ -77,7 +62,6 @@ class Window:
 
     @property
     def spacing(self) -> float:
-        """Of the lines, Hz."""
         return float(self.frequency[1] - self.frequency[0])
 
     def basis(self, poles: Floats) -> Complex:
@@ -97,28 +81,15 @@ class Window:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """Modes fitted in a window.
-
-    Attributes
-    ----------
-    poles : (n_modes, 2) array, Hz
-        Frequency and decay rate, which is half the width of the peak at half its power.
-    residues : (n_modes, n_records) complex array
-        Of the values of the window.
-    rest : (n_lines, n_records) complex array
-        What the fit leaves.
-    jacobian : (n_lines, 2 n_modes) complex array
-        Change of a mode's shape with its frequency, then with its decay rate, what other shapes can take up removed.
-    orthogonal : (n_lines, n_basis) complex array
-        An orthonormal basis of the shapes; it, `rest` and `jacobian` are weighted.
-    """
+    """Modes fitted in a window; `rest`, `jacobian` and `orthogonal` are weighted."""
 
     window: Window
-    poles: Floats
-    residues: Complex
-    rest: Complex
+    poles: Floats  # (n_modes, 2), Hz: frequency, and decay rate: half the width of the peak at half its power
+    residues: Complex  # (n_modes, n_records): of the values of the window
+    rest: Complex  # (n_lines, n_records): what the fit leaves
+    # (n_lines, 2 n_modes): change of a shape with its frequency, then its decay rate, less what other shapes take up
     jacobian: Complex
-    orthogonal: Complex
+    orthogonal: Complex  # (n_lines, n_basis): an orthonormal basis of the shapes
 
     @property
     def n_free(self) -> int:
@@ -127,7 +98,7 @@ class Fitted:
 
     @property
     def variance(self) -> Floats:
-        """Of the noise of each record, (n_records,): the mean square of what is left, if that is not too little."""
+        """Noise variance of each record, (n_records,): the mean square of the rest, but not below the least one."""
         power = np.sum(np.abs(self.rest) ** 2, axis=0) / self.n_free
         return np.maximum(power, max(self.window.least_variance, 1e-300))
 
@@ -184,10 +155,7 @@ def fitted(window: Window, poles: Floats) -> Fitted:
 
 
 def refined(window: Window, poles: Floats, most_steps: int = _MOST_STEPS) -> Fitted:
-    """The most likely modes near given ones, (n_modes, 2: Hz), by damped Gauss-Newton steps.
-
-    Every record weighs as its noise lets it.
-    """
+    """The most likely modes near given ones, (n_modes, 2: Hz), by damped Gauss-Newton steps."""
     here = fitted(window, poles)
     if not len(poles):
         return here
@@ -220,10 +188,7 @@ def _moved(window: Window, poles: Floats, step: Floats) -> Floats:
 
 
 def search(window: Window, least_gain: float) -> list[Floats]:
-    """Modes of a window, (n_modes, 2: Hz): with one mode, with two, and so on, while the likelihood gains.
-
-    `least_gain` is twice the ln of the likelihood that a mode must gain.
-    """
+    """Modes of a window, (n_modes, 2: Hz), one more at each step while -2 ln likelihood falls by `least_gain`."""
     fit = refined(window, np.zeros((0, 2)))
     candidates = _candidates(window)
     tried = shapes(window.frequency, candidates) * window.weights[:, None]

@@ -8,13 +8,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Complex, Floats, Indices
 from bayesplate.recordings.local_fit import Fitted, Window, refined, search
 from bayesplate.recordings.spectra import Spectra
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 WIDTHS = (100.0, 60.0)
 """Hz of the windows in which modes are looked for; the first are those of the final fits."""
@@ -43,33 +40,17 @@ _BROADEST = 0.06
 
 @dataclass(frozen=True, eq=False)
 class Mode:
-    """A mode that was found.
-
-    Attributes
-    ----------
-    frequency, decay : float, Hz
-        The decay rate is half the width of the peak at half its power: damping ratio times frequency.
-    noise, scatter, window : (2,) array, Hz
-        Standard deviations of both: by what each record leaves after the fit, for what hits, places and files scatter
-        beyond it, and for the choice of lines.
-    residues : (n_records,) complex array
-        In units of the spectra.
-    residue_sd : (n_records,) array
-    expected : float
-        How many modes noise alone would show as clearly, in all the band.
-    seen : float
-        Share of the widths of windows in which it was found.
-    """
+    """A mode that was found."""
 
     frequency: float
-    decay: float
-    noise: Floats
-    scatter: Floats
-    window: Floats
-    residues: Complex
+    decay: float  # Hz, half the width of the peak at half its power: damping ratio times frequency
+    noise: Floats  # (2,), Hz: standard deviations of frequency and decay, by what each record leaves after the fit
+    scatter: Floats  # the same for what hits, places and files scatter beyond it
+    window: Floats  # the same for the choice of lines
+    residues: Complex  # (n_records,), in units of the spectra
     residue_sd: Floats
-    expected: float
-    seen: float
+    expected: float  # how many modes noise alone would show as clearly, in all the band
+    seen: float  # share of the widths of windows in which it was found
 
     @property
     def pole(self) -> Floats:
@@ -78,7 +59,6 @@ class Mode:
 
     @property
     def damping(self) -> float:
-        """Damping ratio, 1."""
         return self.decay / self.frequency
 
 
@@ -97,7 +77,7 @@ class _Part(NamedTuple):
     high: float
 
     def own(self, poles: Floats) -> Floats:
-        """Of modes (n_modes, 2) those that count."""
+        """Those of (n_modes, 2) modes that count."""
         return poles[(poles[:, 0] >= self.low) & (poles[:, 0] < self.high)]
 
 
@@ -127,19 +107,9 @@ def joined(by_width: list[Floats], spacing: float) -> Floats:
 
 
 def fit_modes(spectra: Spectra, start: Floats, by_width: list[Floats], lowest: float, highest: float) -> list[Mode]:
-    """Fit modes to all records at once, each in its window, and leave out those that noise alone would give.
+    """Fit modes, from (n_modes, 2) starts in Hz, to all records at once, each in its window; in the order of frequency.
 
-    Parameters
-    ----------
-    start : (n_modes, 2) array, Hz
-        Frequencies and decay rates to begin with.
-    by_width : list of (n_modes, 2) array, Hz
-        What windows of each width have shown.
-
-    Returns
-    -------
-    list of Mode
-        Between two frequencies, in their order.
+    Those that noise alone would give are left out; `by_width` is what windows of each width have shown.
     """
     n_lines = int(np.sum((spectra.frequency >= lowest) & (spectra.frequency < highest)))
     parts = _parts(spectra, lowest, highest, WIDTHS[0])
@@ -217,8 +187,8 @@ def _inverse(information: Floats) -> Floats:
     return np.asarray(np.linalg.pinv(information.sum(axis=0), hermitian=True))
 
 
-def _excess(places: NDArray[np.intp], steps: Floats, variances: Floats) -> Floats:
-    """By how much the steps of hits, or of places, exceed their variances, 1 or more: the larger of the two ratios.
+def _excess(places: Indices, steps: Floats, variances: Floats) -> Floats:
+    """Factor, at least 1, by which the steps of hits, or of places if larger, exceed their variances.
 
     The steps are those by which each record would move frequency and decay rate.
     """
@@ -256,7 +226,7 @@ def _expected(gain: float, n_records: int, n_lines: int) -> float:
 
 
 def _correlation(fit: Fitted) -> float:
-    """By how much what is left varies more slowly than from line to line: a factor of variances, 1 to 10."""
+    """Factor of variances, 1 to 10, by which the rest of a fit varies more slowly than from line to line."""
     rest = fit.rest / np.sqrt(fit.variance)
     total = float(np.sum(np.abs(rest) ** 2))
     factor = 1.0
@@ -269,7 +239,7 @@ def _correlation(fit: Fitted) -> float:
 
 
 def _narrower(fit: Fitted, part: _Part) -> Fitted:
-    """The same modes fitted to the lines of the window without most of its margins."""
+    """A fit of the same modes to the lines of the window without most of its margins."""
     window = fit.window
     kept = (window.frequency >= part.low - 0.4 * _MARGIN) & (window.frequency <= part.high + 0.4 * _MARGIN)
     if kept.sum() < 0.6 * kept.size or kept.sum() < 3 * len(fit.poles) + 8:
@@ -278,7 +248,7 @@ def _narrower(fit: Fitted, part: _Part) -> Fitted:
 
 
 def _shift(narrow: Fitted, pole: Floats, variances: Floats) -> Floats:
-    """By how much frequency and decay rate move in the narrower window, if that is more than fewer lines let expect."""
+    """Change of frequency and decay rate in the narrower window, if it is more than fewer lines let expect."""
     nearest = int(np.argmin(np.abs(narrow.poles[:, 0] - pole[0])))
     own = np.diagonal(_inverse(narrow.information()[1]))[[nearest, len(narrow.poles) + nearest]]
     expected = np.maximum(own - variances, 0.0)

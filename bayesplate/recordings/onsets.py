@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from bayesplate.arrays import Floats
+from bayesplate.recordings.signals import in_blocks
 
 _BLOCK = 0.002
 """s over which a sound's power is taken."""
@@ -46,23 +46,19 @@ def heard_as(response: Floats, rate: float) -> list[tuple[Floats, float]]:
     every = int(rate / _BOARD_RATE)
     if every < 2:
         return [(response, rate)]
-    n = response.size // every
-    return [(response, rate), (response[: n * every].reshape(n, every).mean(axis=1), rate / every)]
+    return [(response, rate), (in_blocks(response, every).mean(axis=1), rate / every)]
 
 
 def _rises(change: Floats, rate: float, seconds: float, rise: float, above_floor: float) -> Floats:
     """Times of the blocks whose power leaps, s."""
     block = max(round(seconds * rate), 1)
-    n = change.size // block
-    if n < 2 * _LOOK_BACK:
+    power = np.mean(in_blocks(change, block) ** 2, axis=1)
+    if power.size < 2 * _LOOK_BACK:
         return np.empty(0)
-    power = np.mean(change[: n * block].reshape(n, block) ** 2, axis=1)
     floor = max(float(np.quantile(power, 0.1)), float(power.max()) * 1e-12, 1e-300)
     level = 10.0 * (np.log10(np.maximum(power, 1e-300)) - np.log10(floor))
-    before = np.zeros(n)
-    before[1:] = level[:-1]
-    for back in range(2, _LOOK_BACK + 1):
-        before[back:] = np.maximum(before[back:], level[:-back])
+    padded = np.concatenate([np.full(_LOOK_BACK, -np.inf), level])
+    before = np.lib.stride_tricks.sliding_window_view(padded, _LOOK_BACK)[:-1].max(axis=1)
     leaps = (level - before > rise) & (level > above_floor) & (level > level.max() - _BELOW_LOUDEST)
     return np.asarray(np.flatnonzero(leaps) * block / rate)
 
@@ -79,10 +75,9 @@ def _unforeseen(response: Floats, rate: float) -> Floats:
 
     change = _curved(response)
     block = max(round(_QUIET_BLOCK * rate), 2 * _ORDER)
-    n = change.size // block
-    blocks = change[: n * block].reshape(n, block)
+    blocks = in_blocks(change, block)
     power = np.sum(blocks**2, axis=1)
-    quiet = blocks[power <= np.quantile(power, _QUIET)] if n else blocks
+    quiet = blocks[power <= np.quantile(power, _QUIET)] if len(blocks) else blocks
     lags = np.array([np.sum(quiet[:, k:] * quiet[:, : block - k]) for k in range(_ORDER + 1)])
     if lags[0] <= 0.0:
         return change

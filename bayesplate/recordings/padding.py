@@ -13,8 +13,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Complex
 from bayesplate.recordings.signals import FrequencyResponse
 
 _FACTORS = (8, 4, 3, 2)
@@ -26,7 +26,7 @@ _EARLIER, _BEFORE, _BEHIND = (0.7, 0.8), (0.9, 1.0), (1.05, 1.15)
 _FEWEST_LINES = 640
 
 
-def padding_of(values: NDArray[np.complex128]) -> int:
+def padding_of(values: Complex) -> int:
     """How many times as many lines a response has as its record; 1 where nothing tells that it was padded."""
     if values.size < _FEWEST_LINES:
         return 1
@@ -40,5 +40,5 @@ def padding_of(values: NDArray[np.complex128]) -> int:
 
 
 def common_padding(responses: Sequence[FrequencyResponse]) -> int:
-    """The same of responses on one grid: the least of them, for nothing that one of them knows is left out."""
+    """The least padding of responses on one grid: nothing that one of them knows is left out."""
     return min(padding_of(one.values) for one in responses)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.recordings.plausibility import weighted_median
-
-Floats = NDArray[np.float64]
 
 SHAPE_ERROR = 0.05
 """By how much a computed residue may be off, over the largest that the shape gives: modes mix, places are read off."""
@@ -21,25 +19,13 @@ _N_GAINS = 41
 def residue_evidence(
     measured: Floats, measured_sd: Floats, predicted: Floats, largest: Floats, likely: Floats
 ) -> tuple[Floats, float]:
-    """ln of how much the residues speak for each label of each peak, and for the polarity that was assumed.
+    """ln of how much the residues speak for each label of each peak, (n_peaks, n_modes), and for the same polarity.
 
-    Parameters
-    ----------
-    measured, measured_sd : (n_peaks, n_places) array
-        Residues of the mobility, in the units of the recordings.
-    predicted : (n_modes, n_places) array, 1/kg
-        The same of the computed modes.
-    largest : (n_modes,) array, 1/kg
-        The largest residue that each shape gives between any two places.
-    likely : (n_peaks, n_modes) array
-        Probability of each label by the frequencies, from which the common gain is taken.
-
-    Returns
-    -------
-    evidence : (n_peaks, n_modes) array
-        Zero on the average over the modes that a peak may be; between two places only, sizes count and signs do not.
-    log_polarity : float
-        ln of the odds that force and response have the same polarity; zero where there is one pair of places.
+    Measured, (n_peaks, n_places), are residues of the mobility in the units of the recordings; predicted, (n_modes,
+    n_places) in 1/kg, those of the computed modes, and `largest` what each shape gives between any two places. From
+    `likely`, (n_peaks, n_modes) probabilities by the frequencies, comes the common gain. The evidence is zero on the
+    average over the modes that a peak may be. Between two places only, sizes count and signs do not: the odds of the
+    polarity are then 1.
     """
     if measured.shape[1] == 1:
         each = _log_likelihood(np.abs(measured), measured_sd, np.abs(predicted), largest, likely)
@@ -52,7 +38,7 @@ def residue_evidence(
 def sign_odds(signs: Floats, predicted: Floats, largest: Floats, likely: Floats) -> float:
     """ln of the odds that force and response have the same polarity, from the signs between two places.
 
-    The signs are +1 or -1, 0 if not known: (n_peaks,) array; the others as of `residue_evidence`.
+    The signs are +1 or -1, 0 if not known: (n_peaks,); the others as of `residue_evidence`.
     """
     from scipy.special import ndtr
 
@@ -88,6 +74,6 @@ def _summed(each: Floats, likely: Floats) -> Floats:
 
 
 def _relative(each: Floats, likely: Floats) -> Floats:
-    """Over the average of the modes that a peak may be."""
+    """Log likelihoods less the average of the modes that a peak may be."""
     mean = _summed(each, likely) - np.log(np.sum(likely + 1e-6, axis=1))
     return np.clip(each - mean[:, None], _LEAST, -_LEAST)

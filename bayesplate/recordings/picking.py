@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.across import modes_across
 from bayesplate.recordings.agreement import agreeing
@@ -16,8 +16,6 @@ from bayesplate.recordings.modes_found import Mode, Path, find_modes, fit_modes,
 from bayesplate.recordings.plausibility import Peak, Verdict, judged, part_words
 from bayesplate.recordings.spectra import Spectra
 from bayesplate.recordings.strength import Answer
-
-Floats = NDArray[np.float64]
 
 LOWEST, HIGHEST = 20.0, 1000.0
 """Hz between which modes are looked for unless others are given."""
@@ -30,37 +28,21 @@ _SAME = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Picked:
-    """What was picked from recordings.
-
-    Attributes
-    ----------
-    peaks : tuple of PickedRow
-        In the order of frequency, without signs and labels, those that are likely no mode included.
-    answers : tuple of Answer
-        Of each peak.
-    paths : tuple of Path
-        Of the search, for the diagram of stability.
-    lowest, highest : float, Hz
-    remarks : tuple of str
-        How recordings differ that do not show quite the same modes.
-    """
-
+    # in the order of frequency, without signs and labels, those that are likely no mode included
     peaks: tuple[PickedRow, ...]
     answers: tuple[Answer, ...]
     spectra: Spectra
-    paths: tuple[Path, ...]
+    paths: tuple[Path, ...]  # of the search, for the diagram of stability
     lowest: float
     highest: float
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # how recordings differ that do not show quite the same modes
 
     @property
     def likely(self) -> tuple[PickedRow, ...]:
-        """The peaks that are modes rather than not."""
         return tuple(peak for peak in self.peaks if peak.is_likely)
 
     @property
     def likely_answers(self) -> tuple[Answer, ...]:
-        """Of each likely peak."""
         return tuple(one for one, peak in zip(self.answers, self.peaks, strict=True) if peak.is_likely)
 
     def sign(self, answer: Answer, flips: bool | None) -> str:

@@ -13,14 +13,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Bools, Floats
 from bayesplate.recordings.local_fit import STEADY
 from bayesplate.recordings.modes_found import Mode
 from bayesplate.recordings.spectra import Spectra
 from bayesplate.recordings.strength import Answer, answers
-
-Floats = NDArray[np.float64]
 
 FAINT, FAINT_FACTOR = 0.01, 4.5
 """Strength of what is no mode over that of modes nearby, log-normal: its median and factor."""
@@ -79,7 +77,6 @@ class Peak:
 
     @property
     def is_likely(self) -> bool:
-        """Whether it is a mode rather than not."""
         return self.verdict.spurious < 0.5
 
 
@@ -99,7 +96,6 @@ def verdicts(spectra: Spectra, modes: Sequence[Mode], answered: Sequence[Answer]
 
 
 def part_words(hertz: float) -> str:
-    """What a part of the peak of another mode is called."""
     return f"part of {hertz:.1f} Hz"
 
 
@@ -120,7 +116,6 @@ class _Beside:
         self.broad = broad_odds(np.array([mode.damping for mode in modes]), weights)
 
     def verdict(self, m: int) -> Verdict:
-        """On one mode."""
         mode, alike = self.modes[m], self.answered[m].alike
         unlike = _unlike(alike, self.n_places, self.n_records - self.n_places)
         lines = self._of_lines(m, unlike)
@@ -138,7 +133,7 @@ class _Beside:
         return Verdict(spurious, worst)
 
     def _of_lines(self, m: int, unlike: float) -> dict[str, float]:
-        """That it is hum of the mains or another line that does not decay."""
+        """Probability of hum of the mains, or of another line that does not decay."""
         mode = self.modes[m]
         off = min(abs(mode.frequency - base * round(mode.frequency / base)) for base in _MAINS)
         is_mains = mode.frequency > 40.0 and off < _NEAR_MAINS and mode.decay < _NEAR_MAINS
@@ -180,7 +175,7 @@ class _Beside:
         return _uniform(90.0) / _of_real(self.answered[m].complexity) if self.has_force else 1.0
 
 
-def _usual(hertz: Floats, strengths: Floats, rings: NDArray[np.bool_]) -> Floats:
+def _usual(hertz: Floats, strengths: Floats, rings: Bools) -> Floats:
     """Strength of the stronger modes that ring down within an octave of each, of all where none does: (n_modes,)."""
     near = (np.abs(np.log2(hertz[:, None] / hertz)) <= 1.0) & rings
     return np.array([np.quantile(strengths[row if row.any() else slice(None)], 0.7) for row in near])
@@ -203,13 +198,11 @@ def broad_odds(damping: Floats, strengths: Floats) -> Floats:
 
 def weighted_median(values: Floats, weights: Floats) -> float:
     """The value with half of the weight on either side."""
-    order = np.argsort(values)
-    total = np.cumsum(weights[order] + 1e-12)
-    return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
+    return float(np.quantile(values, 0.5, weights=weights + 1e-12, method="inverted_cdf"))
 
 
 def _unlike(alike: float, n_places: int, spare: int) -> float:
-    """That residues are alike from hit to hit by chance only."""
+    """Probability that residues are alike from hit to hit by chance only."""
     from scipy.special import betaln
 
     if spare < 2 or alike >= 1.0:

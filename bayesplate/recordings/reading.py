@@ -40,16 +40,9 @@ def read_recordings(
 ) -> list[list[Read]]:
     """What every file holds, file by file; every fault of every file is told at once.
 
-    Parameters
-    ----------
-    rate : float, optional, Hz
-        For files that do not say it.
-    channels : str
-        What the two channels of a sound file are, one of `CHANNELS`, or the number of the one that is used.
-    motion : str
-        What a response is whose file does not say it.
-    was_played : bool
-        Whether the files are what a loudspeaker was given: they may reach the largest value, and may be quiet.
+    `rate` (Hz) and `motion` are for files that do not say them. The two channels of a sound file are one of `CHANNELS`,
+    or the number of the one that is used. What a loudspeaker was given (`was_played`) may reach the largest value, and
+    may be quiet.
     """
     faults: list[Fault] = []
     if not 0 < len(paths) <= MOST_FILES:
@@ -71,7 +64,7 @@ def read_recordings(
 
 
 def _set_aside(read: list[Read]) -> list[Read]:
-    """Of a file with several recordings those that are neither silent nor a copy, the first with the remarks."""
+    """Recordings of a file that are neither silent nor a copy of another; the first has the remarks on the rest."""
     kept, told, seen = list[Read](), list[str](), dict[bytes, str]()
     for one in read:
         signal = one.response if isinstance(one, Recording) else one.values

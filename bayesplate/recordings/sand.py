@@ -12,11 +12,9 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.errors import Fault, InputError
-
-Floats = NDArray[np.float64]
 
 GRID = (96, 48)
 """Points along x and across it at which picture and shapes are compared."""
@@ -73,13 +71,8 @@ def straightened(picture: Floats) -> Floats:
 def sand_evidence(forms: Floats, shapes: Floats) -> Floats:
     """ln of how much a picture speaks for each shape, zero for the average of all: (n_modes,) array.
 
-    Parameters
-    ----------
-    forms : (n_forms, n_points) array
-        As of `straightened`, of the board from above, x from left to right and y from bottom to top; sand lighter or
-        darker than the board.
-    shapes : (n_modes, n_x, n_y) array
-        Deflections at evenly spaced points of the whole board, edges included.
+    The forms of `straightened` show the board from above, x from left to right and y from bottom to top; the shapes,
+    (n_modes, n_x, n_y), are deflections at evenly spaced points of the whole board, edges included.
     """
     scores = agreement(forms, shapes)
     log_likelihood = -0.5 * _N_CELLS * np.log(1.0 - np.clip(scores, 0.0, 0.999) ** 2)
@@ -95,7 +88,7 @@ def agreement(forms: Floats, shapes: Floats) -> Floats:
 
 
 def _still(shape: Floats) -> Floats:
-    """Where sand would lie, 0 to 1, at the points of the grid."""
+    """Stillness of a shape, 0 to 1, at the points of the grid: sand lies where it is 1."""
     level = np.abs(shape) / np.abs(shape).max()
     return _sampled(np.exp(-((level / _STILL) ** 2)), *_points())
 

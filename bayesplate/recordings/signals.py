@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from bayesplate.arrays import Complex, Floats
+
 Place = tuple[float, float]
 """m, from the corner of the edges x0 and y0."""
 
 Motion = Literal["acceleration", "velocity", "displacement", "pressure"]
-MOTIONS: tuple[Motion, ...] = ("acceleration", "velocity", "displacement", "pressure")
+MOTIONS: tuple[Motion, ...] = get_args(Motion)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,3 +46,8 @@ class FrequencyResponse:
 
 
 Read = Recording | FrequencyResponse
+
+
+def in_blocks(signal: Floats, length: int) -> Floats:
+    """Consecutive blocks of a signal, (n_blocks, length), without what is left at its end."""
+    return signal[: signal.size // length * length].reshape(-1, length)

@@ -8,13 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.checks import SILENT, is_copy, rings
 from bayesplate.recordings.signals import Motion, Read, Recording
-
-Floats = NDArray[np.float64]
 
 _RATE_OFF = 1e-6
 _CROSSTALK = 1e-3

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Complex, Floats, Indices
 from bayesplate.recordings.hits import LONGEST_DURATION, Hit
 from bayesplate.recordings.signals import FrequencyResponse, Motion, Place, Recording
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Rows = NDArray[np.intp]
+Rows = Indices
 Between = tuple[Place | None, Place | None]
 """Places of hammer and sensor."""
 
@@ -26,36 +24,20 @@ _MEDIAN = np.sqrt(6.0 * np.log(2.0))
 
 @dataclass(frozen=True, eq=False)
 class Spectra:
-    """Spectra of decays, or frequency responses, on one grid.
+    """Spectra of decays, or frequency responses, on one grid."""
 
-    Attributes
-    ----------
-    frequency : (n_lines,) array, Hz
-    values : (n_lines, n_records) complex array
-        From the moment on at which the board rings by itself, without a taper.
-    force : (n_lines, n_records) complex array or None
-        Spectrum of each hit's force from the same origin of time; one for frequency responses.
-    files, places : (n_records,) array of int
-        Which records are hits of one file, and which were taken between the same two places.
-    between : tuple of (Place or None, Place or None)
-        Hammer and sensor of each of `places`.
-    duration : float, s
-        Of each decay.
-    """
-
-    frequency: Floats
-    values: Complex
-    force: Complex | None
+    frequency: Floats  # (n_lines,), Hz
+    values: Complex  # (n_lines, n_records): from where the board rings by itself, without a taper
+    force: Complex | None  # (n_lines, n_records): of each hit from the same origin of time; 1 for frequency responses
     names: tuple[str, ...]
-    files: Rows
-    places: Rows
-    between: tuple[Between, ...]
+    files: Rows  # (n_records,): which records are hits of one file
+    places: Rows  # (n_records,): which were taken between the same two places
+    between: tuple[Between, ...]  # of each of `places`
     motion: Motion
-    duration: float
+    duration: float  # s, of each decay
 
     @property
     def spacing(self) -> float:
-        """Of the lines, Hz."""
         return float(self.frequency[1] - self.frequency[0])
 
     @property
@@ -67,7 +49,6 @@ class Spectra:
         return np.asarray(np.maximum(level, 1e-9 * top + 1e-300))
 
     def only(self, records: Rows) -> Spectra:
-        """The same of some records."""
         kept = np.unique(self.places[records])
         return replace(
             self,
@@ -128,7 +109,7 @@ def response_spectra(responses: Sequence[FrequencyResponse], highest: float, pad
 
 
 def _force_spectrum(force: Floats, rate: float, hit: Hit, frequency: Floats) -> Complex:
-    """Of one pulse, from the moment at which the decay begins; outside the pulse the force is noise."""
+    """Spectrum of one pulse, its time counted from where the decay begins; outside the pulse the force is noise."""
     first = max(hit.onset - round(_BEFORE_PULSE * rate), 0)
     pulse = force[first : hit.start] - np.median(force)
     at = (np.arange(first, hit.start) - hit.start) / rate

@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Complex, Floats
 from bayesplate.recordings.local_fit import STEADY
 from bayesplate.recordings.modes_found import Mode
 from bayesplate.recordings.signals import Motion
 from bayesplate.recordings.spectra import Spectra
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _TURN: dict[Motion, tuple[complex, int]] = {
     "acceleration": (-1j, -1),
@@ -33,21 +30,13 @@ _SIGNED, _MOST_COMPLEX = 3.0, 60.0
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """How a mode answers.
+    """How a mode answers."""
 
-    Attributes
-    ----------
-    mobility : (n_places,) complex array
-        Residue of the mobility between each pair of places, in the units of the recordings; for a simple mode it is
-        real. Without a force it is known but for a factor for each place.
-    sd : (n_places,) array
-    alike : float
-        Share of the residues' power that is the same for every hit between the same places, 0 to 1; 1 where no two
-        records are of the same places.
-    """
-
+    # (n_places,): residue between each pair of places, in the units of the recordings; real for a simple mode, known
+    # but for a factor for each place without a force
     mobility: Complex
     sd: Floats
+    # share of the residues' power that is the same for every hit between the same places; 1 where there is one each
     alike: float
 
     @property
@@ -57,7 +46,7 @@ class Answer:
 
     @property
     def complexity(self) -> float:
-        """By how many degrees the residues are complex, 0 to 90, the strongest counting most."""
+        """Angle of the residues from real ones, 0 to 90 degrees, the strongest counting most."""
         squares, power = np.sum(self.mobility**2), float(np.sum(np.abs(self.mobility) ** 2))
         # of residues r_k e^(i a) with one a, the sum of squares is real and positive where a is zero
         return float(np.degrees(0.5 * np.arccos(np.clip(np.real(squares) / max(power, 1e-300), -1.0, 1.0))))

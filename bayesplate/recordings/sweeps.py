@@ -15,13 +15,11 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.hits import LEAST_DURATION, LONGEST_DURATION, Hit
 from bayesplate.recordings.signals import Recording
-
-Floats = NDArray[np.float64]
 
 _BEFORE = 0.01
 """s before the impulse response that are kept."""

@@ -90,7 +90,6 @@ def take_impulses(impulses: Sequence[tuple[Recording, Hit]], highest: float) -> 
 
 
 def _hit_faults(one: Recording, hits: Sequence[Hit]) -> list[Fault]:
-    """Why nothing can be taken from a recording."""
     if (no_force := force_fault(one)) is not None:
         return [no_force]
     if not hits:
@@ -115,7 +114,6 @@ def _told_of(one: Recording, hits: Sequence[Hit]) -> list[str]:
 
 
 def _unusable(one: Recording, hits: Sequence[Hit]) -> list[tuple[str, str]]:
-    """Which hits cannot be used, and why."""
     numbered = enumerate(hits, start=1)
     return [(f"hit {number} at {hit.onset / one.rate:.2f} s", hit.fault) for number, hit in numbered if hit.fault]
 

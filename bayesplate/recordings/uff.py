@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from bayesplate.errors import Fault, InputError
-from bayesplate.recordings.axes import rate_of
 from bayesplate.recordings.signals import FrequencyResponse, Motion, Read, Recording
+from bayesplate.recordings.tables import rate_of
 
 _TIME, _RESPONSE = 1, 4
 """Kinds of function: a time response, a frequency response."""
@@ -75,7 +75,6 @@ def _of_sets(sets: list[dict[str, Any]], shown: str, motion: Motion) -> Iterator
 
 
 def _unit(one: dict[str, Any], kind: int, name: str) -> float:
-    """The unit of the abscissa in s or Hz."""
     unit, data = str(one.get("abscissa_axis_units_lab") or "").strip(), int(one.get("abscissa_spec_data_type") or 0)
     known, of = _AXES[kind]
     if data not in (*_UNKNOWN, of) or unit.lower() not in known:

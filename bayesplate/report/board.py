@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values, vibrating_lengths
 from bayesplate.board.setup import Setup
 from bayesplate.board.words import EDGES
@@ -18,7 +18,6 @@ from bayesplate.report.style import DARK, GREY, LIGHT, SMALL, VERMILLION, WIDTH,
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Floats = NDArray[np.float64]
 
 _WIDEST, _TALLEST = 3.1, 3.6
 _LEFT, _ABOVE, _BELOW = 0.85, 0.42, 0.62
@@ -30,7 +29,8 @@ _N_POINTS = 201
 _BENT = 0.12
 """Height at which the largest rise is drawn, as a share of the shorter side."""
 _LINES = {"clamped": ("-", 1.6), "supported": ((0, (4, 3)), 1.6), "free": ("-", 0.9)}
-_MARKERS = {"accelerometer": "s", "exciter": "D", "shaker": "D", "weight": "p"}
+_MARKERS = {"accelerometer": "s", "exciter": "D", "shaker": "D", "weight": "p", "hammer": "X"}
+_MARK: Any = {"ls": "none", "ms": 7, "mec": "black", "mew": 0.8, "clip_on": False, "zorder": 6}
 
 
 def board_picture(board: Board) -> Picture:
@@ -67,11 +67,14 @@ def board_picture(board: Board) -> Picture:
             handles=list(handles.values()), loc="lower center", ncols=3, frameon=False, fontsize=SMALL,
             handletextpad=0.4,
         )  # fmt: skip
-    caption = " ".join([_SEEN, *([] if board.isotropic else [_GRAIN]), _EDGES])
-    if not all(one.is_rectangle for one in outlines):
-        caption = f"{caption} {_OUTLINE}"
-    if _is_warped(board):
-        caption = f"{caption} {_WARP}"
+    said = {
+        _SEEN: True,
+        _GRAIN: not board.isotropic,
+        _EDGES: True,
+        _OUTLINE: not all(one.is_rectangle for one in outlines),
+        _WARP: _is_warped(board),
+    }
+    caption = " ".join(text for text, holds in said.items() if holds)
     return Picture("board", "The board, drawn to scale", _alt(board, values, outlines), caption, figure)
 
 
@@ -82,8 +85,6 @@ _OUTLINE = (
     "The outline is what the readings of the width make probable. Which edge recedes they do not say: where both are "
     "free, both are drawn to recede alike."
 )
-
-
 _WARP = (
     "Dashed: how far the board is from flat where a straightedge lies along it and across it, drawn larger than it is; "
     "a filled corner lifts off the table."
@@ -92,12 +93,7 @@ _WARP = (
 
 @dataclass(frozen=True, eq=False)
 class _Outline:
-    """Where a whole board begins and ends along y at points along it, clamped parts included.
-
-    Attributes
-    ----------
-    x, low, high : (n,) array, m
-    """
+    """Ends of a whole board along y, m, at points along it, clamped parts included."""
 
     x: Floats
     low: Floats
@@ -106,15 +102,13 @@ class _Outline:
 
     @property
     def width(self) -> float:
-        """Widest width, m."""
         return float(self.high.max())
 
     def at(self, x: Floats) -> tuple[Floats, Floats]:
-        """Where it begins and ends along y at points along it, m; as at its ends beyond them."""
+        """Its ends along y at points along it, m; beyond its length as at its ends."""
         return np.interp(x, self.x, self.low), np.interp(x, self.x, self.high)
 
     def across(self) -> str:
-        """Its width in words."""
         narrowest, widest = (f"{end((self.high - self.low) * 1e3):.4g}" for end in (np.min, np.max))
         return f"{widest} mm across" if self.is_rectangle else f"{narrowest} to {widest} mm across"
 
@@ -131,14 +125,12 @@ def _outline(system: System, values: Values) -> _Outline:
 
 
 def _draw_grain(panel: Axes, outline: _Outline) -> None:
-    """Fine lines along the board."""
     for y in np.linspace(0, outline.width, _N_GRAIN + 2)[1:-1]:
         within = (outline.low <= y) & (y <= outline.high)
         panel.plot(outline.x, np.where(within, y, np.nan), color=LIGHT, lw=0.7, zorder=1)
 
 
 def _draw_board(panel: Axes, setup: Setup, outline: _Outline, values: Values, scale: float, along: str) -> None:
-    """Edges and dimensions."""
     length, width = float(values["length_x"]), outline.width
     covered = {edge: float(values[setup.input_name(edge)]) for edge in setup.clamped}
     low_x, high_x = covered.get("x0", 0.0), length - covered.get("x1", 0.0)
@@ -215,22 +207,21 @@ def _dimension(panel: Axes, start: tuple[float, float], end: tuple[float, float]
 def _draw_items(panel: Axes, setup: Setup, outline: _Outline) -> dict[str, Any]:
     """Hammer and attached items at their places from the corner of x0 and y0; a handle for the legend by name."""
     corner = outline.low[0]
-    style: Any = {"ls": "none", "ms": 7, "mec": "black", "mew": 0.8, "clip_on": False, "zorder": 6}
-    handles: dict[str, Any] = {}
-    for kind in dict.fromkeys(item.kind for item in setup.attached):
-        places = [(x, y + corner) for item in setup.attached if item.kind == kind for x, y in item.places]
-        if not places:
-            continue
-        handles[kind] = _points(panel, places, _MARKERS[kind], kind, mfc=VERMILLION, **style)
+    places: dict[str, list[tuple[float, float]]] = {}
+    for item in setup.attached:
+        places.setdefault(item.kind, []).extend(item.places)
     if setup.hammer is not None:
-        handles["hammer"] = _points(
-            panel, [(setup.hammer[0], setup.hammer[1] + corner)], "X", "hammer", mfc="white", **style
-        )
+        places["hammer"] = [setup.hammer]
+    handles: dict[str, Any] = {}
+    for kind, at in places.items():
+        if at:
+            x, y = np.transpose(at)
+            face = "white" if kind == "hammer" else VERMILLION
+            handles[kind] = panel.plot(x, y + corner, marker=_MARKERS[kind], label=kind, mfc=face, **_MARK)[0]
     return handles
 
 
 def _is_warped(board: Board) -> bool:
-    """Whether a rise was read that is not zero."""
     return any(rise.mean for rise in board.warp.values())
 
 
@@ -252,18 +243,12 @@ def _draw_warp(panel: Axes, board: Board, length: float, width: float) -> dict[s
                 handles[name] = panel.plot(*lines[name], color=VERMILLION, lw=1.3, ls=style, label=told, zorder=5)[0]
     if "twist" in rises:
         told = f"twist {rises['twist'] * 1e3:.3g} mm"
-        marker: Any = {"ls": "none", "ms": 8, "mec": "black", "mew": 0.8, "clip_on": False, "zorder": 6}
-        handles["twist"] = _points(panel, [(length, width)], "^", told, mfc=VERMILLION, **marker)
+        marker = {**_MARK, "ms": 8, "marker": "^", "mfc": VERMILLION}
+        handles["twist"] = panel.plot([length], [width], label=told, **marker)[0]
     return handles
 
 
-def _points(panel: Axes, places: Sequence[tuple[float, float]], marker: str, label: str, **style: Any) -> Any:
-    x, y = zip(*places, strict=True)
-    return panel.plot(x, y, marker=marker, label=label, **style)[0]
-
-
 def _along(board: Board) -> str:
-    """What the length of a board runs along."""
     return "along x" if board.isotropic else "along the grain"
 
 

@@ -145,17 +145,15 @@ def left_out_picture(diagnosis: CampaignDiagnosis) -> Picture:
 
 
 def _shown(names: Iterable[str]) -> list[str]:
-    """Names of boards as far as they have room."""
     return [short(drawable(name), _LONGEST) for name in names]
 
 
 def _ends(entry: Spread, factor: float) -> tuple[float, float, float]:
-    """Where a 90 % interval begins, its median, and where it ends."""
+    """Lower end, median and upper end of a 90 % interval."""
     return entry.q05 * factor, entry.q50 * factor, entry.q95 * factor
 
 
 def every_picture(summary: CampaignSummary, diagnosis: CampaignDiagnosis | None = None) -> dict[str, list[Picture]]:
-    """The figures of the page, by the place where they stand."""
     told = diagnosis is not None and bool(diagnosis.left_out_boards)
     return {
         "diagnosis": [left_out_picture(diagnosis)] if diagnosis is not None and told else [],
@@ -165,30 +163,11 @@ def every_picture(summary: CampaignSummary, diagnosis: CampaignDiagnosis | None 
     }
 
 
-def pooled_rms_cents(summary: CampaignSummary) -> float:
-    """Error of all labelled modes of all boards, cents."""
-    residuals = [mode.residual_cents for one in summary.boards.values() for mode in one.modes]
-    return float(np.sqrt(np.mean(np.square(residuals))))
-
-
 @drawing()
 def write_campaign_report(
     folder: Path, title: str, summary: CampaignSummary, diagnosis: CampaignDiagnosis | None = None
 ) -> Path:
-    """Write the page and its figures as PNG and SVG.
-
-    Parameters
-    ----------
-    folder : Path
-        Made if it is not there.
-    title : str
-        Of the campaign; any text.
-
-    Returns
-    -------
-    Path
-        Of report.html.
-    """
+    """Write the page and its figures as PNG and SVG into a folder, which is made; returns the path of report.html."""
     shared = summary.shared
     return save_page(
         folder / PAGE,
@@ -211,7 +190,6 @@ def write_campaign_report(
 
 
 def sentences(summary: CampaignSummary, diagnosis: CampaignDiagnosis | None = None) -> tuple[str, ...]:
-    """The page in short."""
     told = []
     if diagnosis is not None:
         told += [claim_sentence(diagnosis)]
@@ -224,7 +202,9 @@ def sentences(summary: CampaignSummary, diagnosis: CampaignDiagnosis | None = No
         )
         if one.scatter is not None:
             told.append(f"The boards' own differ from it by {plus_minus(one.scatter, 100.0)} %.")
-    told.append(f"The fitted boards miss their labelled modes by {pooled_rms_cents(summary):.1f} cents in all.")
+    residuals = [mode.residual_cents for one in summary.boards.values() for mode in one.modes]
+    pooled = np.sqrt(np.mean(np.square(residuals)))
+    told.append(f"The fitted boards miss their labelled modes by {pooled:.1f} cents in all.")
     if diagnosis is not None and diagnosis.recommendation:
         told.append(f"What to do next: {diagnosis.recommendation}.")
     return tuple(told)

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.estimates.sheet import CombinedMode, Sheet, SheetMode, points
 from bayesplate.frequencies.system import Limits
+from bayesplate.planning.places import Placing
 from bayesplate.report.style import BLUE, DARK, GREEN, SMALL, VERMILLION, WORDS, drawable, in_figure, placed
 from bayesplate.results.words import STIFFNESS, STIFFNESS_OF_ISOTROPIC
 
@@ -45,15 +46,7 @@ class Layout:
 
 
 def layout(n_modes: int, aspect_ratio: float, *, has_combined: bool) -> Layout:
-    """The division of the page that makes the panels largest.
-
-    Parameters
-    ----------
-    aspect_ratio : float
-        Length of a board over its width.
-    has_combined : bool
-        Whether a row of combined modes comes last.
-    """
+    """The division of the page that makes the panels largest; `aspect_ratio` is length over width."""
     width = A4[0] - 2 * _MARGIN
     height = A4[1] - _HEAD - _FOOT - (_BETWEEN if has_combined else 0.0)
     found = []
@@ -65,44 +58,15 @@ def layout(n_modes: int, aspect_ratio: float, *, has_combined: bool) -> Layout:
     return max(found, key=lambda one: one.panel[0])
 
 
-@dataclass(frozen=True)
-class Marks:
-    """What is marked on every figure of a sheet, as fractions of the length that vibrates and of the width there.
-
-    Attributes
-    ----------
-    sensor, hammer : (float, float)
-    taps : tuple of (float, float)
-    heading : str
-        In place of the sheet's own.
-    """
-
-    sensor: tuple[float, float]
-    hammer: tuple[float, float]
-    taps: tuple[tuple[float, float], ...]
-    heading: str
-
-
-def chladni_sheet(sheet: Sheet, marks: Marks | None = None) -> Figure:
-    """Draw a sheet.
-
-    Parameters
-    ----------
-    marks : Marks, optional
-        Where sensor and hammer go.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        A4 upright, one panel a mode in the order of frequency, then the combined modes; no state of pyplot is touched.
-    """
+def chladni_sheet(sheet: Sheet, placing: Placing | None = None) -> Figure:
+    """A sheet, A4 upright: a panel for each mode, where sensor and hammer go on each, then the combined modes."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=A4)
     plan = layout(len(sheet.modes), sheet.aspect_ratio, has_combined=bool(sheet.combined))
-    if marks is not None:
+    if placing is not None:
         plan = _close(plan)
-    heading = f"{'Chladni figures' if marks is None else marks.heading}: {drawable(sheet.title)}"
+    heading = f"{'Chladni figures' if placing is None else 'Modes to look for'}: {drawable(sheet.title)}"
     size = min(14.0, 14.0 * _LONGEST_HEADING / len(heading))
     _text(figure, A4[0] / 2, A4[1] - 0.45, heading, fontsize=size, weight="bold")
     held = f"setup: {sheet.setup}; {sheet.theory} plate; Hz {sheet.basis}"
@@ -113,37 +77,35 @@ def chladni_sheet(sheet: Sheet, marks: Marks | None = None) -> Figure:
         in_row = min(plan.n_columns, len(sheet.modes) - row * plan.n_columns)
         panel = _panel(figure, plan, _left(plan, column, in_row), top - row * plan.cell[1], sheet)
         draw_sand(panel, mode.shape, sheet.limits)
-        if marks is not None:
-            _draw_marks(panel, marks, sheet)
+        if placing is not None:
+            _draw_placing(panel, placing, sheet)
         caption(panel, *_mode_caption(mode))
     if sheet.combined:
         _draw_combined(figure, plan, sheet, top - plan.n_rows * plan.cell[1])
-    _legend(figure, sheet, marks)
+    _legend(figure, sheet, placing)
     return figure
 
 
 def _close(plan: Layout) -> Layout:
-    """The same panels with no more room below each than its caption takes."""
+    """A layout with the same panels and no more room below each than its caption takes."""
     height = min(plan.cell[1], plan.panel[1] + _CAPTION + _GAP + _AIR)
     return replace(plan, cell=(plan.cell[0], height))
 
 
-def _draw_marks(panel: Axes, marks: Marks, sheet: Sheet) -> None:
-    """Sensor, hammer, and where to tap."""
+def _draw_placing(panel: Axes, placing: Placing, sheet: Sheet) -> None:
     style: Any = {"ls": "none", "clip_on": False, "zorder": 6, "mec": "black"}
-    if marks.taps:
+    if placing.taps:
         panel.plot(
-            *np.transpose([sheet.drawn_at(*tap) for tap in marks.taps]),
+            *np.transpose([sheet.drawn_at(*tap) for tap in placing.taps]),
             ".",
             ms=4,
             **style | {"mfc": GREEN, "mec": GREEN},
         )
-    panel.plot(*sheet.drawn_at(*marks.sensor), "o", ms=8, color=BLUE, mew=0.8, **style)
-    panel.plot(*sheet.drawn_at(*marks.hammer), "X", ms=9, color=VERMILLION, mew=0.8, **style)
+    panel.plot(*sheet.drawn_at(*placing.sensor), "o", ms=8, color=BLUE, mew=0.8, **style)
+    panel.plot(*sheet.drawn_at(*placing.hammer), "X", ms=9, color=VERMILLION, mew=0.8, **style)
 
 
 def _draw_combined(figure: Figure, plan: Layout, sheet: Sheet, top: float) -> None:
-    """The last row: the combined modes under their heading."""
     mixed = {name for one in sheet.combined for name in one.weights}
     are_measured = all(mode.measured_hz is not None for mode in sheet.modes if mode.name in mixed)
     which = "measured" if are_measured else "lowest named"
@@ -160,7 +122,6 @@ def _draw_combined(figure: Figure, plan: Layout, sheet: Sheet, top: float) -> No
 
 
 def _left(plan: Layout, column: int, in_row: int) -> float:
-    """Left side of a panel in a centred row, inches."""
     return A4[0] / 2 + (column - in_row / 2) * plan.cell[0] + (plan.cell[0] - plan.panel[0]) / 2
 
 
@@ -202,7 +163,7 @@ def draw_edge(panel: Axes, name: str, word: str, depth: float, limits: Limits | 
         panel.add_patch(hatched)
 
 
-def _outline(limits: Limits | None) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _outline(limits: Limits | None) -> tuple[Floats, Floats, Floats]:
     """Points along the length, from end to end, and where the board begins and ends along y there."""
     if limits is None:
         return np.array([0.0, 1.0]), np.zeros(2), np.ones(2)
@@ -211,8 +172,8 @@ def _outline(limits: Limits | None) -> tuple[NDArray[np.float64], NDArray[np.flo
     return x, *limits
 
 
-def _places(n: int, limits: Limits | None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where a shape of n by n points is drawn: x and y, as it is, (n, n) arrays."""
+def _places(n: int, limits: Limits | None) -> tuple[Floats, Floats]:
+    """Points x and y, (n, n) arrays, at which a shape of n by n points is drawn."""
     x, y = np.meshgrid(points(n), points(n), indexing="ij")
     if limits is None:
         return x, y
@@ -220,7 +181,7 @@ def _places(n: int, limits: Limits | None) -> tuple[NDArray[np.float64], NDArray
     return x, low + y * (high - low)
 
 
-def draw_sand(panel: Axes, shape: NDArray[np.float64], limits: Limits | None = None) -> None:
+def draw_sand(panel: Axes, shape: Floats, limits: Limits | None = None) -> None:
     """Nodal lines in black; the parts that move down while the others move up are grey."""
     at = _places(len(shape), limits)
     panel.contourf(*at, shape, levels=[-np.inf, 0.0, np.inf], colors=[_LOW, "white"])
@@ -259,8 +220,7 @@ def caption(panel: Axes, first: str, *others: str) -> None:
         panel.annotate(line, (0.5, 0.0), (0, -18 - 10 * i), fontsize=SMALL, color=DARK, **common)
 
 
-def _legend(figure: Figure, sheet: Sheet, marks: Marks | None) -> None:
-    """What the drawing means, at the foot of the page."""
+def _legend(figure: Figure, sheet: Sheet, placing: Placing | None) -> None:
     drawn = {"clamped": "hatched", "supported": "dashed", "free": "thin"}
     edges = ", ".join(f"{drawn[word]} = {word}" for word in dict.fromkeys(sheet.edges.values()))
     along, begins = ("x", "x") if sheet.isotropic else ("the grain", "The grain")
@@ -271,7 +231,7 @@ def _legend(figure: Figure, sheet: Sheet, marks: Marks | None) -> None:
         f"here the counts begin at {sheet.first_label}.",
     )
     told = [f"Likely: two times in three, {sheet.likely}."] if sheet.likely else []
-    if marks is not None:
+    if placing is not None:
         told.append("Disc: the sensor. Cross: the hammer. Small dots: tap there to tell the figures apart.")
     for i, line in enumerate((*lines, *told)):
         _text(figure, A4[0] / 2, 0.68 - 0.15 * i, line, fontsize=8)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.material import MODULI
 from bayesplate.estimates.paper import paper_system
 from bayesplate.estimates.percentile import PercentileEstimate, percentile_estimate
@@ -36,19 +37,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def constants_figure(summary: Summary, moduli: Mapping[str, NDArray[np.float64]]) -> Figure:
-    """Posterior of E_x, E_y and G_xy side by side, with the point estimates that people know.
-
-    Parameters
-    ----------
-    moduli : dict of array, Pa
-        Draws of each modulus.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Three panels, GPa; no state of pyplot is touched.
-    """
+def constants_figure(summary: Summary, moduli: Mapping[str, Floats]) -> Figure:
+    """Posterior of E_x, E_y and G_xy side by side, from draws in Pa, with the point estimates that people know."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 3.4), layout="constrained")
@@ -62,8 +52,8 @@ def constants_figure(summary: Summary, moduli: Mapping[str, NDArray[np.float64]]
     return figure
 
 
-def constants_picture(summary: Summary, moduli: Mapping[str, NDArray[np.float64]]) -> Picture:
-    """The same below each other, for a page; parameters as of `constants_figure`."""
+def constants_picture(summary: Summary, moduli: Mapping[str, Floats]) -> Picture:
+    """The posterior of each constant below the other, for a page."""
     figure, panels = stacked([0.95] * 3, left=0.2, right=0.2, top=0.3, bottom=0.95, gap=0.72)
     for panel, name in zip(panels, MODULI, strict=True):
         _draw_posterior(panel, name, summary, moduli[name])
@@ -80,15 +70,15 @@ def constants_picture(summary: Summary, moduli: Mapping[str, NDArray[np.float64]
 
 
 def modulus_title(name: str, *, isotropic: bool = False) -> str:
-    """What stands above the panel of a modulus."""
     return f"{in_figure(name)}: {(STIFFNESS_OF_ISOTROPIC if isotropic else STIFFNESS)[name]}"
 
 
-def _draw_posterior(panel: Axes, name: str, summary: Summary, moduli: NDArray[np.float64]) -> None:
+def _draw_posterior(panel: Axes, name: str, summary: Summary, moduli: Floats) -> None:
     """One constant: its draws, its 90 % interval, and the estimates of the older methods."""
     draws = np.asarray(moduli).ravel() * GPA
     entry = summary.elastic[name]
-    paper, weighted = (_point(one[name]) for one in (summary.least_squares, summary.weighted_least_squares))
+    estimates = (summary.least_squares[name], summary.weighted_least_squares[name])
+    paper, weighted = (None if value is None else value * GPA for value in estimates)
     band = _band(summary.percentile, name)
     ends = limits(draws, [value for value in (paper, weighted, *(band or ())) if value is not None])
     hump(panel, draws, ends)
@@ -117,10 +107,6 @@ def _mark(panel: Axes, at: float | None, ends: tuple[float, float], label: str, 
     panel.plot([ends[not is_low]], [0.5], marker="<" if is_low else ">", color=style["color"], ms=7, clip_on=False)
 
 
-def _point(value: float | None) -> float | None:
-    return None if value is None else value * GPA
-
-
 def _band(percentile: Percentile | None, name: str) -> tuple[float, float] | None:
     """Mean less and plus the percentile method's own spread, GPa; None where it gave none."""
     if percentile is None or (mean := percentile[name].mean) is None:
@@ -147,7 +133,7 @@ def percentiles_pictures(inference: Inference, draws: Draws) -> list[Picture]:
     return [_picture(estimate, system.psi.size, draws.moduli)]
 
 
-def _picture(percentile: PercentileEstimate, n_modes: int, moduli: Mapping[str, NDArray[np.float64]]) -> Picture:
+def _picture(percentile: PercentileEstimate, n_modes: int, moduli: Mapping[str, Floats]) -> Picture:
     """Estimates of each modulus, a dot for each subset, at the height of the number of its modes."""
     heights = [min(1.9, 0.5 + 0.24 * (n_modes - 2))] * len(MODULI)
     figure, panels = stacked(heights, left=0.55, top=0.3, bottom=0.95, gap=0.72)
@@ -169,9 +155,7 @@ def _picture(percentile: PercentileEstimate, n_modes: int, moduli: Mapping[str, 
     return Picture("percentiles", title, alt, caption, figure)
 
 
-def _draw_estimates(
-    panel: Axes, name: str, percentile: PercentileEstimate, n_modes: int, moduli: NDArray[np.float64]
-) -> None:
+def _draw_estimates(panel: Axes, name: str, percentile: PercentileEstimate, n_modes: int, moduli: Floats) -> None:
     """One constant: the posterior at the foot, the band, and a dot an estimate."""
     i = MODULI.index(name)
     sizes = np.concatenate([np.full(comb(n_modes, size), size) for size in range(3, n_modes + 1)])
@@ -194,8 +178,7 @@ def _draw_estimates(
     panel.set(xlim=ends, ylim=(0, n_modes + 0.7), yticks=ticks, xlabel="GPa")
 
 
-def _arrows(panel: Axes, estimates: NDArray[np.float64], sizes: NDArray[np.int_], low: float, high: float) -> None:
-    """Marks at the sides for estimates beyond them."""
+def _arrows(panel: Axes, estimates: Floats, sizes: NDArray[np.int_], low: float, high: float) -> None:
     for beyond, at, marker in ((estimates < low, low, "<"), (estimates > high, high, ">")):
         for size in np.unique(sizes[beyond]):
             panel.scatter([at], [size], s=22, marker=marker, color="0.45", clip_on=False, zorder=4)

@@ -17,16 +17,7 @@ from bayesplate.results.contract import Spread
 from bayesplate.results.fit_tables import modes_table, peaks_table
 from bayesplate.results.summary import NONE_JUDGED, TOO_FEW_LEFT, Summary
 from bayesplate.results.tables import Cell, Row, Table, by_constant
-from bayesplate.results.words import (
-    CONSTANTS,
-    GPA,
-    Value,
-    constant_name,
-    number,
-    percent,
-    plus_minus,
-    two_digits,
-)
+from bayesplate.results.words import CONSTANTS, GPA, Value, constant_name, number, percent, plus_minus, two_digits
 
 _MAKERS = (
     ("wave_speed", "wave speed c", 1.0, "m/s"),
@@ -38,7 +29,6 @@ _RATIOS = (("anisotropy", "E_x / E_y"), ("E_x_over_G_xy", "E_x / G_xy"))
 
 
 def summary_sentences(summary: Summary) -> list[str]:
-    """The fit in three plain sentences."""
     error = summary.error
     E_x, E_y, G_xy = (plus_minus(entry, GPA) for _, entry in summary.elastic.items())
     n = len(summary.modes)
@@ -69,7 +59,6 @@ def _cents(value: float) -> str:
 
 
 def makers_table(summary: Summary) -> Table:
-    """What makers derive from the constants, along and across the grain."""
     derived = summary.derived
     rows: list[Row] = [
         (words, *(plus_minus(derived[f"{name}_{axis}"], factor) for axis in "xy"), unit)
@@ -79,7 +68,6 @@ def makers_table(summary: Summary) -> Table:
 
 
 def ratios_table(summary: Summary) -> Table:
-    """Ratios of the constants, and the density."""
     derived = summary.derived
     rows: list[Row] = [(words, plus_minus(derived[name])) for name, words in _RATIOS]
     rows.append(("density ρ, kg/m³", plus_minus(derived["density"])))
@@ -114,12 +102,10 @@ def _measured(entry: Spread) -> tuple[Cell, Cell]:
 
 
 def effect_sentences(summary: Summary) -> list[str]:
-    """One plain sentence a declared effect."""
     return [f"{effect_name(name)}: {EFFECTS[name].sentence}" for name in summary.model.effects]
 
 
 def budget_table(inference: Inference, draws: Draws, summary: Summary) -> Table:
-    """Where the uncertainty of each constant comes from."""
     board = inference.problem.board
     shares = budget(draws, board)
     alone = dict(zip(CONSTANTS, inference.problem.identifiability.errors_of_rigidities, strict=True))
@@ -144,7 +130,6 @@ def budget_table(inference: Inference, draws: Draws, summary: Summary) -> Table:
 
 
 def inputs_table(board: Board, summary: Summary) -> Table:
-    """What the card states, and what became of it where it was uncertain."""
     rows = []
     for one in filter(lambda one: one.is_listed, board.parameters):
         words, factor, unit = input_words(one, board)
@@ -165,7 +150,6 @@ def _stated(quantity: Quantity, factor: float) -> str:
 
 
 def setups_table(board: Board) -> Table:
-    """How the board was held, and how it was read."""
     rows = tuple(
         (
             setup.name,
@@ -179,7 +163,6 @@ def setups_table(board: Board) -> Table:
 
 
 def priors_table(prior: PriorCard) -> Table:
-    """The prior card, with its sources."""
     rows = tuple((name, _prior(stated.quantity), stated.source) for name, stated in prior.stated_constants.items())
     return Table(f"Prior card {prior.name}", ("constant", "density", "source"), rows)
 
@@ -192,13 +175,11 @@ def _prior(quantity: Quantity) -> str:
 
 
 def modes_tables(summary: Summary) -> list[Table]:
-    """The labelled modes, and the peaks whose label is not sure."""
     peaks = peaks_table(summary)
     return [modes_table(summary), *([peaks] if peaks else [])]
 
 
 def laws_table(summary: Summary) -> Table:
-    """Posterior means under both laws."""
     columns = {
         "linear law": lambda name: number(summary.linear_means[name], 3, factor=GPA),
         "exact law": lambda name: number(summary.exact_means[name], 3, factor=GPA),
@@ -207,7 +188,6 @@ def laws_table(summary: Summary) -> Table:
 
 
 def model_rows(summary: Summary) -> list[tuple[str, str]]:
-    """What was fitted, as pairs of a name and a value."""
     model, error = summary.model, summary.error
     effects = joined([effect_name(name) for name in model.effects]) or "none"
     noise = "Student's distribution (robust)" if model.robust else "normal distribution"
@@ -223,7 +203,6 @@ def model_rows(summary: Summary) -> list[tuple[str, str]]:
 
 
 def sampler_rows(summary: Summary) -> list[tuple[str, str | Value]]:
-    """How the sampler fared, beside what convergence asks for."""
     one, limits = summary.sampler, Gate()
     return [
         ("ensembles, walkers, steps", f"{one.ensembles}, {one.walkers}, {one.steps}"),
@@ -236,6 +215,5 @@ def sampler_rows(summary: Summary) -> list[tuple[str, str | Value]]:
 
 
 def run_rows(summary: Summary) -> list[tuple[str, str]]:
-    """What made the numbers, so that they can be made again."""
     versions = ", ".join(f"{name} {version}" for name, version in summary.versions.items())
     return [("seed", str(summary.seed)), ("versions", versions), ("SHA-256 of the card", summary.card_sha256)]

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.material import MODULI
 from bayesplate.libraries import load_arviz
@@ -23,7 +23,6 @@ from bayesplate.results.words import GPA
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 MOST = 6
 """Columns of the report: more cannot be read on a phone."""
@@ -44,25 +43,12 @@ _BRIEF = {
 
 
 def corner_figure(
-    columns: Mapping[str, Floats],
-    marked: Mapping[str, float | None] | None = None,
-    labels: Sequence[str] | None = None,
+    columns: Mapping[str, Floats], marked: Mapping[str, float | None] | None = None, labels: Sequence[str] | None = None
 ) -> Figure:
-    """Every pair of columns against each other; the lines hold half and nine tenths of the draws.
+    """Every pair of columns of draws against each other; the lines hold half and nine tenths of the draws.
 
-    Parameters
-    ----------
-    columns : dict of array of any shape
-        Draws by what stands at their axis, units included; all of one size.
-    marked : dict of float, optional
-        Values to mark by a line, such as the least squares, by the same words.
-    labels : sequence of str, optional
-        What stands at the axes instead.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        No state of pyplot is touched.
+    Columns are named by what stands at their axis, unless there are labels; values of `marked`, by the same names, get
+    a line.
     """
     load_arviz()  # which corner imports, and which has to be kept quiet
     import corner
@@ -120,7 +106,6 @@ def corner_figure(
 def write_corner_plot(
     path: Path, columns: Mapping[str, Floats], marked: Mapping[str, float | None] | None = None
 ) -> None:
-    """Write the figure by the ending of the path, PNG or SVG; further parameters as of `corner_figure`."""
     save_figure(corner_figure(columns, marked), path)
 
 
@@ -148,14 +133,9 @@ def axis_labels(names: Sequence[str]) -> list[str]:
 
 
 def axis_label(name: str, side: float) -> str:
-    """A name and its unit, in lines no longer than the panel, as matplotlib sets them.
+    """A name and its unit, in lines no longer than the side of a panel in inches, as matplotlib sets them.
 
-    Parameters
-    ----------
-    name : str
-        A symbol of ours becomes mathematics; nothing else does.
-    side : float
-        Of the panel, inches.
+    A symbol of ours becomes mathematics; nothing else does.
     """
     for words, brief in _BRIEF.items():
         name = name.replace(words, brief)
@@ -190,7 +170,6 @@ def words_and_factor(name: str, board: Board) -> tuple[str, float]:
 
 
 def _correlated(columns: Mapping[str, Floats]) -> str:
-    """The pairs whose correlation is strong, in words."""
     names = [name.partition(",")[0] for name in columns]
     matrix = np.corrcoef([values.ravel() for values in columns.values()])
     strong = [(i, j) for i in range(len(names)) for j in range(i) if abs(matrix[i, j]) > _STRONG]

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.material import MODULI
 from bayesplate.grading.boards import BatchSummary
 from bayesplate.grading.figures import FIGURES, limit_told
@@ -48,8 +48,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-Floats = NDArray[np.float64]
-
 MOST_NAMED = 30
 """Boards up to which each has a row with its name; more are drawn in the order of their size, without names."""
 _ROW, _CROWD, _LEFT, _LONGEST = 0.2, 1.6, 1.75, 24
@@ -62,7 +60,6 @@ _STYLES = {"E_x": (BLUE, "o"), "E_y": (ORANGE, "D"), "G_xy": (GREEN, "s")}
 
 
 def every_grading_picture(graded: Grading) -> dict[str, list[Picture]]:
-    """The figures of the page, by the place where they stand; none where no board was fitted."""
     if not graded.names:
         return {"constants": [], "makers": [], "limits": [], "pairs": []}
     return {
@@ -102,7 +99,6 @@ def sorted_picture(graded: Grading) -> Picture:
 
 
 def _draw_crowd(panel: Axes, ends: tuple[Floats, Floats, Floats]) -> None:
-    """Bars and dots of boards that are too many to be named."""
     low, middle, high = ends
     ranks, as_pixels = np.arange(len(middle)), len(middle) > _MOST_VECTORS
     panel.hlines(ranks, low, high, color=SKY, lw=0.8, rasterized=as_pixels)
@@ -231,7 +227,6 @@ def _lines_of_equal_ratio(panel: Axes, ratios: Floats) -> None:
 
 
 def _limit_band(panel: Axes, graded: Grading, name: str) -> None:
-    """What a specification allows of a constant, shaded."""
     if name in graded.request.limits:
         low, high = graded.request.limits[name]
         factor = FIGURES[name].per_unit
@@ -250,17 +245,7 @@ _TABLES = ("constants", "makers", "limits", "pairs", "doubts")
 
 @drawing()
 def write_grading_page(folder: Path, graded: Grading, summary: BatchSummary, *, has_pages: bool) -> Path:
-    """Write the page and its figures as PNG and SVG.
-
-    Parameters
-    ----------
-    folder : Path
-        Must be there.
-    summary : BatchSummary
-        Of the same boards.
-    has_pages : bool
-        Whether each board has a page of its own in boards/NAME.
-    """
+    """Write the page and its figures as PNG and SVG; `has_pages`: each board has a page of its own in boards/NAME."""
     tables: dict[str, Table | None] = {**dict.fromkeys(_TABLES), **grading_tables(graded)}
     pages = [(marked(graded, i), f"boards/{graded.names[i]}/{PAGE}") for i in best_first(graded)[:MOST_LISTED]]
     return save_page(
@@ -281,7 +266,6 @@ def write_grading_page(folder: Path, graded: Grading, summary: BatchSummary, *, 
 
 
 def sentences(graded: Grading, summary: BatchSummary) -> tuple[str, ...]:
-    """The page in short."""
     told = [f"{summary.n_fitted} of {summary.n_boards} boards were fitted."]
     if graded.meets_all is not None and graded.names:
         meets = graded.meets_all[graded.trusted]
@@ -303,7 +287,6 @@ def sentences(graded: Grading, summary: BatchSummary) -> tuple[str, ...]:
 
 
 def matching_sentence(graded: Grading) -> str:
-    """When two boards match."""
     within = ", ".join(f"{name} within {value:g} %" for name, value in graded.request.match_percent.items())
     return (
         f"Two boards match where {within}, all at once. The errors of two boards are taken to be independent. The "

@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Values, vibrating_lengths
 from bayesplate.estimates.identifiability import Identifiability
-from bayesplate.estimates.shapes import N_POINTS, labelled_shapes
-from bayesplate.estimates.sheet import points
+from bayesplate.estimates.sheet import N_POINTS, labelled_shapes, points
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.posterior.draws import Draws, posterior_mean_values
@@ -54,7 +53,6 @@ _N_COLUMNS = 3
 
 
 def modes_pictures(inference: Inference, draws: Draws, summary: Summary) -> list[Picture]:
-    """One picture a setup."""
     problem = inference.problem
     shapes = labelled_shapes(problem.posterior.models, posterior_mean_values(problem, draws))
     caption = (
@@ -75,10 +73,7 @@ def modes_pictures(inference: Inference, draws: Draws, summary: Summary) -> list
     return pictures
 
 
-def _sand_figure(
-    model: SetupModel, values: Values, modes: Sequence[ModeRow], shapes: Mapping[str, NDArray[np.float64]]
-) -> Figure:
-    """The modes of a setup, their shapes by label."""
+def _sand_figure(model: SetupModel, values: Values, modes: Sequence[ModeRow], shapes: Mapping[str, Floats]) -> Figure:
     from matplotlib.figure import Figure
 
     system = model.system
@@ -101,7 +96,6 @@ def _sand_figure(
 
 
 def _hertz(mode: ModeRow) -> tuple[str, str]:
-    """Its measured and its predicted frequency in words."""
     return f"measured {mode.measured_hz:.6g} Hz", f"predicted {mode.predicted_hz.mean:.1f} Hz"
 
 
@@ -136,14 +130,8 @@ def residuals_picture(summary: Summary) -> Picture:
     return Picture("residuals", "How far each mode is missed", f"Errors of the fit, cents: {told}.", caption, figure)
 
 
-def predictive_picture(summary: Summary, predictive: NDArray[np.float64]) -> Picture:
-    """What the model expects to be read, beside what was read.
-
-    Parameters
-    ----------
-    predictive : (..., n_modes) array, Hz
-        Draws of the next reading.
-    """
+def predictive_picture(summary: Summary, predictive: Floats) -> Picture:
+    """What the model expects to be read, (..., n_modes) draws of the next reading in Hz, beside what was read."""
     modes = summary.modes
     measured = np.array([mode.measured_hz for mode in modes])
     draws = cents(np.log(np.maximum(predictive.reshape(-1, len(modes)), 1e-9) / measured))
@@ -171,7 +159,7 @@ def predictive_picture(summary: Summary, predictive: NDArray[np.float64]) -> Pic
     return Picture("predictive", "What the model would expect you to read", alt, caption, figure)
 
 
-def _rounding(modes: Sequence[ModeRow]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _rounding(modes: Sequence[ModeRow]) -> tuple[Floats, Floats]:
     """How far below and above each reading its rounding interval reaches: two (n_modes,) arrays, cents."""
     below, above = np.array([mode.rounding_cents or (0.0, 0.0) for mode in modes]).T
     return below, above
@@ -231,7 +219,6 @@ _SHARES_CAPTION = (
 
 
 def _best_witnesses(names: list[str], found: Identifiability) -> str:
-    """The best witness of each constant."""
     told = []
     for constant, column in zip(("E_x", "E_y", "G_xy"), found.shares.T, strict=True):
         best = int(np.argmax(column))
@@ -249,7 +236,6 @@ def spectrum_pictures(summary: Summary) -> list[Picture]:
 
 
 def _spectrum_picture(summary: Summary, spectrum: Spectrum) -> Picture:
-    """Measured peaks over predicted modes of a setup."""
     peaks = [peak for peak in summary.peaks if peak.setup == spectrum.setup]
     several = len(summary.spectra) > 1
     figure, (panel,) = stacked([2.6], left=0.2, right=0.2, bottom=0.4, top=0.1)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from bayesplate.board.board import Board
 from bayesplate.diagnosis.result import Diagnosis
@@ -41,43 +40,22 @@ from bayesplate.results.tables import escape, render, visible
 _PIXELS_AN_INCH = 96
 
 
-@dataclass(frozen=True)
-class PagePicture:
+class PagePicture(NamedTuple):
     """A picture as the page holds it: its words, its size in pixels, and its content as a data address."""
 
-    name: str
-    title: str
-    alt: str
-    caption: str
-    width: int
-    height: int
+    words: Picture
+    size: tuple[int, ...]
     source: str
 
 
 @drawing()
 def write_report(
-    folder: Path,
-    card: Board,
-    inference: Inference,
-    draws: Draws,
-    summary: Summary,
-    diagnosis: Diagnosis | None = None,
+    folder: Path, card: Board, inference: Inference, draws: Draws, summary: Summary, diagnosis: Diagnosis | None = None
 ) -> Path:
-    """Write report.html, its figures as PNG and SVG, and the tables for other programs.
+    """Write report.html, its figures as PNG and SVG, and the tables for other programs; returns the path of the page.
 
-    Parameters
-    ----------
-    folder : Path
-        Made if it is not there; what it holds of an earlier report is replaced.
-    inference : Inference
-        Of a run that has converged.
-    diagnosis : Diagnosis, optional
-        Then `inference`, `draws` and `summary` are those of the refitted model.
-
-    Returns
-    -------
-    Path
-        Of report.html. It shows the SVG figures, and is there before the PNG files are.
+    What the folder holds of an earlier report is replaced. With a diagnosis, `inference`, `draws` and `summary` are
+    those of the refitted model.
     """
     title = inference.problem.board.title or summary.name
     make_folder(folder)
@@ -91,19 +69,9 @@ def write_report(
 def save_page(
     path: Path, groups: Mapping[str, Sequence[Picture]], text: Callable[[Mapping[str, Sequence[PagePicture]]], str]
 ) -> Path:
-    """Write a page and, into the folder beside it, its figures as PNG and SVG.
+    """Write a page and, into the folder beside it, its figures as PNG and SVG, by the place where they stand.
 
-    Parameters
-    ----------
-    groups : dict of sequence of Picture
-        By the place where they stand.
-    text : callable
-        The page, given its pictures by their place.
-
-    Returns
-    -------
-    Path
-        Of the page. It shows the SVG figures, and is there before the PNG files are.
+    The page shows the SVG figures, and is there before the PNG files are.
     """
     make_folder(path.parent / FIGURES)
     every = [one for found in groups.values() for one in found]
@@ -116,7 +84,6 @@ def save_page(
 def pictures(
     inference: Inference, draws: Draws, summary: Summary, diagnosis: Diagnosis | None = None
 ) -> dict[str, list[Picture]]:
-    """Every figure of the page, by the place where it stands."""
     problem = inference.problem
     board = problem.board
     first, more = _of_diagnosis(diagnosis)
@@ -150,9 +117,9 @@ def _shown(picture: Picture, svg: bytes) -> PagePicture:
     """A picture as a page holds it, from the content of its SVG file."""
     from markupsafe import Markup
 
-    width, height = (round(_PIXELS_AN_INCH * side) for side in picture.figure.get_size_inches())
-    source = Markup(f"data:image/svg+xml;base64,{b64encode(svg).decode('ascii')}")  # nothing in it to escape
-    return PagePicture(picture.name, picture.title, picture.alt, picture.caption, width, height, source)
+    size = tuple(round(_PIXELS_AN_INCH * side) for side in picture.figure.get_size_inches())
+    # nothing in it to escape
+    return PagePicture(picture, size, Markup(f"data:image/svg+xml;base64,{b64encode(svg).decode('ascii')}"))
 
 
 def fit_page(
@@ -163,7 +130,6 @@ def fit_page(
     shown: Mapping[str, Sequence[PagePicture]],
     diagnosis: Diagnosis | None = None,
 ) -> str:
-    """The page as text; parameters as of `write_report`, `shown` the pictures by their place."""
     problem = inference.problem
     board, prior = problem.board, problem.prior
     return from_template(

@@ -12,7 +12,7 @@ from bayesplate.board.material import MODULI
 from bayesplate.planning.bench import Bench
 from bayesplate.planning.plan import Plan, ProposalEntry
 from bayesplate.planning.words import shared_words
-from bayesplate.report.chladni import Marks, chladni_sheet
+from bayesplate.report.chladni import chladni_sheet
 from bayesplate.report.style import (
     BLUE,
     DARK,
@@ -73,7 +73,6 @@ def gains_picture(plan: Plan) -> Picture:
 
 
 def _doubt(axes: Axes, plan: Plan, shown: Sequence[ProposalEntry]) -> None:
-    """How much of the doubt between the explanations goes."""
     share = 100.0 / plan.entropy
     values = np.array([share * max(one.gain.explanations or 0.0, 0.0) for one in shown])
     errors = np.array([share * (one.gain.explanations_error or 0.0) for one in shown])
@@ -85,7 +84,6 @@ def _doubt(axes: Axes, plan: Plan, shown: Sequence[ProposalEntry]) -> None:
 
 
 def _intervals(axes: Axes, plan: Plan, shown: Sequence[ProposalEntry]) -> None:
-    """What is left of each interval."""
     shared = list(shown[0].gain.shared) if shown else []
     names = shared or list(MODULI)
     for i, name in enumerate(names):
@@ -118,5 +116,4 @@ def _told(one: ProposalEntry) -> str:
 
 def bench_sheet(bench: Bench) -> Figure:
     """The sheet of one way to hold the board: A4 upright, one panel a mode in the order of frequency."""
-    placing = bench.placing
-    return chladni_sheet(bench.sheet, Marks(placing.sensor, placing.hammer, placing.taps, "Modes to look for"))
+    return chladni_sheet(bench.sheet, bench.placing)

@@ -63,11 +63,8 @@ class FitPlots(Plots):
     def corner(self, names: Sequence[str] = MODULI) -> Figure:
         """Every pair of quantities, by the package corner; least squares marked where there is one.
 
-        Parameters
-        ----------
-        names : sequence of str
-            One or more, each once, of moduli, rigidities and uncertain inputs; moduli are drawn in GPa, inputs in the
-            units of cards.
+        The names, each once, are of moduli, rigidities and uncertain inputs; moduli are drawn in GPa, inputs in the
+        units of cards.
         """
         known = {**self.draws.moduli, **self.draws.rigidities, **self.draws.inputs}
         if isinstance(names, str) or not len(names) or len(set(names)) < len(names):
@@ -205,7 +202,7 @@ def _figure(picture: Picture | None, place: str, wanted: str, got: str) -> Figur
 
 
 def _place(what: str, name: str | None, names: Sequence[str]) -> int:
-    """Where a name stands among those that there are; the first if none is given."""
+    """Index of a name among those that there are; the first if none is given."""
     if name is not None and name not in names:
         raise InputError(Fault(what, f"one of {', '.join(names)}", repr(name)))
     return 0 if name is None else list(names).index(name)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.board.parameter import Parameter, unit_of_people
@@ -51,24 +51,16 @@ _LONGEST = 28
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """A quantity with its draws and its prior, in one unit: what a panel shows.
-
-    Attributes
-    ----------
-    draws : (n_draws,) array
-    """
+    """A quantity with its draws, (n_draws,), and its prior, in one unit: what a panel shows."""
 
     name: str
     unit: str
-    draws: NDArray[np.float64]
+    draws: Floats
     prior: Quantity
 
     @property
     def told(self) -> str:
-        """What the readings made of it: how much narrower, or whether it was at least moved.
-
-        By the logarithm of what is positive by nature.
-        """
+        """What the readings made of it: how much narrower, or moved; of what is positive, by its logarithm."""
         is_log = self.prior.kind != "normal"
         draws = np.log(self.draws) if is_log else self.draws
         mean, sd = (np.log(self.prior.median), self.prior.log_sd) if is_log else (self.prior.mean, self.prior.sd)
@@ -152,7 +144,7 @@ _MOST_POINTS = 240
 def health_picture(inference: Inference) -> Picture:
     """The mean over the walkers of each ensemble, step by step."""
     convergence = inference.convergence
-    ways, burn_in = _ways(inference)
+    ways, burn_in = inference.chains.draws.mean(axis=2), inference.chains.burn_in
     n_ensembles, n_steps, _ = ways.shape
     names = [*inference.problem.board.symmetry.free, "noise"]
     figure, panels = stacked([0.68] * len(names), left=0.62, right=0.25, top=0.26, bottom=0.78, gap=0.34)
@@ -179,8 +171,3 @@ def health_picture(inference: Inference) -> Picture:
         "sign; the numbers below are the test."
     )
     return Picture("sampler", "How the sampler fared", alt, caption, figure)
-
-
-def _ways(inference: Inference) -> tuple[NDArray[np.float64], int]:
-    """Mean over the walkers of each ensemble, step by step, (n_ensembles, n_steps, n_dim), and the steps of burn-in."""
-    return inference.chains.draws.mean(axis=2), inference.chains.burn_in

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.recordings.contract import PickedRow, PickReport
 from bayesplate.recordings.modes_found import Path as FoundPath
 from bayesplate.recordings.picking import Picked
@@ -38,8 +38,6 @@ from bayesplate.report.style import (
 )
 from bayesplate.results.tables import Table
 from bayesplate.results.words import chances, percent, two_digits
-
-Floats = NDArray[np.float64]
 
 MOST_PLACES = 8
 _STEP = 30.0
@@ -163,7 +161,7 @@ def errors_picture(report: PickReport) -> Picture:
 
 
 def stability_picture(report: PickReport, paths: Sequence[FoundPath]) -> Picture:
-    """Where the search found modes with one mode in a window, with two, and so on."""
+    """The modes that the search found with one mode in a window, with two, and so on."""
     figure, (panel,) = stacked([2.2], left=0.55, right=0.2, bottom=0.75, top=0.05)
     widths = sorted({path.width for path in paths}, reverse=True)
     keys = []
@@ -217,7 +215,6 @@ def write_recordings_page(folder: Path, report: PickReport, picked: Picked) -> P
 
 
 def sentences(report: PickReport) -> tuple[str, ...]:
-    """The page in short."""
     hits = "One ring-down" if report.n_hits == 1 else f"{report.n_hits} ring-downs"
     places = "one pair of places" if report.n_places == 1 else f"{report.n_places} pairs of places"
     told = [
@@ -241,7 +238,6 @@ def sentences(report: PickReport) -> tuple[str, ...]:
 
 
 def modes_table(report: PickReport) -> Table:
-    """Every likely mode."""
     rows = tuple(
         (
             f"{peak.hz:.3f} ± {two_digits(peak.sd_hz)}",
@@ -257,7 +253,6 @@ def modes_table(report: PickReport) -> Table:
 
 
 def aside_table(aside: list[PickedRow]) -> Table:
-    """What was set aside, and why."""
     rows = tuple(
         (f"{peak.hz:.2f}", peak.kind or None, f"{peak.amplitude:.3f}", percent(peak.spurious_probability, 1))
         for peak in aside

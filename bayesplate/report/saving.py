@@ -46,18 +46,7 @@ def save_figure(figure: Figure, path: Path) -> None:
 
 
 def save_pictures(pictures: Iterable[Picture], folder: Path, ending: Ending) -> dict[str, bytes]:
-    """Write pictures, made while `drawing`, as PNG or SVG files, title and alternative text inside.
-
-    Parameters
-    ----------
-    folder : Path
-        Must be there.
-
-    Returns
-    -------
-    dict of bytes
-        The content of each file, by the picture's name.
-    """
+    """Write pictures, made while `drawing`, with title and alternative text inside; returns their content by name."""
     written = {}
     for picture in pictures:
         told = {"Title": picture.title, "Description": picture.alt}

@@ -8,8 +8,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.results.tables import GREEK, JOINERS, SYMBOL, visible
 
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-Floats = NDArray[np.float64]
 Limits = tuple[float, float]
 
 BLUE, ORANGE, GREEN, VERMILLION, SKY, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7"
@@ -43,22 +42,12 @@ NO_GLYPH = "\N{REPLACEMENT CHARACTER}"
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A figure of the report.
+    """A figure of the report."""
 
-    Attributes
-    ----------
-    name : str
-        Stem of its files.
-    alt : str
-        What a person who cannot see it should know.
-    caption : str
-        How to read it.
-    """
-
-    name: str
+    name: str  # stem of its files
     title: str
-    alt: str
-    caption: str
+    alt: str  # what a person who cannot see it should know
+    caption: str  # how to read it
     figure: Figure = field(repr=False)
 
 
@@ -71,7 +60,6 @@ def placed(figure: Figure, left: float, bottom: float, width: float, height: flo
 
 
 def plain_axes(panel: Axes) -> None:
-    """Small words, and no frame above and at the right."""
     panel.tick_params(labelsize=SMALL, length=3)
     panel.xaxis.label.set_fontsize(SMALL)
     panel.yaxis.label.set_fontsize(SMALL)
@@ -87,18 +75,7 @@ def stacked(
     bottom: float = 0.45,
     gap: float = 0.55,
 ) -> tuple[Figure, list[Axes]]:
-    """An empty figure with panels below each other; everything in inches, so that no layout need be searched for.
-
-    Parameters
-    ----------
-    left, right, top, bottom, gap : float
-        Margins of the page, and the space between two panels.
-
-    Returns
-    -------
-    figure : matplotlib.figure.Figure
-        No state of pyplot is touched.
-    """
+    """An empty figure with panels below each other, placed in inches, so that no layout need be searched for."""
     from matplotlib.figure import Figure
 
     height = top + sum(heights) + gap * (len(heights) - 1) + bottom
@@ -129,22 +106,13 @@ def name_rows(panel: Axes, names: Sequence[str], *, size: float = SMALL, parse_m
 
 
 def heading(panel: Axes, words: str) -> None:
-    """What a panel is of, above it."""
     panel.set_title(words, fontsize=WORDS, loc="left", weight="bold")
 
 
 def limits(draws: Floats, others: Iterable[float] = (), *, reach: float = 1.5, margin: float = 0.04) -> Limits:
-    """The range of a panel: nearly all draws, and of other values those that are not too far from them.
+    """The range of a panel: nearly all draws, and of other values those that are not farther off than `reach` widths.
 
-    Parameters
-    ----------
-    draws : array
-    others : iterable of float
-        Estimates that should be seen too.
-    reach : float
-        How far from the draws they may be, in widths of theirs.
-    margin : float
-        At either side, as a share of what is shown.
+    `margin` is air at either side, as a share of what is shown.
     """
     low, high = np.quantile(draws, _SHOWN)
     far = reach * (high - low)
@@ -208,7 +176,7 @@ def upright_names(panel: Axes, hertz: Sequence[float], names: Sequence[str], sta
         panel.text(place, end, names[i], rotation=90, ha="center", va=side, fontsize=SMALL - 1.5, **at)
 
 
-def moved_apart(wanted: NDArray[np.float64], least: float) -> NDArray[np.float64]:
+def moved_apart(wanted: Floats, least: float) -> Floats:
     """Places from 0 to 1, at least so far apart, near where they are wanted, which is in rising order."""
     placed = wanted.copy()
     for _ in range(2000):
@@ -234,7 +202,6 @@ def is_symbol(name: str) -> bool:
 
 
 def short(text: str, longest: int) -> str:
-    """A text cut to a number of characters, the cut shown."""
     return text if len(text) <= longest else text[: longest - 1] + "…"
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from types import SimpleNamespace
 
 from bayesplate.diagnosis.known_words import known_table
 from bayesplate.diagnosis.result import Diagnosis
@@ -30,38 +31,6 @@ from bayesplate.results.fit_tables import compared_constants
 from bayesplate.results.summary import Summary
 from bayesplate.results.tables import Table
 
-
-@dataclass(frozen=True)
-class DiagnosisSection:
-    """Everything that the page shows of a diagnosis besides its pictures.
-
-    Attributes
-    ----------
-    verdicts : tuple of (str, str, bool)
-        Each word that a verdict may be, what it means, and whether it is the one given.
-    known : str
-        What known effects do to the error, and what is claimed of those that the card states; empty if there are none.
-    tables : tuple of Table
-        Known effects, probabilities, errors, conditions of the claim, shift of the constants, sizes.
-    explained : tuple of str
-        What two words of these tables mean.
-    model : str
-        Which model the rest of the page is of.
-    """
-
-    heading: str
-    verdicts: tuple[tuple[str, str, bool], ...]
-    sentences: tuple[str, ...]
-    known: str
-    tables: tuple[Table, ...]
-    explained: tuple[str, ...]
-    model: str
-    notes: tuple[str, ...]
-    known_effects: Table | None
-    candidates: Table | None
-    recommendation: str
-
-
 _LOG_SCORE = (
     "Log score: the natural logarithm of how probable each reading was, given the others, summed over the modes. The "
     "higher, the better; it punishes errors as well as intervals that are too narrow."
@@ -69,8 +38,8 @@ _LOG_SCORE = (
 _SHIFT = "Shift, sd: how far a constant moves, counted in the standard deviations that it had before."
 
 
-def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
-    """The section of a diagnosis."""
+def diagnosis_section(diagnosis: Diagnosis) -> SimpleNamespace:
+    """Everything that the page shows of a diagnosis besides its pictures."""
     tables = (
         answers_table(diagnosis),
         errors_table(diagnosis),
@@ -78,8 +47,9 @@ def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
         shift_table(diagnosis),
         sizes_table(diagnosis),
     )
-    return DiagnosisSection(
+    return SimpleNamespace(
         heading=IN_PART if diagnosis.named_in_part else VERDICTS[diagnosis.verdict].heading,
+        # each word that a verdict may be, what it means, and whether it is the one given
         verdicts=tuple((word, one.heading, word == diagnosis.verdict) for word, one in VERDICTS.items()),
         sentences=tuple(verdict_sentences(diagnosis)),
         known=" ".join(known_sentences(diagnosis)),
@@ -96,8 +66,8 @@ def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
 def quoted(summary: Summary, diagnosis: Diagnosis | None) -> Summary:
     """A summary with the constants that are to be quoted, and the errors of the fit that they stand for.
 
-    Without a diagnosis it stays as it is; after one the constants are the averaged ones, and the errors those of the
-    first fit unless one model was named, be it in part.
+    After a diagnosis the constants are the averaged ones, and the errors those of the first fit unless one model was
+    named, be it in part.
     """
     if diagnosis is None:
         return summary
@@ -117,7 +87,6 @@ def quoted(summary: Summary, diagnosis: Diagnosis | None) -> Summary:
 
 
 def quoted_constants(summary: Summary, diagnosis: Diagnosis | None) -> Table:
-    """The constants to quote beside the older methods; its title says what they are."""
     what = "" if diagnosis is None else f", {what_is_quoted(diagnosis)}"
     return compared_constants(quoted(summary, diagnosis), f"Elastic constants{what}, GPa")
 

@@ -21,9 +21,8 @@ from bayesplate.diagnosis.joint import with_joint_pairs
 from bayesplate.diagnosis.search import PASSES, prepare_search, search
 from bayesplate.diagnosis.sensitivity import exact_log_frequencies
 from bayesplate.diagnosis.shifts import joint_law, joint_table, together
-from bayesplate.frequencies.full import full_log_frequencies
 from bayesplate.frequencies.laws import cents
-from bayesplate.frequencies.model import setup_model
+from bayesplate.frequencies.model import full_log_frequencies, setup_model
 from bayesplate.frequencies.system import system_of
 
 PAIR = {"fluid_loading", "membrane_tension"}

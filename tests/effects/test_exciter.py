@@ -13,8 +13,7 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Reading
 from bayesplate.effects.drives import Drive, Spot
 from bayesplate.effects.exciter import Exciter
-from bayesplate.frequencies.full import full_log_frequencies
-from bayesplate.frequencies.model import setup_model
+from bayesplate.frequencies.model import full_log_frequencies, setup_model
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
 

@@ -7,7 +7,7 @@ import pytest
 
 from bayesplate.board.random_field import Surface
 from bayesplate.commands.prepare import prepare
-from bayesplate.effects.field_looks import look
+from bayesplate.effects.field_components import look
 
 PLACES = {
     "towards x0": (0.0, 0.5), "towards x1": (1.0, 0.5), "towards y0": (0.5, 0.0), "towards y1": (0.5, 1.0),

@@ -7,8 +7,8 @@ import pytest
 from effect_plates import posed
 
 from bayesplate.board.attached import AttachedItem
-from bayesplate.frequencies.full import full_log_frequencies
 from bayesplate.frequencies.laws import cents
+from bayesplate.frequencies.model import full_log_frequencies
 from bayesplate.posterior.laplace import law_tolerance, worst_cents
 
 N_FRESH = 6

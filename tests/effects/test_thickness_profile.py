@@ -17,8 +17,8 @@ from bayesplate.board.random_field import Surface
 from bayesplate.commands.prepare import prepare
 from bayesplate.effects.field_components import FieldProfile
 from bayesplate.effects.thickness_profile import ThicknessProfile
-from bayesplate.frequencies.full import full_log_frequencies
 from bayesplate.frequencies.laws import cents
+from bayesplate.frequencies.model import full_log_frequencies
 from bayesplate.frequencies.system import System
 from bayesplate.posterior.laplace import law_tolerance
 from bayesplate.posterior.posing import pose

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesplate.estimates.combined import combination, combined_shapes
+from bayesplate.estimates.sheet import combination, combined_shapes
 
 CLAMPED = np.array(
     [

@@ -21,8 +21,7 @@ from bayesplate.estimates.leave_one_out import (
     united,
 )
 from bayesplate.estimates.refit import design, deviance_misfit, most_likely, normal_misfit, refit
-from bayesplate.frequencies.densities import DEGREES_OF_FREEDOM
-from bayesplate.frequencies.reading_errors import ReadingErrors
+from bayesplate.frequencies.reading_errors import DEGREES_OF_FREEDOM, ReadingErrors
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.posing import pose
 

@@ -12,8 +12,7 @@ from scipy import integrate, stats
 from bayesplate.board.board import Board
 from bayesplate.board.quantity import Quantity
 from bayesplate.estimates.least_squares import reading_scales, weighted_least_squares
-from bayesplate.frequencies.densities import DEGREES_OF_FREEDOM
-from bayesplate.frequencies.reading_errors import ReadingErrors, reading_sd
+from bayesplate.frequencies.reading_errors import DEGREES_OF_FREEDOM, ReadingErrors, reading_sd
 
 EPS = np.finfo(float).eps
 LAWS = {False: stats.norm, True: stats.t(DEGREES_OF_FREEDOM)}

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import ritz
+from paper_rows import paper_coefficients
 
 from bayesplate.board.material import rigidities
 from bayesplate.board.setup import CLAMPED_NOISE, Setup
-from bayesplate.frequencies.terms import paper_coefficients, term_weights
+from bayesplate.frequencies.terms import term_weights
 from bayesplate.plate.mesh import mesh
 from bayesplate.plate.naming import find
 from bayesplate.plate.thin import thin_plate

@@ -12,8 +12,8 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.commands.prepare import prepare
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.estimates.refit import refit
-from bayesplate.frequencies.full import full_log_frequencies
 from bayesplate.frequencies.laws import ExactLaw, cents
+from bayesplate.frequencies.model import full_log_frequencies
 from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.posterior import laplace
 from bayesplate.posterior.laplace import law_tolerance, linearisation_errors, noise_widenings, predictor, worst_cents

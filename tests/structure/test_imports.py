@@ -29,7 +29,7 @@ ROAD = (
     "report",
 )
 """Each room sees the rooms before it."""
-OPEN_TO_ALL = {"errors", "files", "locks", "labels", "libraries", "streams"}
+OPEN_TO_ALL = {"arrays", "errors", "files", "locks", "labels", "libraries", "streams"}
 ROOMS = {
     **{room: {*ROAD[: i + 1], *OPEN_TO_ALL} for i, room in enumerate(ROAD)},
     "recordings": {"recordings", "plate", *OPEN_TO_ALL},
