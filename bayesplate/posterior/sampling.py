@@ -29,6 +29,8 @@ from bayesplate.posterior.starts import LogDensity, cholesky_factor, guarded
 Floats = NDArray[np.float64]
 
 _FIRST_LOOK, _LOOK_AGAIN = 200, 1.15
+_LONG_ENOUGH = 4.0
+"""Times the autocorrelation times that the gate wants, from which on a run that does not pass never will."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +155,10 @@ def sample(
     checkpoint: Checkpoint | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> tuple[Chains, Convergence]:
-    """Sample until the gate passes, `settings.max_steps` are made, or more than twice as many would be needed.
+    """Sample until the gate passes or further steps are of no use.
+
+    They are of none where `settings.max_steps` are made, where more than twice as many would be needed, and where the
+    chains are four times as long as the gate wants and do not pass: a small acceptance, for one, stays small.
 
     The draws depend on the seed alone: a run that was killed and continued from its checkpoint gives the same bytes.
 
@@ -206,6 +211,7 @@ def sample(
             if n_steps and (is_last or _is_due(n_steps, settings.chunk_steps)):
                 n_taus = length_in_taus(ensembles.chain[:, burn_in:])
                 is_last |= is_hopeless(n_taus, n_steps - burn_in, settings)
+                is_last |= n_taus >= _LONG_ENOUGH * settings.gate.tau_count_min
                 if is_last or n_taus >= settings.gate.tau_count_min:
                     chains = Chains(ensembles.chain, ensembles.log_prob, burn_in)
                     convergence = assess(chains.kept, settings.gate, names=names)

@@ -29,6 +29,15 @@ def short(seed=1, max_steps=100, **changes):
     return SamplerSettings(seed=seed, chunk_steps=50, max_steps=max_steps, **changes)
 
 
+def test_a_run_four_times_as_long_as_the_gate_wants_ends_though_it_does_not_pass():
+    """Better proposals than any sampler makes are asked for; what can be reached passes at the first look."""
+    wanted = {share: SamplerSettings(seed=3, gate=Gate(acceptance_min=share)) for share in (0.99, 0.15)}
+    (never, refused), (soon, passed) = (sample(log_normal_density, MEAN, COVARIANCE, one) for one in wanted.values())
+    assert not refused.passed
+    assert passed.passed
+    assert soon.draws.shape[1] < never.draws.shape[1] <= 2000
+
+
 def test_a_correlated_normal_is_recovered_and_a_wider_one_is_told_apart():
     settings = SamplerSettings(seed=11, gate=Gate(ess_min=2500))
     chains, convergence = sample(log_normal_density, MEAN, COVARIANCE, settings)
