@@ -19,19 +19,11 @@ REFUSED = 0.05
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A board when the others teach it the shared parameters.
-
-    Attributes
-    ----------
-    log_score : float
-        ln of the probability of its readings, the shared parameters learned from the others.
-    p_value : float
-        How often a board that shares the others' parameters would want to leave them at least as much.
-    """
+    """A board when the others teach it the shared parameters."""
 
     name: str
-    log_score: float
-    p_value: float
+    log_score: float  # ln of the probability of its readings, the shared parameters learned from the others
+    p_value: float  # how often a board that shares the others' parameters would want to leave them at least as much
 
 
 def left_out(together: Together) -> tuple[LeftOut, ...]:

@@ -20,17 +20,8 @@ def archive_name(name: str) -> str:
 
 
 def shared_tree(learnt: Learnt, attributes: Mapping[str, str]) -> Any:
-    """Draws of the shared numbers and their scatters, SI, each board's log likelihood of them, the sampler's health.
-
-    Parameters
-    ----------
-    attributes : dict of str
-        What is said of their origin.
-
-    Returns
-    -------
-    xarray.DataTree
-    """
+    """Draws of the shared numbers and scatters, SI, each board's log likelihood of them, the sampler's health:
+    DataTree."""
     chains, convergence, together = learnt.chains, learnt.convergence, learnt.together
     thinned = [
         thin_walker_major(each, chains.burn_in, convergence.tau_max, n_draws_max=MOST_DRAWS_A_CHAIN)

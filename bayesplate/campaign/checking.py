@@ -10,26 +10,15 @@ from bayesplate.results.checking import CheckReport
 
 @dataclass(frozen=True)
 class CheckedShared:
-    """A number that the boards would share.
+    """A number that the boards would share."""
 
-    Attributes
-    ----------
-    unit : str
-        SI; "1" for a ratio.
-    prior_q05, prior_q50, prior_q95 : float
-        Quantiles of its prior.
-    expected_sd : float
-        In standard deviations of its prior, from all boards together.
-    boards : dict of float
-        The same from each board alone.
-    """
-
-    unit: str
+    unit: str  # SI; "1" for a ratio
+    # prior_q05, prior_q50, prior_q95: quantiles of its prior
     prior_q05: float
     prior_q50: float
     prior_q95: float
-    expected_sd: float
-    boards: Mapping[str, float]
+    expected_sd: float  # in standard deviations of its prior, from all boards together
+    boards: Mapping[str, float]  # the same from each board alone
 
 
 @dataclass(frozen=True, repr=False)

@@ -29,49 +29,27 @@ _LINE = 18
 
 @dataclass(frozen=True)
 class TaughtBoard:
-    """A board that was left out: what it gives when the others teach it the shared effect.
+    """A board that was left out: what it gives when the others teach it the shared effect."""
 
-    Attributes
-    ----------
-    log_score_gain : float
-        ln of the probability of its readings with what the others teach, over that without the effect.
-    before_rms_cents, after_rms_cents : float
-        Error of its labelled modes, its own constants fitted: without the effect, and with the others' effect.
-    p_value : float
-        Of the board against the others.
-    others : dict of Spread
-        The shared numbers as the others teach them.
-    """
-
+    # ln of the probability of its readings with what the others teach, over that without the effect
     log_score_gain: float
-    before_rms_cents: float
-    after_rms_cents: float
-    p_value: float
+    before_rms_cents: float  # error of its labelled modes without the effect, its own constants fitted
+    after_rms_cents: float  # the same with the others' effect
+    p_value: float  # of the board against the others
     refuses: bool
-    others: Mapping[str, Spread]
+    others: Mapping[str, Spread]  # the shared numbers as the others teach them
 
 
 @dataclass(frozen=True)
 class SharedClaim:
-    """Whether it may be said that the boards share an effect.
+    """Whether it may be said that the boards share an effect."""
 
-    Attributes
-    ----------
-    gain, standard_error : float
-        Sum over the left-out boards of the gain in log score, and its standard error from their scatter.
-    refused_by : tuple of str
-        Boards that do not want what the others teach.
-    n_better : int
-        Boards whose own score rises.
-    holds : bool
-        Whether the sum rises by more than two standard errors and by ln 20, more than half of the boards gain, and none
-        refuses.
-    """
-
-    gain: float
-    standard_error: float
-    refused_by: tuple[str, ...]
-    n_better: int
+    gain: float  # sum over the left-out boards of the gain in log score
+    standard_error: float  # of that, from the boards' scatter
+    refused_by: tuple[str, ...]  # boards that do not want what the others teach
+    n_better: int  # boards whose own score rises
+    # whether the sum rises by more than two standard errors and by ln 20, more than half of the boards gain, and none
+    # refuses
     holds: bool
 
 
@@ -86,15 +64,7 @@ def judge(boards: Mapping[str, TaughtBoard]) -> SharedClaim:
 
 
 def taught_boards(learnt: Learnt, before: Mapping[str, Member], seed: int) -> dict[str, TaughtBoard]:
-    """Every board left out in turn.
-
-    Parameters
-    ----------
-    learnt : Learnt
-        With the shared effect.
-    before : dict of Member
-        By board: fitted without the effect, nothing shared.
-    """
+    """Every board left out in turn; `before` are the boards fitted without the effect, nothing shared."""
     refused = refusing(learnt.together)
     together = learnt.together
     found = {}

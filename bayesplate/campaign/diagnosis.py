@@ -22,18 +22,10 @@ _MOST_LISTED = 12
 
 @dataclass(frozen=True)
 class PooledErrors:
-    """Errors over all boards.
+    """Errors over all boards."""
 
-    Attributes
-    ----------
-    in_sample_rms_cents : float
-        Of all labelled modes, each board's constants fitted.
-    left_out_boards_rms_cents : float
-        The same, the shared effect learned from the other boards.
-    """
-
-    in_sample_rms_cents: float
-    left_out_boards_rms_cents: float
+    in_sample_rms_cents: float  # of all labelled modes, each board's constants fitted
+    left_out_boards_rms_cents: float  # the same, the shared effect learned from the other boards
 
 
 @dataclass(frozen=True)
@@ -98,17 +90,10 @@ class CampaignDiagnosis:
 
 
 def named(found: Sequence[Explanation]) -> tuple[str, tuple[str, ...], str]:
-    """What a search over a campaign allows to say: a verdict, effects, and the reason.
+    """What a search over a campaign, its most probable explanation first, allows to say: a verdict, effects, the
+    reason.
 
-    Parameters
-    ----------
-    found : sequence of Explanation
-        The most probable first.
-
-    Returns
-    -------
-    effects : tuple of str
-        Shared ones; in a group those of any alternative, the most probable first.
+    In a group the effects are the shared ones of any alternative, the most probable first.
     """
     none = next(one.probability for one in found if one.way == "none")
     if none >= IMPROBABLE:

@@ -29,16 +29,10 @@ _SETTLED = 1e-8
 def bridge_sampling(
     log_density: Callable[[Floats], Floats], draws: Floats, rng: np.random.Generator, n_points: int = N_POINTS
 ) -> float:
-    """ln of the integral of a density that is not normalised.
+    """ln of the integral of a density that is not normalised, from draws of it in random order.
 
-    Parameters
-    ----------
-    log_density : callable
-        From (n, n_dim) points to (n,) logarithms; -inf where it is zero.
-    draws : (n_draws, n_dim) array
-        From that density, in random order.
-    n_points : int
-        At which the density is looked at, among the draws and beside them.
+    `log_density` takes (n, n_dim) points, -inf where it is zero; `n_points` of the draws, and beside them, are looked
+    at.
     """
     half = len(draws) // 2
     mixture = Mixture.fitted(draws[:half])

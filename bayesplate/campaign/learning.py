@@ -26,20 +26,12 @@ _ROUNDS = 3
 
 @dataclass(frozen=True, eq=False)
 class Learnt:
-    """What the boards of a campaign teach.
-
-    Attributes
-    ----------
-    samples : tuple of Sample
-        Of each board, where what all boards teach is among them.
-    chains : Chains
-        Of the standard coordinates of what is learned: `Together.coordinates`.
-    """
+    """What the boards of a campaign teach."""
 
     members: tuple[Member, ...]
-    samples: tuple[Sample, ...]
+    samples: tuple[Sample, ...]  # of each board, where what all boards teach is among them
     together: Together
-    chains: Chains
+    chains: Chains  # of the standard coordinates of what is learned: `Together.coordinates`
     convergence: Convergence
 
     @property
@@ -48,21 +40,9 @@ class Learnt:
         return np.array([_astray(self.together, i, one) for i, one in enumerate(self.samples)])
 
     def board(self, index: int, rng: np.random.Generator, seed: int) -> tuple[Inference, Draws, float]:
-        """A board's posterior under what all boards teach of the shared parameters.
+        """A board's posterior under what all boards teach, and how many independent draws it rests on.
 
         Its draws, weighted by what the other boards say of theirs; where too few are left, it is walked anew.
-
-        Parameters
-        ----------
-        index : int
-            Of the board.
-        seed : int
-            Of the predictive draws.
-
-        Returns
-        -------
-        effective : float
-            How many independent draws the result rests on.
         """
         together, member = self.together, self.members[index]
         log_reference = together.log_taught((index,))
@@ -90,11 +70,6 @@ def learn(
     A likelihood is first found from a board's own draws, then from the same draws weighted to be halfway to where all
     boards together are: there it matters, and a polynomial of low order follows it the better. A board that has too few
     draws there is walked anew; one that still has too few keeps the likelihood that its own draws gave.
-
-    Returns
-    -------
-    Learnt
-        Its convergence is that of the shared parameters.
     """
     samples = [member.alone for member in members]
     found = [one.likelihood(drawn, one.log_prior) for one, drawn in zip(members, samples, strict=True)]

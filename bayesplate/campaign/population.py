@@ -41,30 +41,20 @@ _CONSTANTS = len(MODULI)
 
 @dataclass(frozen=True, eq=False)
 class BoardConstants:
-    """What one board says of its constants: a normal likelihood of ln E_x, ln E_y, ln G_xy (Pa), given what is shared.
-
-    Attributes
-    ----------
-    mean : (3,) array
-    covariance : (3, 3) array
-        Where the shared numbers are known.
-    slopes : (3, n_shared) array
-        What the mean does with the standard coordinates of the shared numbers that all boards have the same.
-    """
+    """A board's normal likelihood of ln E_x, ln E_y, ln G_xy (Pa), given what is shared."""
 
     name: str
-    mean: Floats
-    covariance: Floats
+    mean: Floats  # (3,) array
+    covariance: Floats  # (3, 3) array, where the shared numbers are known
+    # (3, n_shared) array: what the mean does with the standard coordinates of the shared numbers that all boards have
+    # the same
     slopes: Floats = field(default_factory=lambda: np.zeros((_CONSTANTS, 0)))
 
     @classmethod
     def of(cls, inference: Inference, draws: Draws, shared: Floats | None = None) -> BoardConstants:
         """From the posterior of a board, the prior of its constants divided out.
 
-        Parameters
-        ----------
-        shared : (n_draws, n_shared) array, optional
-            Standard coordinates of the shared numbers at the draws.
+        `shared` are standard coordinates of the shared numbers at the draws, (n_draws, n_shared).
         """
         name = inference.problem.board.name
         logs = np.column_stack([np.log(draws.moduli[name]).ravel() for name in MODULI])
@@ -80,20 +70,14 @@ class BoardConstants:
 
 @dataclass(frozen=True, eq=False)
 class Population:
-    """What the boards say of the distribution of their constants.
-
-    Attributes
-    ----------
-    chains : Chains
-        Of mean of ln E_x, ln E_y, ln G_xy, then ln of their standard deviations, then how far the shared numbers are
-        off their mean.
-    common : (n_shared, n_shared) array
-        Covariance of the standard coordinates of the shared numbers, from all boards.
-    """
+    """What the boards say of the distribution of their constants."""
 
     boards: tuple[BoardConstants, ...]
+    # of mean of ln E_x, ln E_y, ln G_xy, then ln of their standard deviations, then how far the shared numbers are off
+    # their mean
     chains: Chains
     convergence: Convergence
+    # (n_shared, n_shared) array: covariance of the standard coordinates of the shared numbers, from all boards
     common: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
@@ -128,14 +112,9 @@ def find_population(
 ) -> Population:
     """Sample mean and standard deviation of the constants of all boards of such a kind.
 
-    Parameters
-    ----------
-    prior : PriorCard
-        Of E_x, E_y, G_xy. Its medians and factors are believed of the mean; the standard deviation of ln E is
-        half-normal on the scale of the factor.
-    common : (n_shared, n_shared) array, optional
-        Covariance of the standard coordinates of what all boards share, which is off by the same on all of them: the
-        mean of many boards does not average it out.
+    The prior's medians and factors are believed of the mean; the standard deviation of ln E is half-normal on the scale
+    of the factor. `common` is the covariance of the standard coordinates of what all boards share, which is off by the
+    same on all of them: the mean of many boards does not average it out.
     """
     common = np.zeros((0, 0)) if common is None else common
     away = np.array([one.slopes @ np.linalg.cholesky(common) for one in boards])
@@ -172,13 +151,7 @@ def find_population(
 
 
 def require_moduli(prior: PriorCard, place: str) -> None:
-    """A population is one of E_x, E_y, G_xy: rigidities go with each board's thickness.
-
-    Raises
-    ------
-    InputError
-        If the prior card states D_x, D_y, D_s, or E alone.
-    """
+    """InputError where a prior card states rigidities, which go with each board's thickness, or E alone."""
     wanted = "a prior card of E_x, E_y, G_xy"
     if prior.is_of_isotropic:
         raise InputError(Fault(place, wanted, f"{prior.name}, which states E alone"))

@@ -38,13 +38,7 @@ _ROWS_AT_ONCE = 4096
 
 @dataclass(frozen=True)
 class Scatter:
-    """How much a shared number differs between boards: the standard deviation of its logarithm, half-normal before.
-
-    Attributes
-    ----------
-    of : Shared
-        The number.
-    """
+    """How much a shared number differs between boards: the standard deviation of its logarithm, half-normal before."""
 
     of: Shared
 
@@ -76,10 +70,7 @@ def scatters_of(shared: Sequence[Shared]) -> tuple[Scatter, ...]:
 def widths(shared: Sequence[Shared], hyper: Floats) -> Floats:
     """How much each number scatters, in its standard coordinate: (n, n_shared) array, zero where it does not.
 
-    Parameters
-    ----------
-    hyper : (n, n_shared + n_scatters) array
-        Standard coordinates of the numbers, then of their scatters.
+    `hyper` are standard coordinates of the numbers, then of their scatters: (n, n_shared + n_scatters) array.
     """
     found = np.zeros((len(hyper), len(shared)))
     columns = [i for i, one in enumerate(shared) if one.scatter]
@@ -96,19 +87,11 @@ def expected_width(shared: Sequence[Shared]) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class ScatteredLikelihood:
-    """ln of the probability of a board's readings as a function of the numbers' middle and of their scatter.
-
-    Attributes
-    ----------
-    own : SharedLikelihood
-        The board's, of its own numbers.
-    pull : Pull
-        The normal one that it amounts to.
-    """
+    """ln of the probability of a board's readings as a function of the numbers' middle and of their scatter."""
 
     shared: tuple[Shared, ...]
-    own: Likelihood
-    pull: Pull
+    own: Likelihood  # the board's, of its own numbers
+    pull: Pull  # the normal one that it amounts to
 
     def at(self, hyper: Floats) -> Floats:
         """ln L at standard coordinates of numbers and scatters: (n,) array from (n, n_shared + n_scatters)."""

@@ -44,38 +44,23 @@ _DIGITS = 9
 
 @dataclass(frozen=True)
 class Explanation:
-    """One thing that the boards may have.
+    """One thing that the boards may have."""
 
-    Attributes
-    ----------
-    way : "none", "shared", "own", "one board" or "shared and own"
-        No effect; one size for all boards; a size of its own for each; one board alone; the first effect of one size
-        for all and the second of a size of its own for each.
-    effects : tuple of str
-        Empty for none; two where both are shared or the second is each board's own.
-    board : str
-        The one board; otherwise empty.
-    """
-
+    # no effect; one size for all boards; a size of its own for each; one board alone; the first effect of one size for
+    # all and the second of a size of its own for each
     way: Way
-    effects: tuple[str, ...]
-    board: str
+    effects: tuple[str, ...]  # empty for none; two where both are shared or the second is each board's own
+    board: str  # the one board; otherwise empty
     log_evidence: float
     probability: float
 
 
 @dataclass(frozen=True, eq=False)
 class BoardSearch:
-    """A board's tables, asked for what the boards may have in common.
-
-    Attributes
-    ----------
-    ground : Ground
-        With the labels of each hypothesis.
-    """
+    """A board's tables, asked for what the boards may have in common."""
 
     name: str
-    ground: Ground
+    ground: Ground  # with the labels of each hypothesis
 
     def hypothesis(self, effects: tuple[str, ...]) -> Hypothesis | None:
         """The one of these effects alone; None where the board cannot have them."""
@@ -128,13 +113,7 @@ class BoardSearch:
 def search_board(
     name: str, baseline: Baseline, effects: Sequence[str], tell: Callable[[float], None] | None = None
 ) -> BoardSearch:
-    """Tabulate effects on a board, and every pair of them: what one board would not show several may.
-
-    Parameters
-    ----------
-    tell : callable, optional
-        Told which share of the effects is done.
-    """
+    """Tabulate effects on a board, and every pair of them: what one board would not show several may."""
     ground = prepare_search(baseline, tried=effects, tell=tell)
     fine = {effect: one.fine for effect, one in ground.candidates.items()}
     coarse = {effect: one.coarse for effect, one in ground.candidates.items()}
@@ -156,13 +135,7 @@ def shown(boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...]]) -> 
 
 
 def explanations(boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...]]) -> tuple[Explanation, ...]:
-    """Everything that the boards may have, the most probable first.
-
-    Parameters
-    ----------
-    effects : sequence of tuple of str
-        Those of `shareable`: single ones, and pairs.
-    """
+    """Everything that the boards may have of single effects and pairs, the most probable first."""
     none = np.array([one.log_evidence(()) for one in boards])
     shared = {each: log_evidence_shared(boards, each) for each in effects}
     single = [each for each in effects if len(each) == 1]

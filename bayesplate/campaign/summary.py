@@ -27,71 +27,33 @@ _N_DRAWS = 4000
 
 @dataclass(frozen=True)
 class SharedNumber:
-    """A number that all boards have in common, or about which their own scatter.
+    """A number that all boards have in common, or about which their own scatter."""
 
-    Attributes
-    ----------
-    all_boards : Spread, SI
-        Under what all boards teach; where their own scatter, the median of such boards.
-    scatter : Spread or None
-        Standard deviation of the logarithm of the boards' own; None where all have the same.
-    own : dict of Spread
-        By board: from that board alone.
-    others : dict of Spread
-        By board: what all boards but that one say of its own.
-    prior_source : str
-        Where the prior comes from; empty if the boards' cards state it.
-    """
-
-    all_boards: Spread
-    scatter: Spread | None
-    own: Mapping[str, Spread]
-    others: Mapping[str, Spread]
-    prior_source: str
+    all_boards: Spread  # SI, under what all boards teach; where their own scatter, the median of such boards
+    scatter: Spread | None  # standard deviation of the logarithm of the boards' own; None where all have the same
+    own: Mapping[str, Spread]  # by board: from that board alone
+    others: Mapping[str, Spread]  # by board: what all boards but that one say of its own
+    prior_source: str  # where the prior comes from; empty if the boards' cards state it
 
 
 @dataclass(frozen=True)
 class LeftOutBoard:
-    """A board when the others teach it what is shared.
+    """A board when the others teach it what is shared."""
 
-    Attributes
-    ----------
-    log_score : float
-        ln of the probability of its readings then.
-    p_value : float
-        Of the board against the others: small where it does not want what they teach.
-    refuses : bool
-        Whether it does not, as many boards as were asked being allowed for.
-    """
-
-    log_score: float
-    p_value: float
-    refuses: bool
+    log_score: float  # ln of the probability of its readings then
+    p_value: float  # of the board against the others: small where it does not want what they teach
+    refuses: bool  # whether it does not, as many boards as were asked being allowed for
 
 
 @dataclass(frozen=True)
 class PopulationSummary:
-    """The distribution of the boards' constants.
+    """The distribution of the boards' constants."""
 
-    Attributes
-    ----------
-    prior : str
-        Name of the prior card.
-    mean : Elastic of Spread, Pa
-        Median of the population.
-    sd_percent : Elastic of Spread
-        Standard deviation of ln E in the population, per cent.
-    next_board : Elastic of Spread, Pa
-        A board that was not measured yet.
-    boards : dict of Elastic of Spread, Pa
-        Each board's constants under the population.
-    """
-
-    prior: str
-    mean: Elastic[Spread]
-    sd_percent: Elastic[Spread]
-    next_board: Elastic[Spread]
-    boards: Mapping[str, Elastic[Spread]]
+    prior: str  # name of the prior card
+    mean: Elastic[Spread]  # Pa, median of the population
+    sd_percent: Elastic[Spread]  # standard deviation of ln E in the population, per cent
+    next_board: Elastic[Spread]  # Pa, of a board that was not measured yet
+    boards: Mapping[str, Elastic[Spread]]  # Pa, each board's constants under the population
 
 
 @dataclass(frozen=True, repr=False)
@@ -209,13 +171,7 @@ def _by_constant(values: np.ndarray, unit: str) -> Elastic[Spread]:
 
 
 def learning_warnings(learnt: Learnt, effective: Mapping[str, float]) -> tuple[str, ...]:
-    """What a reader of the shared numbers must know, a sentence each.
-
-    Parameters
-    ----------
-    effective : dict of float
-        By board: draws of equal weight that its posterior under all boards rests on.
-    """
+    """What a reader of the shared numbers must know; `effective` draws are what each board's posterior rests on."""
     told = []
     refused = refusing(learnt.together)
     if refused:

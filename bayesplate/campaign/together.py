@@ -35,28 +35,14 @@ _N_FITTED = 4096
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """Boards that are independent given the shared parameters: the numbers, then the scatters of those that have one.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Of the boards.
-    likelihoods : tuple of Likelihood
-        One per board, of its own numbers.
-    pulls : tuple of Pull
-        What each board says by itself, as a normal likelihood of its own numbers.
-    points : (n_points, n_coordinates) array
-        Standard coordinates at which densities are summed.
-    log_spread : (n_points,) array
-        ln of the density of these points.
-    """
+    """Boards that are independent given the shared numbers and the scatters of those that have one."""
 
     shared: tuple[Shared, ...]
-    names: tuple[str, ...]
-    likelihoods: tuple[Likelihood, ...]
-    pulls: tuple[Pull, ...]
-    points: Floats
-    log_spread: Floats
+    names: tuple[str, ...]  # of the boards
+    likelihoods: tuple[Likelihood, ...]  # one per board, of its own numbers
+    pulls: tuple[Pull, ...]  # what each board says by itself, as a normal likelihood of its own numbers
+    points: Floats  # (n_points, n_coordinates) array: standard coordinates at which densities are summed
+    log_spread: Floats  # (n_points,) array: ln of the density of these points
 
     @classmethod
     def of(
@@ -202,13 +188,7 @@ class Together:
 def walk(
     together: Together, settings: SamplerSettings, progress: Callable[[Progress], None] | None = None
 ) -> tuple[Chains, Convergence]:
-    """Sample the shared parameters from all boards.
-
-    Returns
-    -------
-    chains : Chains
-        Of standard coordinates: the shared numbers, then their scatters.
-    """
+    """Sample the shared numbers, then their scatters, in standard coordinates, from all boards."""
     names = [one.name for one in together.coordinates]
     return sample(together.log_density, *together.moments(), settings, names=names, progress=progress)
 

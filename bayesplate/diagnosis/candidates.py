@@ -15,19 +15,11 @@ Fate = Literal["in the verdict", "not detectable", "not needed", "not establishe
 
 @dataclass(frozen=True, kw_only=True)
 class Amplitude:
-    """Posterior quantiles of an effect's first parameter, given that it is there; all alike if the card fixes it.
-
-    Attributes
-    ----------
-    form : str
-        Which form of the effect, empty if it has one.
-    q05, q50, q95 : float
-        In `unit`.
-    """
+    """Posterior quantiles of an effect's first parameter, given that it is there; all alike if the card fixes it."""
 
     parameter: str
-    form: str
-    q05: float
+    form: str  # empty if the effect has one only
+    q05: float  # quantiles in `unit`
     q50: float
     q95: float
     unit: str
@@ -35,62 +27,31 @@ class Amplitude:
 
 @dataclass(frozen=True, kw_only=True)
 class EffectEntry:
-    """A candidate effect: what it would do, how probable it is, and why it was rejected.
-
-    Attributes
-    ----------
-    name, setup : str
-        `setup` is "board" for an effect of the whole board.
-    raw_rms_cents, visible_rms_cents : float or None
-        Shift of the modes at the nominal size, and what is left of it after the constants are fitted again, both with
-        the weights of that fit, so that the second is never the larger; None where there is no frequency, or nothing
-        is left because there are as many constants as modes.
-    visible_cents : tuple of (float or None)
-        The same mode by mode.
-    below_detection_limit : bool
-        Whether these readings could not show it even if it were there.
-    bias_percent : dict of float
-        What ignoring it does to each modulus.
-    log_bayes_factor, ockham_log_factor : float
-        Against no effect, and the part of it that the width of the prior costs.
-    amplitude : Amplitude or None
-        None if it has no size.
-    learnt_bits : dict of float
-        How far the posterior of each of its sizes left the prior, by parameter.
-    rejected_because : str or None
-        None if it is part of the verdict.
-    fate : str
-        The same in two words; not written to JSON.
-    """
+    """A candidate effect: what it would do, how probable it is, and why it was rejected."""
 
     name: str
-    setup: str
-    raw_rms_cents: float | None
+    setup: str  # "board" for an effect of the whole board
+    raw_rms_cents: float | None  # shift of the modes at the nominal size; None where there is no frequency
+    # what refitted constants leave of it, by the same weights; None where nothing is left
     visible_rms_cents: float | None
-    visible_cents: tuple[float | None, ...]
-    below_detection_limit: bool
-    bias_percent: Mapping[str, float]
+    visible_cents: tuple[float | None, ...]  # mode by mode
+    below_detection_limit: bool  # these readings could not show it even if it were there
+    bias_percent: Mapping[str, float]  # what ignoring it does to each modulus
     inclusion_probability: float
     inclusion_probability_with_doubled_priors: float
-    log_bayes_factor: float
-    ockham_log_factor: float
+    log_bayes_factor: float  # against no effect
+    ockham_log_factor: float  # the part of it that the width of the prior costs
     p_value: float | None
-    amplitude: Amplitude | None
-    learnt_bits: Mapping[str, float]
+    amplitude: Amplitude | None  # None if it has no size
+    learnt_bits: Mapping[str, float]  # how far the posterior of each size left its prior, by parameter
     look_alikes: tuple[str, ...]
-    rejected_because: str | None
+    rejected_because: str | None  # None if it is part of the verdict
     fate: Fate = field(metadata=NOT_IN_JSON)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExchangeEntry:
-    """Two labels that may have been exchanged, as a candidate beside the effects; fields as of `EffectEntry`.
-
-    Attributes
-    ----------
-    labels : tuple of str
-        The two.
-    """
+    """Two labels that may have been exchanged, as a candidate beside the effects; fields as of `EffectEntry`."""
 
     name: str = RELABELLING
     setup: str

@@ -36,37 +36,23 @@ FALLS_TO = 2.0 / 3.0
 
 @dataclass(frozen=True)
 class Condition:
-    """One condition of the claim.
+    """One condition of the claim."""
 
-    Attributes
-    ----------
-    name : str
-        "chance selection": nested left-out error after over before, to be below that of 95 % of null simulations made
-        to choose. "log score": nested gain, to exceed two standard errors. "probability of none": the largest over the
-        widths of the sizes' priors, to be below 0.05. "probability of another": that something else is lacking than
-        what the verdict tells, the largest over the same widths, to be below 0.05. "prior predictive": p-value with
-        the effect, at least 0.05.
-    value, limit : float or None
-        None where too few readings leave nothing to judge by.
-    """
-
+    # "chance selection": nested left-out error after over before, to be below that of 95 % of null simulations made to
+    # choose. "log score": nested gain, to exceed two standard errors. "probability of none", and "of another" than the
+    # verdict tells: the largest over the widths of the sizes' priors, to be below 0.05. "prior predictive": p-value
+    # with the effect, at least 0.05.
     name: ConditionName
-    value: float | None
+    value: float | None  # None where too few readings leave nothing to judge by; the limit likewise
     limit: float | None
     is_met: bool
 
 
 @dataclass(frozen=True)
 class Claim:
-    """Whether it may be said that the error is reduced.
+    """Whether it may be said that the error is reduced."""
 
-    Attributes
-    ----------
-    conditions : tuple of Condition
-        Empty if nothing was added to the model.
-    """
-
-    conditions: tuple[Condition, ...] = ()
+    conditions: tuple[Condition, ...] = ()  # empty if nothing was added to the model
 
     @property
     def holds(self) -> bool:
@@ -75,13 +61,7 @@ class Claim:
 
 
 def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Nested | None) -> Claim:
-    """Judge the five conditions.
-
-    Parameters
-    ----------
-    folded : Nested or None
-        Of the board's own readings; it and the control without those whose modes alone carry something.
-    """
+    """Judge the five conditions; `folded` and the control do not count readings whose modes alone carry something."""
     if not verdict.index:
         return Claim()
     searches = [found, *(varied(found, width=factor) for factor in WIDTHS.values())]
@@ -105,21 +85,9 @@ def named_in_part(
 ) -> tuple[str, ...]:
     """Effects that explain readings in part though something else remains; none where that cannot be said.
 
-    The verdict stays what it is, nothing is claimed, and the constants are not to be trusted.
-
-    Parameters
-    ----------
-    folded : Nested or None
-        Of the board's own readings.
-    others : iterable of (str, Found), optional
-        The searches that a name has to survive, as of `bayesplate.diagnosis.verdict.decide`.
-
-    Returns
-    -------
-    tuple of str
-        The members of what comes nearest, if it fails the gate and not the limits of its sizes, no effect is less
-        probable than `SURELY`, the name survives every other assumption, and the nested left-out error falls to
-        `FALLS_TO` or further.
+    The members of what comes nearest, if it fails the gate and not the limits of its sizes, no effect is less probable
+    than `SURELY`, the name survives every other assumption, and the nested left-out error falls to `FALLS_TO` or
+    further. The verdict stays what it is, nothing is claimed, and the constants are not to be trusted.
     """
     nearest = verdict.nearest
     if nearest is None or found.none >= SURELY:

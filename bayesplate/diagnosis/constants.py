@@ -25,19 +25,11 @@ def draw_constants(
     among: Sequence[int] | None = None,
     sampled: Mapping[int, Constants] | None = None,
 ) -> Constants:
-    """Draw the constants from the normal terms of hypotheses, corrected to the exact law by weights.
+    """Draws of the constants and inputs by name, (n_draws,) arrays, from the terms of hypotheses, weighted to the exact
+    law.
 
-    Parameters
-    ----------
-    among : sequence of int, optional
-        Hypotheses to average over, weighted by their probability; by default all, by that under the exact law.
-    sampled : dict, optional
-        Draws to take in place of these, of hypotheses that were sampled.
-
-    Returns
-    -------
-    dict of (n_draws,) array
-        Uncertain inputs are drawn along with the constants.
+    Over the hypotheses `among` by their probability, by default over all by that under the exact law; of hypotheses
+    that were `sampled` from those draws.
     """
     weighed = (under_exact_law(found) or found) if among is None else found
     indices = np.arange(len(found.ground.hypotheses)) if among is None else np.asarray(among)

@@ -22,37 +22,20 @@ OfForms = Iterator[tuple[int, FormLaw, Rows, Floats]]
 
 @dataclass(frozen=True, eq=False)
 class TermDraws:
-    """Draws under one hypothesis, linear in the residual about each cell.
+    """Draws under one hypothesis, linear in the residual about each cell."""
 
-    Attributes
-    ----------
-    log_rigidities : (n_draws, n_constants) array
-        ln D_x, ln D_y, ln D_s.
-    inputs : (n_draws, n_inputs) array
-        Standard coordinates of the board's uncertain inputs.
-    cells : (n_draws,) array of int
-        Of the hypothesis' table.
-    within : (n_draws, n_tangents) array
-        Place within the cell, standard deviations.
-    predicted : (n_draws, n_every) array
-        ln f (Hz) of all modes as the terms have it, with the inputs at the middle of their priors where they are zero.
-    variance : (n_draws, n_modes) array
-        Of each reading, relative; infinite where it is no mode.
-    noise : (n_draws, n_setups) array
-        Relative.
-    """
-
-    log_rigidities: Floats
-    inputs: Floats
-    cells: Rows
-    within: Floats
+    log_rigidities: Floats  # (n_draws, n_constants) array: ln D_x, ln D_y, ln D_s
+    inputs: Floats  # (n_draws, n_inputs) array: standard coordinates of the board's uncertain inputs
+    cells: Rows  # (n_draws,) array of int: of the hypothesis' table
+    within: Floats  # (n_draws, n_tangents) array: place within the cell, standard deviations
+    # (n_draws, n_every) array: ln f (Hz) of all modes as the terms have it, with the inputs at the middle of their
+    # priors where they are zero
     predicted: Floats
-    variance: Floats
-    noise: Floats
+    variance: Floats  # (n_draws, n_modes) array: of each reading, relative; infinite where it is no mode
+    noise: Floats  # (n_draws, n_setups) array: relative
 
     @property
     def n_draws(self) -> int:
-        """How many."""
         return len(self.log_rigidities)
 
     def at(self, picked: Rows) -> TermDraws:

@@ -27,15 +27,8 @@ _LIKELY = 0.1
 def effect_entry(
     found: Found, verdict: Verdict, ranked: Sequence[Answer], one: Candidate, doubled: float
 ) -> EffectEntry:
-    """What there is to say of a candidate effect.
-
-    Parameters
-    ----------
-    ranked : sequence of Answer
-        Best first.
-    doubled : float
-        Its inclusion probability with the width of every amplitude prior doubled.
-    """
+    """What there is to say of a candidate effect; `doubled` is its inclusion probability with every prior twice as
+    wide."""
     ground = found.ground
     index = next(i for i, other in enumerate(ground.hypotheses) if other.members == (one.name,))
     gained = float(found.log_evidence[index] - found.log_evidence[0])
@@ -158,15 +151,7 @@ def _fixed(one: Candidate) -> Amplitude | None:
 
 
 def fate_of(found: Found, verdict: Verdict, ranked: Sequence[Answer], name: str, index: int) -> Told:
-    """What became of a candidate effect.
-
-    Parameters
-    ----------
-    ranked : sequence of Answer
-        Best first.
-    index : int
-        Of the hypothesis that it acts alone.
-    """
+    """What became of a candidate effect; `index` is that of the hypothesis that it acts alone."""
     if name in verdict.effects:
         return "in the verdict", None
     if (

@@ -59,41 +59,25 @@ class Side:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """Everything that the report of a diagnosis is made of.
-
-    Attributes
-    ----------
-    before, after : Side
-        The same where nothing was added.
-    claim : Claim
-        Of the explanation that was fitted again.
-    known : sequence of KnownFit
-        The board as it stands first.
-    finalists : sequence of (Answer, Side)
-        Explanations that were fitted again, best first, or the one that comes nearest where none is enough.
-    has_slip : bool
-        Whether the fit without an effect names a reading or two that a slip explains.
-    in_part : tuple of str
-        Effects that explain the readings in part.
-    carrying : tuple of CarryingMode
-        Modes that count in no left-out error or score, before and after alike.
-    """
+    """Everything that the report of a diagnosis is made of."""
 
     found: Found
     verdict: Verdict
     control: NullControl
     folded: Nested | None
+    # before, after: the same where nothing was added
     before: Side
     after: Side
-    claim: Claim
+    claim: Claim  # of the explanation that was fitted again
     recommendation: str
-    known: Sequence[KnownFit] = ()
+    known: Sequence[KnownFit] = ()  # the board as it stands first
     stated_claims: Sequence[StatedClaim] = ()
+    # explanations that were fitted again, best first, or the one that comes nearest where none is enough
     finalists: Sequence[tuple[Answer, Side]] = ()
-    has_slip: bool = False
+    has_slip: bool = False  # whether the fit without an effect names a reading or two that a slip explains
     notes: tuple[str, ...] = ()
-    in_part: tuple[str, ...] = ()
-    carrying: tuple[CarryingMode, ...] = ()
+    in_part: tuple[str, ...] = ()  # effects that explain the readings in part
+    carrying: tuple[CarryingMode, ...] = ()  # modes that count in no left-out error or score, before and after alike
 
     @property
     def carried(self) -> tuple[int, ...]:

@@ -51,32 +51,17 @@ class Swap:
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """One thing that may be the case.
+    """One thing that may be the case."""
 
-    Attributes
-    ----------
-    members : tuple of str
-        Effects that are present; empty for none.
-    table : Table
-        Of all modes that readings may be.
-    own : Baseline
-        The baseline with the labels that readings have if it is the case.
-    swap : Swap or None
-        The two labels that it exchanges.
-    log_labels : float
-        ln of the likelihood summed over all ways to take the peaks for modes, over that of the labels at hand.
-    joint : JointLaws
-        Of a pair whose table is not that of shifts that add.
-    """
-
-    members: tuple[str, ...]
+    members: tuple[str, ...]  # effects that are present; empty for none
     prior: float
-    table: Table
+    table: Table  # of all modes that readings may be
     noise: NoiseGrid
-    own: Baseline
-    swap: Swap | None = None
+    own: Baseline  # the baseline with the labels that readings have if it is the case
+    swap: Swap | None = None  # the two labels that it exchanges
+    # ln of the likelihood summed over all ways to take the peaks for modes, over that of the labels at hand
     log_labels: float = 0.0
-    joint: JointLaws = field(default_factory=dict)
+    joint: JointLaws = field(default_factory=dict)  # of a pair whose table is not that of shifts that add
 
     @cached_property
     def terms(self) -> Terms:
@@ -100,15 +85,10 @@ class Hypothesis:
 def hypotheses(
     baseline: Baseline, fine: Mapping[str, Table], coarse: Mapping[str, Table], paired: Sequence[str]
 ) -> tuple[Hypothesis, ...]:
-    """Every hypothesis about a board: none first, then single effects, exchanged labels, and pairs.
+    """Every hypothesis about a board: none first, then single effects, exchanged labels, and pairs of those `paired`.
 
-    Parameters
-    ----------
-    fine, coarse : dict of Table
-        By effect; coarse ones are combined.
-    paired : sequence of str
-        Effects that may be one of two: those whose visible part could be seen at all. A pair costs nothing for a
-        member that cannot be seen, so that every effect would seem to come with an invisible one.
+    These could be seen: a pair costs nothing for a member that cannot, and every effect would seem to come with one.
+    Pairs combine coarse tables.
     """
     board = baseline.board
     reach = reach_of(board, baseline.setup_index, np.where(baseline.is_mode, baseline.residual, np.nan))

@@ -48,44 +48,20 @@ _NEAR = 0.1
 
 @dataclass(frozen=True, eq=False)
 class KnownFit:
-    """The constants fitted to a board with known effects of fixed sizes.
+    """The constants fitted to a board with known effects of fixed sizes."""
 
-    Attributes
-    ----------
-    combination : tuple of str
-        All known effects that it has.
-    effects : tuple of str
-        Those beyond what the board declares.
-    without : tuple of str
-        Known ones that the board declares and that are left out.
-    baseline : Baseline
-        The fit, all inputs fixed, with the labels that it makes likely.
-    moduli : (3,) array, Pa
-        E_x, E_y, G_xy.
-    errors : Errors
-        Of ln f of every reading, in sample and left out; not a number where the reading is no mode.
-    """
-
-    combination: tuple[str, ...]
-    effects: tuple[str, ...]
-    without: tuple[str, ...]
-    baseline: Baseline
-    moduli: Floats
-    errors: Errors
+    combination: tuple[str, ...]  # all known effects that it has
+    effects: tuple[str, ...]  # those beyond what the board declares
+    without: tuple[str, ...]  # known ones that the board declares and that are left out
+    baseline: Baseline  # the fit, all inputs fixed, with the labels that it makes likely
+    moduli: Floats  # (3,) array, Pa: E_x, E_y, G_xy
+    errors: Errors  # of ln f of every reading, in sample and left out; not a number where the reading is no mode
 
 
 def known_fits(problem: PosedProblem, tell: Callable[[float], None] | None = None) -> tuple[KnownFit, ...]:
-    """The board as it stands, and with its known effects in every combination of up to three, fewer ones first.
+    """The board as it stands, then with its known effects in every combination of up to three, fewer ones first.
 
-    Parameters
-    ----------
-    tell : callable, optional
-        Told which share of the fits is done.
-
-    Returns
-    -------
-    tuple of KnownFit
-        The board as it stands first. Of what the card states all together is among them, however much it is.
+    All that the card states together is among them, however much it is.
     """
     board = problem.board
     own = {name for name in known_effects(board) if name in board.effects}
@@ -100,15 +76,8 @@ def known_fits(problem: PosedProblem, tell: Callable[[float], None] | None = Non
 
 
 def known_fit(problem: PosedProblem, combination: Sequence[str] | None = None) -> KnownFit:
-    """Fit the constants of a board with some of its known effects and without the others.
-
-    Parameters
-    ----------
-    problem : PosedProblem
-        The board as it stands.
-    combination : sequence of str, optional
-        By default the board as it stands, with sizes that it leaves open where its own fit has them.
-    """
+    """The constants fitted to a board with some of its known effects and no others; by default to the board as it
+    stands."""
     own = [name for name in known_effects(problem.board) if name in problem.board.effects]
     baseline = fit_with(problem, combination)
     kept, law = baseline.used, baseline.every.predict
@@ -134,16 +103,9 @@ def known_fit(problem: PosedProblem, combination: Sequence[str] | None = None) -
 
 
 def fit_with(problem: PosedProblem, combination: Sequence[str] | None, n_first: int | None = None) -> Baseline:
-    """The fit of the constants to a board with some of its known effects, the law made anew where they move far.
+    """The constants fitted to a board with known effects (None: as it stands), the law made anew where they move far.
 
-    Parameters
-    ----------
-    problem : PosedProblem
-        The board as it stands.
-    combination : sequence of str or None
-        None: the board as it stands.
-    n_first : int, optional
-        How many of the readings, the first ones, tell the constants; by default all.
+    Only the first `n_first` of the readings tell them, by default all.
     """
     board = problem.board if combination is None else with_combination(problem.board, combination)
     inputs, fitted = _inputs_of(problem, board), _estimated(problem)

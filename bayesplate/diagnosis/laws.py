@@ -39,21 +39,13 @@ _BEYOND = 3
 
 @dataclass(frozen=True, eq=False)
 class Following:
-    """Shapes of a block without the effect.
-
-    Attributes
-    ----------
-    shapes : (n_modes, r) array
-        Shape times mass of its lowest modes: their product with another shape is the share.
-    wanted : (n_wanted,) array of int
-        Which of them are labelled.
-    groups : tuple of array of int
-        Positions in `wanted` of the modes of one symmetry class, in the order of their ranks.
-    """
+    """Shapes of a block without the effect."""
 
     block: ReducedClass
+    # (n_modes, r) array: shape times mass of its lowest modes: their product with another shape is the share
     shapes: Floats
-    wanted: NDArray[np.intp]
+    wanted: NDArray[np.intp]  # (n_wanted,) array of int: which of them are labelled
+    # tuple of array of int: positions in `wanted` of the modes of one symmetry class, in the order of their ranks
     groups: tuple[NDArray[np.intp], ...]
 
     @classmethod
@@ -99,28 +91,14 @@ class FollowedLaw(ExactLaw):
 
 @dataclass(frozen=True, eq=False)
 class FormLaw:
-    """Frequencies of a form as a function of the constants and of its free parameters.
-
-    Attributes
-    ----------
-    models : tuple of SetupModel
-        With the exact law.
-    """
+    """Frequencies of a form as a function of the constants and of its free parameters."""
 
     form: Form
-    models: tuple[SetupModel, ...]
+    models: tuple[SetupModel, ...]  # with the exact law
 
     def log_frequencies(self, baseline: Baseline, log_rigidities: Floats, values: Mapping[str, Floats]) -> Floats:
-        """ln f (Hz) of all labelled modes: (n, n_modes) array.
-
-        Parameters
-        ----------
-        baseline : Baseline
-            Whose inputs are taken.
-        log_rigidities : (n, n_constants) array
-        values : dict of (n,) array
-            The form's free parameters by name, SI.
-        """
+        """ln f (Hz) of all labelled modes, (n, n_modes), at (n, n_constants) ln D and (n,) values of the free
+        parameters, SI."""
         return self.every_log_frequency(baseline, log_rigidities, values)[:, baseline.rows]
 
     def every_log_frequency(self, baseline: Baseline, log_rigidities: Floats, values: Mapping[str, Floats]) -> Floats:
@@ -204,11 +182,8 @@ class FormLaw:
 def form_law(baseline: Baseline, form: Form, half_width: float | None = None) -> FormLaw:
     """Solve a form around a baseline and over the prior of its parameters.
 
-    Parameters
-    ----------
-    half_width : float, optional
-        Of the region in ln D_x / D_s and ln D_y / D_s, of which an isotropic board has none; by default three standard
-        deviations of the fit.
+    `half_width` is that of the region in ln D_x / D_s and ln D_y / D_s, of which an isotropic board has none; by
+    default three standard deviations of the fit.
     """
     board = form.board
     parameters = Parameters(board)

@@ -24,32 +24,19 @@ _POINTS, _FEW_POINTS = 64, 32
 
 @dataclass(frozen=True, eq=False)
 class NoiseGrid:
-    """Levels of the relative noise.
+    """Levels of the relative noise."""
 
-    Attributes
-    ----------
-    sd : (n_levels, n_setups) array
-    weights : (n_levels,) array
-        Prior probability, summing to 1.
-    """
-
-    sd: Floats
-    weights: Floats
+    sd: Floats  # (n_levels, n_setups) array
+    weights: Floats  # (n_levels,) array: prior probability, summing to 1
 
 
 def noise_grid(board: Board, *, few: bool = False, reach: Sequence[float] = ()) -> NoiseGrid:
     """Equidistant levels in the logarithm of the noise of one setup, each with each of two, and points among more.
 
     The points are the first of Sobol's sequence (USSR Comput. Math. Math. Phys. 7, 1967), each in the middle of its
-    share of the prior: as many for twenty setups as for three, so that the more setups, the coarser they lie.
-
-    Parameters
-    ----------
-    few : bool
-        Fewer levels, for combinations of effects.
-    reach : sequence of float, optional
-        How far up the levels have to go at least, for each of one or two setups: standard coordinates of its prior. A
-        misfit of many times the noise is a large noise rather than one that no level comes near.
+    share of the prior: as many for twenty setups as for three, so that the more setups, the coarser they lie; a `few`
+    for combinations of effects. The levels of one or two setups go up to `reach` at least, in standard coordinates: a
+    misfit of many times the noise is a large noise rather than one that no level comes near.
     """
     n_setups = len(board.setups)
     counts = _FEW_LEVELS if few else _LEVELS
@@ -65,14 +52,8 @@ def noise_grid(board: Board, *, few: bool = False, reach: Sequence[float] = ()) 
 
 
 def reach_of(board: Board, setup_index: NDArray[np.intp], residual: Floats) -> tuple[float, ...]:
-    """How far up the levels of each setup's noise have to go for its residual: standard coordinates of its prior.
-
-    Parameters
-    ----------
-    setup_index : (n_modes,) array of int
-    residual : (n_modes,) array
-        ln f; not a number where a reading is no mode.
-    """
+    """How far up the levels of each setup's noise have to go for its residual (ln f; NaN: no mode): standard
+    coordinates."""
     found = []
     for i, setup in enumerate(board.setups):
         own = residual[(setup_index == i) & np.isfinite(residual)]

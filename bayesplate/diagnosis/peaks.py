@@ -36,13 +36,8 @@ _MOST_WAYS, _WORTH = 6, 5.0
 
 
 def with_own_labels(ground: Ground) -> Ground:
-    """The hypotheses about a board, each with the labels that its readings likely have if it holds.
-
-    Returns
-    -------
-    Ground
-        The same one where all labels are certain.
-    """
+    """The hypotheses about a board, each with the labels that readings likely have if it holds; unchanged if all are
+    sure."""
     baseline = ground.baseline
     if not baseline.every.is_open:
         return ground
@@ -59,12 +54,7 @@ def with_own_labels(ground: Ground) -> Ground:
 def log_summed(baseline: Baseline, log_frequency: Floats, noise: Floats) -> Floats:
     """ln of the likelihood of all readings and peaks, summed over the ways to take them for modes: (n_draws,) array.
 
-    Parameters
-    ----------
-    log_frequency : (n_draws, n_every) array
-        ln f (Hz) of all modes that readings may be.
-    noise : (n_draws, n_setups) array
-        Relative.
+    From ln f (Hz) of all modes, (n_draws, n_every), and the relative noise, (n_draws, n_setups).
     """
     total = np.zeros(len(log_frequency))
     for i, (setup, every) in enumerate(zip(baseline.board.setups, _by_setup(baseline, log_frequency), strict=True)):
@@ -78,13 +68,8 @@ def log_summed(baseline: Baseline, log_frequency: Floats, noise: Floats) -> Floa
 
 
 def log_of_terms(own: Baseline, seen: Floats, drawn: TermDraws) -> Floats:
-    """ln of the likelihood of the readings under the labels of a baseline, by its normal terms: (n_draws,) array.
-
-    Parameters
-    ----------
-    seen : (n_modes,) array
-        ln of the readings.
-    """
+    """ln of the likelihood of the readings (ln f) under the labels of a baseline, by its normal terms: (n_draws,)
+    array."""
     kept = own.is_mode
     variance = drawn.noise[:, own.setup_index[kept]] ** 2 + own.own_variance[kept]
     squares = (seen[kept] - drawn.predicted[:, own.rows[kept]]) ** 2 / variance + np.log(2.0 * np.pi * variance)
@@ -117,17 +102,7 @@ def _labels_of(ground: Ground, drawn: TermDraws, otherwise: Rows) -> Rows:
 
 
 def likely_labels(baseline: Baseline, log_frequency: Floats, noise: Floats, otherwise: Rows) -> Rows:
-    """Which mode each reading likely is at some draws: (n_modes,) array, -1 where none is likely.
-
-    Parameters
-    ----------
-    log_frequency : (n_draws, n_every) array
-        ln f (Hz) of all modes that readings may be.
-    noise : (n_draws, n_setups) array
-        Relative.
-    otherwise : (n_modes,) array of int
-        What is given where too few have a likely label.
-    """
+    """Which mode each reading likely is at some draws: (n_modes,) rows, -1 where none; `otherwise` if too few are."""
     result = baseline.rows.copy()
     every = _by_setup(baseline, log_frequency)
     n_before = 0

@@ -19,27 +19,13 @@ FORMAT = 1
 
 @dataclass(frozen=True, kw_only=True)
 class Errors:
-    """The errors of a model; None for what these readings are too few to tell.
+    """The errors of a model; None for what these readings are too few to tell."""
 
-    Attributes
-    ----------
-    in_sample_rms_cents : float
-        Of the modes that the fit has seen.
-    leave_one_out_rms_cents : float or None
-        Of each mode, predicted by a fit that has not seen it.
-    nested_leave_one_out_rms_cents : float or None
-        The same, the effect chosen anew without that mode.
-    log_score : float or None
-        Sum of the log densities of the readings, each predicted from the others.
-    hits_90 : float
-        Share of the readings inside their 90 % intervals.
-    """
-
-    in_sample_rms_cents: float
-    leave_one_out_rms_cents: float | None
-    nested_leave_one_out_rms_cents: float | None
-    log_score: float | None
-    hits_90: float
+    in_sample_rms_cents: float  # of the modes that the fit has seen
+    leave_one_out_rms_cents: float | None  # of each mode, predicted by a fit that has not seen it
+    nested_leave_one_out_rms_cents: float | None  # the same, the effect chosen anew without that mode
+    log_score: float | None  # sum of the log densities of the readings, each predicted from the others
+    hits_90: float  # share of the readings inside their 90 % intervals
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,49 +38,27 @@ class PValues:
 
 @dataclass(frozen=True, kw_only=True)
 class Histogram:
-    """Numbers of simulated sets by a value.
+    """Numbers of simulated sets by a value."""
 
-    Attributes
-    ----------
-    edges : (n_bins + 1,) tuple of float
-    counts : (n_bins,) tuple of int
-    """
-
-    edges: tuple[float, ...]
+    edges: tuple[float, ...]  # n_bins + 1 of them
     counts: tuple[int, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class NullControlSummary:
-    """What the same search makes of simulated readings without any effect.
-
-    Attributes
-    ----------
-    flagged_percent : float
-        Share of the sets in which an effect would be called needed.
-    log_odds : float or None
-        ln odds of these readings that something is lacking; None where nothing could be.
-    log_odds_needed : float
-        Those above which an effect is needed.
-    log_odds_of_sets : Histogram or None
-        None where nothing could be lacking.
-    nested_ratio, nested_ratio_to_beat : float or None
-        Nested error after over before of these readings, and what 95 of 100 sets stay above that are made to choose
-        their most probable effect.
-    nested_ratio_percentile : float or None
-        Share of the sets with a larger ratio than these readings, percent.
-    nested_ratio_of_sets : Histogram or None
-        Of as many sets as were needed to tell; this, its limit and the percentile None where nothing is claimed.
-    """
+    """What the same search makes of simulated readings without any effect."""
 
     n_sets: int
-    flagged_percent: float
-    log_odds: float | None
-    log_odds_needed: float
-    log_odds_of_sets: Histogram | None
+    flagged_percent: float  # sets in which an effect would be called needed
+    log_odds: float | None  # ln odds of these readings that something is lacking
+    log_odds_needed: float  # those above which an effect is needed
+    log_odds_of_sets: Histogram | None  # None where nothing could be lacking
+    # nested error after over before of these readings; None of too few
     nested_ratio: float | None
+    # 95 of 100 sets that are made to choose their most probable effect stay above it
     nested_ratio_to_beat: float | None
-    nested_ratio_percentile: float | None
+    nested_ratio_percentile: float | None  # sets with a larger ratio, percent
+    # of as many sets as were needed to tell; this, its limit and the percentile None where nothing is claimed
     nested_ratio_of_sets: Histogram | None
 
 
@@ -109,39 +73,24 @@ class ElasticShift:
 
 @dataclass(frozen=True, kw_only=True)
 class Finalist:
-    """An explanation that was fitted again: its errors, its constants (Pa) and its sizes, by the sampler.
-
-    Attributes
-    ----------
-    elastic : dict of Spread
-        By modulus.
-    sizes : dict
-        "board" or setup -> effect -> parameter -> Spread.
-    """
+    """An explanation that was fitted again: its errors, its constants (Pa) and its sizes, by the sampler."""
 
     effects: tuple[str, ...]
     probability: float
     in_sample_rms_cents: float
     leave_one_out_rms_cents: float | None
     elastic: Mapping[str, Spread]
-    sizes: Mapping[str, Mapping[str, Mapping[str, Spread]]]
+    sizes: Mapping[str, Mapping[str, Mapping[str, Spread]]]  # "board" or setup -> effect -> parameter -> Spread
 
 
 @dataclass(frozen=True, kw_only=True)
 class Explanation:
-    """One way to explain the residual, an effect, a pair or an exchange of labels, with its probability.
-
-    Attributes
-    ----------
-    words : str
-        The same as people read it; not written to JSON.
-    is_stated : bool
-        Whether it is of known effects of which the card states one; not written to JSON.
-    """
+    """One way to explain the residual, an effect, a pair or an exchange of labels, with its probability."""
 
     effects: tuple[str, ...]
     probability: float
-    words: str = field(metadata=NOT_IN_JSON)
+    words: str = field(metadata=NOT_IN_JSON)  # as people read it
+    # whether it is of known effects of which the card states one; not written to JSON
     is_stated: bool = field(default=False, metadata=NOT_IN_JSON)
 
 

@@ -36,24 +36,15 @@ _MOST_TERMS = 2_000_000
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An effect that is tried.
-
-    Attributes
-    ----------
-    laws : tuple of FormLaw
-        Of its forms.
-    signature : Signature
-        Of the form that shows most.
-    trace : float
-        Length of its visible shift at nominal size, at the constants of a board with the effect that looks like the one
-        at hand, in units of the readings' uncertainty: what the search goes by.
-    """
+    """An effect that is tried."""
 
     name: str
     laws: tuple[FormLaw, ...]
     fine: Table
     coarse: Table
-    signature: Signature
+    signature: Signature  # of the form that shows most
+    # length of its visible shift at nominal size, at the constants of a board with the effect that looks like the one
+    # at hand, in units of the readings' uncertainty: what the search goes by
     trace: float
 
 
@@ -82,17 +73,11 @@ class Ground:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What the search finds in one set of readings.
-
-    Attributes
-    ----------
-    residual : (n_modes,) array
-        ln measured less ln f of the baseline.
-    log_evidence, probability : (n_hypotheses,) array
-    """
+    """What the search finds in one set of readings."""
 
     ground: Ground
-    residual: Floats
+    residual: Floats  # (n_modes,) array: ln measured less ln f of the baseline
+    # log_evidence, probability: (n_hypotheses,) array
     log_evidence: Floats
     probability: Floats
 
@@ -141,22 +126,8 @@ def prepare_search(
     tried: Sequence[str] | None = None,
     tell: Callable[[float], None] | None = None,
 ) -> Ground:
-    """Tabulate every candidate of a board.
-
-    Parameters
-    ----------
-    solve : callable, optional
-        Makes the law of a form around the baseline; by default by full solves.
-    tried : sequence of str, optional
-        Effects to try; by default all that are not declared and can act.
-    tell : callable, optional
-        Told which share of the effects is done.
-
-    Returns
-    -------
-    Ground
-        Without effects that leave no plate, whatever their size.
-    """
+    """Tabulate every candidate of a board, its forms solved by `solve`; without effects that leave no plate at any
+    size."""
     every = {name: each for name, each in forms(baseline.board).items() if tried is None or name in tried}
 
     def candidate(name: str) -> Candidate:
@@ -197,25 +168,13 @@ def _candidate(baseline: Baseline, name: str, laws: tuple[FormLaw, ...]) -> Cand
 
 
 def predictive_p_value(hypothesis: Hypothesis, baseline: Baseline, residuals: Floats) -> Floats:
-    """Prior predictive probability of readings that a hypothesis expects as little as these.
+    """Prior predictive probability of readings that a hypothesis expects as little as these: (n_sets,) array.
 
     The share of readings simulated under the hypothesis whose marginal density is no larger: noise and sizes are drawn
     from their priors and integrated over in the density, so that a size that the prior hardly allows counts as misfit,
     and neither noise nor size can follow the residual. Uniform if the hypothesis is true, whatever the number of setups
-    and however different their noise.
+    and however different their noise. At least 1 / 1001, and 1 / 20,001 where nothing is lacking.
 
-    Parameters
-    ----------
-    residuals : (n_sets, n_modes) array
-        Of its labels.
-
-    Returns
-    -------
-    (n_sets,) array
-        At least 1 / 1001, and 1 / 20,001 where nothing is lacking.
-
-    References
-    ----------
     Box, Sampling and Bayes' inference in scientific modelling and robustness, J. R. Stat. Soc. A 143, 383 (1980).
     """
     terms = hypothesis.terms

@@ -55,15 +55,10 @@ def variants(found: Found) -> Iterator[tuple[str, Found]]:
 
 @lru_cache(maxsize=8)  # the verdict, the claim and the result ask for the same
 def varied(found: Found, *, width: float = 1.0, noise: float = 1.0) -> Found:
-    """The same search with other priors.
+    """The same search, the standard deviation of every size's prior and every noise prior multiplied by a factor.
 
-    Parameters
-    ----------
-    width : float
-        Factor of the standard deviation of every size's prior. The cells reach three of the old standard deviations;
-        what a wider prior puts beyond them counts as unable to explain the readings.
-    noise : float
-        Factor of every noise prior.
+    The cells reach three of the old standard deviations; what a wider prior puts beyond them counts as unable to
+    explain the readings.
     """
     ground = found.ground
     changed = replace(ground, hypotheses=tuple(_changed(found, i, width, noise) for i in range(len(ground.hypotheses))))
@@ -101,13 +96,8 @@ def _inside(prior: Quantity, factor: float) -> float:
 
 @lru_cache(maxsize=2)  # the verdict and the averages ask for the same
 def under_exact_law(found: Found) -> Found | None:
-    """The same search with every evidence corrected to the exact law.
-
-    Returns
-    -------
-    Found or None
-        None where no draw of any hypothesis is a plate by it.
-    """
+    """The same search, every evidence corrected to the exact law; None where no draw of any hypothesis is a plate by
+    it."""
     rng = np.random.default_rng(0)
     corrections = np.full(found.probability.size, _correction(found, 0, rng))
     worth = found.probability > _WORTH * found.probability.max()

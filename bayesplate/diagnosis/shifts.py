@@ -42,43 +42,21 @@ _LONGEST_STEP = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Cells of one effect, or of two together.
+    """Cells of one effect, or of two together."""
 
-    Attributes
-    ----------
-    weights : (n_cells,) array
-        Prior probability, summing to 1.
-    shift : (n_cells, n_modes) array
-        ln f with the effect, constants refitted, less ln f of the baseline; of all modes that readings may be, or of
-        those that they are taken for.
-    slopes : (n_cells, n_modes, n_tangents) array
-        Change of the shift over one standard deviation of the cell.
-    moved : (n_cells, n_constants) array
-        Change of ln D by the refit.
-    moved_slopes : (n_cells, n_constants, n_tangents) array
-    form : (n_cells,) array of int
-        Which form of the effect; of the first one where there are two.
-    z : (n_cells, n_parameters) array
-        Standard coordinates of the first effect's parameters.
-    z_slopes : (n_cells, n_parameters) array
-        Their change over one standard deviation of the cell.
-    parts : tuple of Table
-        Of two effects together: the tables of both, the cells of the second running fastest.
-    """
-
-    weights: Floats
-    shift: Floats
-    slopes: Floats
-    moved: Floats
-    moved_slopes: Floats
-    form: Rows
-    z: Floats
-    z_slopes: Floats
+    weights: Floats  # (n_cells,) array: prior probability, summing to 1
+    shift: Floats  # (n_cells, n_modes) array: ln f with the effect, constants refitted, less ln f of the baseline
+    slopes: Floats  # (n_cells, n_modes, n_tangents) array: change of the shift over one standard deviation of the cell
+    moved: Floats  # (n_cells, n_constants) array: change of ln D by the refit
+    moved_slopes: Floats  # (n_cells, n_constants, n_tangents) array
+    form: Rows  # (n_cells,) array of int: which form of the effect; of the first one where there are two
+    z: Floats  # (n_cells, n_parameters) array: standard coordinates of the first effect's parameters
+    z_slopes: Floats  # (n_cells, n_parameters) array: their change over one standard deviation of the cell
+    # of two effects together: the tables of both, the cells of the second running fastest
     parts: tuple[Table, ...] = ()
 
     @property
     def n_cells(self) -> int:
-        """Number of cells."""
         return int(self.weights.size)
 
     def some(self, cells: slice | Rows) -> Table:
@@ -120,20 +98,7 @@ def nothing(n_modes: int, n_constants: int = 3) -> Table:
 
 
 def tabulate(baseline: Baseline, laws: Sequence[FormLaw], cells: tuple[int, int, int] = FINE) -> Table:
-    """Tabulate an effect over all its forms.
-
-    Parameters
-    ----------
-    laws : sequence of FormLaw
-        Of the effect's forms, equally probable.
-    cells : tuple of int
-        `FINE` or `COARSE`.
-
-    Returns
-    -------
-    Table
-        Without any cells where no size of the effect leaves a plate.
-    """
+    """Tabulate an effect over all its forms, equally probable; without cells where no size of it leaves a plate."""
     n_tangents = max(len(law.form.free) for law in laws)
     parts = [_of_form(baseline, i, law, cells, n_tangents) for i, law in enumerate(laws)]
     joined: dict[str, Any] = {key: np.concatenate([getattr(part, key) for part in parts]) for key in _PER_CELL}
@@ -173,18 +138,8 @@ def joint_law(baseline: Baseline, one: Form, other: Form) -> FormLaw:
 
 
 def joint_table(baseline: Baseline, added: Table, laws: JointLaws) -> Table:
-    """Two effects at once, exactly where there are laws of both.
-
-    Parameters
-    ----------
-    added : Table
-        Of both, their shifts added.
-
-    Returns
-    -------
-    Table
-        With the same cells in the same order.
-    """
+    """Two effects at once: exactly where there are laws of both, elsewhere as in `added`, and with its cells in its
+    order."""
     (one, first), (other, second) = added.member(0), added.member(1)
     found = {key: getattr(added, key).copy() for key in ("shift", "moved", "slopes", "moved_slopes")}
     for (i, j), law in laws.items():
@@ -205,18 +160,10 @@ def joint_table(baseline: Baseline, added: Table, laws: JointLaws) -> Table:
 
 
 def refitted(baseline: Baseline, law: FormLaw, z: Floats) -> tuple[Floats, Floats]:
-    """Shifts of all modes with the constants refitted to the baseline's readings, and what the refit changed.
+    """Shifts, (n, n_every), with the constants refitted at (n, n_parameters) standard coordinates, and the changes of
+    ln D.
 
-    Parameters
-    ----------
-    z : (n, n_parameters) array
-        Standard coordinates.
-
-    Returns
-    -------
-    shift : (n, n_every) array
-        Not a number where the law gives no frequency.
-    moved : (n, n_constants) array
+    A shift is not a number where the law gives no frequency.
     """
     values = {free.name: free.prior.value(z[:, i]) for i, free in enumerate(law.form.free)}
     moved = np.zeros((len(z), baseline.log_rigidities.size))

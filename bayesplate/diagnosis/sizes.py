@@ -20,17 +20,7 @@ _N_DRAWS = 2000
 
 
 def size_posterior(found: Found, index: int, member: int, form: int, parameter: int) -> tuple[Floats, Floats]:
-    """Probability and standard coordinate of each cell of a member's form, under one hypothesis.
-
-    Parameters
-    ----------
-    index : int
-        Of the hypothesis.
-    member : int
-        0 or 1: which of its effects.
-    form, parameter : int
-        Which form of that effect, and which of its parameters.
-    """
+    """Probability and standard coordinate of each cell of a member's form, under one hypothesis."""
     table, cells = found.ground.hypotheses[index].table.member(member)
     by_cell = np.bincount(cells, weights=found.cells(index), minlength=table.n_cells)
     of_form = table.form == form

@@ -153,13 +153,8 @@ def sizes_table(diagnosis: Diagnosis) -> Table | None:
 
 
 def candidates_table(diagnosis: Diagnosis, *, narrow: bool = False) -> Table | None:
-    """Candidates, the most probable first: what each would do, and why it was rejected; None if there are none.
-
-    Parameters
-    ----------
-    narrow : bool
-        Fit for a terminal: without the bias and the look-alikes, the reason of a rejection in two words.
-    """
+    """Candidates, the most probable first, and why each was rejected; a narrow one lacks bias and look-alikes. None of
+    none."""
     shown = sorted(worth_showing(diagnosis), key=lambda one: -one.inclusion_probability)
     if not shown:
         return None
@@ -246,15 +241,7 @@ def _sizes(diagnosis: Diagnosis) -> list[tuple[str, Value]]:
 
 
 def write_diagnosis_tables(folder: Path, diagnosis: Diagnosis, title: str) -> tuple[Path, ...]:
-    """Write errors and constants before and after, and known effects where there are any, as CSV and LaTeX.
-
-    Parameters
-    ----------
-    folder : Path
-        Must be there.
-    title : str
-        Of the board; any text.
-    """
+    """Write errors and constants before and after, and known effects where there are any, as CSV and LaTeX."""
     written: tuple[Path, ...] = ()
     for names, table in ((BEFORE_AFTER, before_after_table(diagnosis)), (KNOWN_EFFECTS, known_table(diagnosis.known))):
         if table is not None:

@@ -31,15 +31,9 @@ _LEAST = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """Normal terms of a table: one per level of noise and cell, cells running fastest.
+    """Normal terms of a table: one per level of noise and cell, cells running fastest."""
 
-    Attributes
-    ----------
-    table : Table
-        Of the modes that the readings are taken for.
-    """
-
-    table: Table
+    table: Table  # of the modes that the readings are taken for
     baseline: Baseline
     noise: NoiseGrid
 
@@ -87,13 +81,7 @@ class Terms:
         return offsets[:, :, None] - 0.5 * squares, inside
 
     def log_densities(self, residuals: Floats) -> Floats:
-        """Logarithm of weight times density of each term: (n_terms, n_sets) array.
-
-        Parameters
-        ----------
-        residuals : (n_sets, n_modes) array
-            ln measured less ln f of the baseline.
-        """
+        """Logarithm of weight times density of each term: (n_terms, n_sets) array."""
         return self._densities(residuals)[0].reshape(-1, len(residuals))
 
     def log_evidence(self, residuals: Floats) -> Floats:
@@ -102,18 +90,10 @@ class Terms:
         return np.asarray(log_sum(np.stack(parts)) - self.baseline.half_log_det)
 
     def left_out(self, residuals: Floats) -> tuple[Floats, Floats]:
-        """Each mode left out in turn, with all its readings.
+        """ln evidence without each mode, (n_same_modes, n_sets), and the errors of its readings, (n_modes, n_sets), ln
+        f.
 
-        Parameters
-        ----------
-        residuals : (n_sets, n_modes) array
-
-        Returns
-        -------
-        log_evidence : (n_same_modes, n_sets) array
-            Of the readings of the other modes.
-        errors : (n_modes, n_sets) array
-            Each reading less its mean prediction by these, ln f; not a number where the reading is no mode.
+        An error is a reading less its mean prediction by the others; not a number where the reading is no mode.
         """
         parts = [part._left_out(residuals) for part in self._in_parts(len(residuals))]
         log_masses, errors = (np.stack(each) for each in zip(*parts, strict=True))

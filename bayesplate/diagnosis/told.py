@@ -135,15 +135,7 @@ def _stated_sentence(one: StatedClaim) -> str:
 
 
 def relabelled_sentence(before: Board, after: Board, words: str) -> str:
-    """Which peaks have another label in the model after than in the one before; empty where none has.
-
-    Parameters
-    ----------
-    before, after : Board
-        With the labels that their draws make likely.
-    words : str
-        What was added.
-    """
+    """Which peaks have another label in the model after than in the one before; empty where none has."""
     first, second = _labels(before), _labels(after)
     changed = []
     for key in sorted(first.keys() | second.keys(), key=lambda each: (each[0], each[1].mean)):

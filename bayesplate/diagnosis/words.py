@@ -58,22 +58,12 @@ IN_PART = "Part of what is missing was found"
 
 @dataclass(frozen=True)
 class Merit:
-    """A figure of merit.
-
-    Attributes
-    ----------
-    of : callable
-        Takes it from the errors of a model.
-    shown : callable
-        The number as people read it.
-    is_rms : bool
-        Whether it is an error, rms cents, so that it can be drawn beside the others.
-    """
+    """A figure of merit."""
 
     words: str
     of: Callable[[Errors], float | None]
     shown: Callable[[float | None], Value]
-    is_rms: bool = False
+    is_rms: bool = False  # whether it is an error, rms cents, so that it can be drawn beside the others
 
     @property
     def title(self) -> str:

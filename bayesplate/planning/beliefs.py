@@ -33,85 +33,44 @@ _STEP = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class FormTerms:
-    """Terms of an explanation in which its effects have the same forms.
+    """Terms of an explanation in which its effects have the same forms."""
 
-    Attributes
-    ----------
-    rows : (n,) array of int
-        Which terms.
-    board : Board
-        With the forms declared.
-    effects : tuple of str
-        One per parameter.
-    parameters : tuple of Parameter
-        The sizes that are uncertain.
-    columns : (n_parameters,) array of int
-        Of u: their standard coordinates.
-    """
-
-    rows: Rows
-    board: Board
-    effects: tuple[str, ...]
-    parameters: tuple[Parameter, ...]
-    columns: Rows
+    rows: Rows  # (n,) array of int: which terms
+    board: Board  # with the forms declared
+    effects: tuple[str, ...]  # one per parameter
+    parameters: tuple[Parameter, ...]  # the sizes that are uncertain
+    columns: Rows  # (n_parameters,) array of int: columns of u that are their standard coordinates
 
 
 @dataclass(frozen=True, eq=False)
 class AtHand:
-    """What an explanation expects of the readings at hand, of all setups in turn: the peaks stay, whatever their names.
+    """What an explanation expects of the readings at hand, setup by setup: the peaks stay, whatever their names."""
 
-    Attributes
-    ----------
-    shift : (n_terms, n_readings) array
-        ln f (Hz) where u is zero; not a number of a reading that is taken for no mode.
-    slopes : (n_terms, n_readings, n_u) array
-    taken : (n_readings,) array of int
-        The reading by whose label each of them goes then; -1 for none.
-    """
-
-    shift: Floats
-    slopes: Floats
-    taken: Rows
+    shift: Floats  # (n_terms, n_readings) array: ln f (Hz) where u is zero; not a number of a reading that is no mode
+    slopes: Floats  # (n_terms, n_readings, n_u) array
+    taken: Rows  # (n_readings,) array of int: the reading by whose label each of them goes then; -1 for none
 
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """One thing that may be the case, as equally probable normal terms of u.
+    """One thing that may be the case, as equally probable normal terms of u."""
 
-    Attributes
-    ----------
-    members : tuple of str
-        Effects that are present; empty for none.
-    probability : float
-        Among the explanations that survive; they sum to one.
-    mean : (n_terms, n_u) array
-    covariance : (n_terms, n_u, n_u) array
-    noise : (n_terms, n_setups) array
-        Relative, of the setups of all boards in turn.
-    middle : (n_terms, n_wanted) array
-        Where u is zero: standard coordinates of what boards share, then ln of E_x, E_y, G_xy (Pa), board after board.
-    wanted : (n_terms, n_wanted, n_u) array
-        Their slopes.
-    forms : tuple of FormTerms
-        Of its effects.
-    again : AtHand, optional
-        What is expected of the readings at hand; by default what the laws of the stations say.
-    """
-
-    members: tuple[str, ...]
+    members: tuple[str, ...]  # effects that are present; empty for none
     words: str
-    probability: float
-    mean: Floats
-    covariance: Floats
-    noise: Floats
+    probability: float  # among the explanations that survive; they sum to one
+    mean: Floats  # (n_terms, n_u) array
+    covariance: Floats  # (n_terms, n_u, n_u) array
+    noise: Floats  # (n_terms, n_setups) array: relative, of the setups of all boards in turn
+    # (n_terms, n_wanted) array: standard coordinates of what boards share, then ln of E_x, E_y, G_xy (Pa), board after
+    # board; where u is zero
     middle: Floats
-    wanted: Floats
+    wanted: Floats  # (n_terms, n_wanted, n_u) array: their slopes
     forms: tuple[FormTerms, ...] = ()
+    # what is expected of the readings at hand; by default what the laws of the stations say
     again: AtHand | None = None
 
     @property
     def n_terms(self) -> int:
-        """Number of terms."""
         return len(self.mean)
 
     @property
@@ -122,68 +81,40 @@ class Explanation:
 
 @dataclass(frozen=True, eq=False)
 class KnownBoard:
-    """A board of a belief.
-
-    Attributes
-    ----------
-    values : dict of float
-        Rigidities and inputs about which its modes are computed, SI.
-    laws : tuple of BareLaw
-        Of the stations that are looked at.
-    columns : (n_fitted, n_u) array
-        What the columns of u do to its constants and inputs.
-    first_setup : int
-        Where its setups begin among those of all boards.
-    pull : (n_shared, n_shared) array, optional
-        Precision of what it says of the shared parameters, its own integrated out.
-    """
+    """A board of a belief."""
 
     board: Board
-    values: Values
-    laws: tuple[BareLaw, ...]
-    columns: Floats
-    first_setup: int = 0
+    values: Values  # rigidities and inputs about which its modes are computed, SI
+    laws: tuple[BareLaw, ...]  # of the stations that are looked at
+    columns: Floats  # (n_fitted, n_u) array: what the columns of u do to its constants and inputs
+    first_setup: int = 0  # where its setups begin among those of all boards
+    # (n_shared, n_shared) array: precision of what it says of the shared parameters, its own integrated out
     pull: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Beliefs:
-    """What is believed now of one board, or of several together.
-
-    Attributes
-    ----------
-    explanations : tuple of Explanation
-        The most probable first.
-    shared : tuple of str
-        Names of what the boards share.
-    basis : str
-        What is believed: "readings", "prior" (readings, if there are any, were left aside) or "campaign".
-    notes : tuple of str
-        What a plan that rests on it does not know.
-    wrong : str, optional
-        Where nothing explains the readings, what is to be done about a wrong one before anything else.
-    """
+    """What is believed now of one board, or of several together."""
 
     boards: tuple[KnownBoard, ...]
-    explanations: tuple[Explanation, ...]
-    shared: tuple[str, ...] = ()
+    explanations: tuple[Explanation, ...]  # the most probable first
+    shared: tuple[str, ...] = ()  # names of what the boards share
+    # what is believed: "readings", "prior" (readings, if there are any, were left aside) or "campaign"
     basis: str = "readings"
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what a plan that rests on it does not know
+    # where nothing explains the readings, what is to be done about a wrong one before anything else
     wrong: str | None = None
 
     @property
     def is_prior(self) -> bool:
-        """Whether readings, if there are any, were left aside."""
         return self.basis == "prior"
 
     @property
     def probabilities(self) -> Floats:
-        """Of the explanations: (n_explanations,) array."""
         return np.array([one.probability for one in self.explanations])
 
     @property
     def entropy(self) -> float:
-        """Of the explanations, nats."""
         return float(entropy(self.probabilities[:, None])[0])
 
     @property
@@ -219,12 +150,7 @@ def levels(prior: Quantity, n: int, rng: np.random.Generator) -> Floats:
 
 
 def log_moduli(board: Board, log_rigidities: Floats) -> tuple[Floats, Floats]:
-    """ln E_x, E_y, G_xy (Pa), the inputs at the middle of their priors: (3,) array, and slopes, (3, n_fitted) array.
-
-    Parameters
-    ----------
-    log_rigidities : (n_constants,) array
-    """
+    """ln E_x, E_y, G_xy (Pa), the inputs at the middle of their priors: (3,) array, and slopes, (3, n_fitted) array."""
     parameters = Parameters(board)
     columns = parameters.fitted_columns
     theta = np.zeros((1 + 2 * columns.size, parameters.n_dim))

@@ -34,16 +34,10 @@ _LEVELS = 401
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """What to do at the bench for one way to hold the board.
-
-    Attributes
-    ----------
-    sheet : Sheet
-        Of the modes to look for alone.
-    """
+    """What to do at the bench for one way to hold the board."""
 
     entry: BenchEntry
-    sheet: Sheet
+    sheet: Sheet  # of the modes to look for alone
     placing: Placing
 
 
@@ -58,13 +52,8 @@ def benches(beliefs: Beliefs, steps: Sequence[Proposal]) -> tuple[Bench, ...]:
 
 
 def bands(beliefs: Beliefs, readings: Readings, within: Sequence[float] = BAND) -> Floats:
-    """Where each reading will lie, over all explanations: (n, n_within) array in the unit of the readings.
-
-    Parameters
-    ----------
-    within : sequence of float
-        Probabilities.
-    """
+    """Where each reading will lie, over all explanations: (n, n_within) array at these probabilities, in the readings'
+    unit."""
     from scipy.special import ndtri
 
     levels = ndtri((np.arange(_LEVELS) + 0.5) / _LEVELS)[:, None, None]
@@ -83,16 +72,9 @@ def bands(beliefs: Beliefs, readings: Readings, within: Sequence[float] = BAND) 
 
 
 def bench_of(known: KnownBoard, law: BareLaw, rows: Sequence[int], ends: Floats, likely: str) -> Bench:
-    """The sheet for some modes of a board; the sensor stands where it stood in a session that goes on.
+    """The sheet for some modes of a board, `ends` being ln of their frequencies (Hz) at the probabilities of `BAND`.
 
-    Parameters
-    ----------
-    rows : sequence of int
-        Which of its modes.
-    ends : (n_rows, 3) array
-        ln of the frequencies (Hz) at the probabilities of `BAND`.
-    likely : str
-        By what the bands are judged.
+    The sensor stands where it stood in a session that goes on.
     """
     board, station = known.board, law.station
     system = station.system(board)

@@ -22,15 +22,7 @@ def drawn_up(
     priors: Sequence[PriorCard] = (),
     shared: Sequence[Shared] = (),
 ) -> tuple[Plan, tuple[Bench, ...]]:
-    """The plan as plan.json has it, and the sheets for the bench.
-
-    Parameters
-    ----------
-    name, title, card_sha256 : str
-        Of the card.
-    priors, shared
-        See `bayesplate.planning.proposals.Planner.ranked`.
-    """
+    """The plan as plan.json has it, and the sheets for the bench."""
     beliefs, listed = planner.beliefs, planner.ranked(priors, shared)
     together = planner.sequences(listed)
     drawn = benches(beliefs, together[-1][0] if together else listed[:1])

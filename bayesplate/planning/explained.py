@@ -52,17 +52,9 @@ MOST = 4
 def believed(
     found: Found, prior: PriorCard | None, rng: np.random.Generator, among: Sequence[Answer] | None = None
 ) -> Beliefs:
-    """What a search leaves to be believed of a board.
+    """What a search leaves to be believed of a board: of the explanations among those given, or of those that survive.
 
-    Parameters
-    ----------
-    prior : PriorCard or None
-        Of the noise where the board was never held.
-    rng : numpy.random.Generator
-        Picks the terms that stand for all.
-    among : sequence of Answer, optional
-        Explanations that are to be told apart, that of no effect with index 0. By default those that survive; no effect
-        alone where nothing explains the readings.
+    No effect alone where nothing explains the readings. The prior is of the noise where the board was never held.
     """
     base, is_failed = found.ground.baseline, among is None and is_unexplained(found)
     left = [Answer((), 0, found.none)] if is_failed else survivors(found) if among is None else among
@@ -183,12 +175,8 @@ def _conditioned(design: Floats, variance: Floats, seen: Floats, used: Rows, n_c
 def survivors(found: Found, rivals: Collection[tuple[str, ...]] = ()) -> tuple[Answer, ...]:
     """No effect, and the answers of a search within a factor ten of the best of them, the most probable first.
 
-    No effect is left out where it is ten times less probable than the best answer.
-
-    Parameters
-    ----------
-    rivals : collection of tuple of str
-        Answers that survive in any case: alternatives that a verdict lists because another assumption favours them.
+    No effect is left out where it is ten times less probable than the best answer. Rivals survive in any case: a
+    verdict lists them because another assumption favours them.
     """
     return surviving(found, {one.members: one.support for one in answers(found)}, found.none, rivals)
 
@@ -196,18 +184,9 @@ def survivors(found: Found, rivals: Collection[tuple[str, ...]] = ()) -> tuple[A
 def surviving(
     found: Found, support: Mapping[tuple[str, ...], float], none: float, rivals: Collection[tuple[str, ...]] = ()
 ) -> tuple[Answer, ...]:
-    """The same by probabilities that are known from a finished diagnosis.
+    """The same by probabilities, of answers by their effects and of none, that are known from a finished diagnosis.
 
-    Parameters
-    ----------
-    found : Found
-        A search that has tried at least these effects; others are left out.
-    support : dict of float
-        By the effects of an answer.
-    none : float
-        Probability of no effect.
-    rivals : collection of tuple of str
-        See `survivors`.
+    Effects that the search has not tried are left out.
     """
     index: dict[tuple[str, ...], int] = {}
     for i, one in enumerate(found.ground.hypotheses):

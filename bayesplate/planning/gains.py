@@ -36,24 +36,15 @@ _FEWEST_DRAWS = 32
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """Readings that could be taken, linear in u under each explanation.
+    """Readings that could be taken, linear in u under each explanation."""
 
-    Attributes
-    ----------
-    shift : tuple of (n_terms, n) array
-        One per explanation: what is read where u is zero, less the same number under all.
-    slopes : tuple of (n_terms, n, n_u) array
-    variance : tuple of (n_terms, n) array
-        Of the noise.
-    """
-
+    # one (n_terms, n) array per explanation: what is read where u is zero, less the same number under all
     shift: tuple[Floats, ...]
-    slopes: tuple[Floats, ...]
-    variance: tuple[Floats, ...]
+    slopes: tuple[Floats, ...]  # (n_terms, n, n_u) arrays
+    variance: tuple[Floats, ...]  # (n_terms, n) arrays: of the noise
 
     @property
     def n(self) -> int:
-        """Number of readings."""
         return int(self.shift[0].shape[1])
 
     def some(self, rows: Sequence[int]) -> Readings:
@@ -81,15 +72,8 @@ def expected_gain(
 ) -> Gain:
     """What some readings are expected to give.
 
-    Parameters
-    ----------
-    goal : str, optional
-        One of `GOALS`: what the score counts. By default the drop of the explanations' entropy and the mean shrinkage,
-        both logarithms, of what the boards share, or of the constants where they share nothing.
-    minutes : float
-        That the readings take.
-    n_draws : int
-        Of what may be read.
+    The score counts the goal, one of `GOALS`; by default the drop of the explanations' entropy and the mean shrinkage,
+    both logarithms, of what the boards share, or of the constants where they share nothing.
     """
     updates = [_Update.of(one, readings, k, beliefs.free) for k, one in enumerate(beliefs.explanations)]
     weights = beliefs.probabilities
@@ -145,28 +129,15 @@ class _Mean:
 
 @dataclass(frozen=True, eq=False)
 class _Update:
-    """What readings do to each term of an explanation.
+    """What readings do to each term of an explanation."""
 
-    Attributes
-    ----------
-    expected : (n_terms, n) array
-        Of the readings.
-    factor, whitening : (n_terms, n, n) array
-        L with their covariance L L', and its inverse.
-    log_size : (n_terms,) array
-        ln of the determinant of L.
-    pull : (n_terms, n_wanted, n) array
-        Takes whitened misses to what the wanted numbers change by.
-    wanted, before, after : (n_terms, n_wanted) array
-        Their means, and their variances before and after.
-    information : (n_terms,) array
-    """
-
-    expected: Floats
+    expected: Floats  # (n_terms, n) array: of the readings
+    # factor, whitening: (n_terms, n, n) array: L with their covariance L L', and its inverse
     factor: Floats
     whitening: Floats
-    log_size: Floats
-    pull: Floats
+    log_size: Floats  # (n_terms,) array: ln of the determinant of L
+    pull: Floats  # (n_terms, n_wanted, n) array: takes whitened misses to what the wanted numbers change by
+    # wanted, before, after: (n_terms, n_wanted) array: their means, and their variances before and after
     wanted: Floats
     before: Floats
     after: Floats

@@ -32,25 +32,13 @@ PLACED = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class SolvedStation:
-    """The modes of a station by full solution, and a known mass among them.
-
-    Attributes
-    ----------
-    values : dict of float
-        With those that the station's effects take.
-    modes : Modes
-        The lowest ones.
-    rows : list of int
-        Where the station's modes stand among them; -1 where one has lost its name.
-    share : float
-        The known mass over that of what vibrates.
-    """
+    """The modes of a station by full solution, and a known mass among them."""
 
     station: Station
-    values: Values
-    modes: Modes
-    rows: list[int]
-    share: float
+    values: Values  # with those that the station's effects take
+    modes: Modes  # the lowest ones
+    rows: list[int]  # where the station's modes stand among them; -1 where one has lost its name
+    share: float  # the known mass over that of what vibrates
 
     @classmethod
     def of(cls, station: Station, board: Board, values: Values, meshed: Values | None = None) -> SolvedStation:
@@ -117,43 +105,20 @@ def known_mass(board: Board) -> float:
 
 @dataclass(frozen=True, eq=False)
 class BareLaw:
-    """The modes of a station without further effects, linear in constants and inputs.
-
-    Attributes
-    ----------
-    solved : (1 + n_spots, n_modes) array
-        Of `SolvedStation.bare_and_added`, at the estimate.
-    middle : (n_modes,) array
-        ln f (Hz) with the inputs at the middle of their priors.
-    slopes : (n_plates, n_modes, n_constants + n_inputs) array
-        By the logarithms of the free rigidities and the inputs' standard coordinates, at the estimate; where nothing
-        was read, at plates drawn from the prior.
-    off_place : (n_spots, n_modes) array
-        Of `SolvedStation`, at the estimate.
-    """
+    """The modes of a station without further effects, linear in constants and inputs."""
 
     station: Station
-    solved: Floats
-    middle: Floats
+    solved: Floats  # (1 + n_spots, n_modes) array: of `SolvedStation.bare_and_added`, at the estimate
+    middle: Floats  # (n_modes,) array: ln f (Hz) with the inputs at the middle of their priors
+    # (n_plates, n_modes, n_constants + n_inputs) array: by the logarithms of the free rigidities and the inputs'
+    # standard coordinates, at the estimate; where nothing was read, at plates drawn from the prior
     slopes: Floats
-    off_place: Floats
+    off_place: Floats  # (n_spots, n_modes) array: of `SolvedStation`, at the estimate
 
 
 def bare_law(board: Board, station: Station, values: Values, drawn: Sequence[Values] = ()) -> BareLaw:
-    """Solve a station at an estimate.
-
-    Parameters
-    ----------
-    values : dict of float
-        Rigidities and the board's inputs, SI.
-    drawn : sequence of dict of float
-        Plates at which the slopes are taken instead; one on which a mode is not to be found is passed over.
-
-    Raises
-    ------
-    KeyError
-        If one of its modes is no mode of the plate at the estimate.
-    """
+    """Solve a station at an estimate; the slopes at plates drawn instead, where they have its modes. KeyError if it
+    lacks one."""
     slopes, inputs, offset = _linear(board, station, values)
     found = SolvedStation.of(station, board, values)
     solved, n = found.bare_and_added, board.symmetry.n

@@ -24,28 +24,18 @@ REPEATED = 2e-4
 
 @dataclass(frozen=True, eq=False)
 class StationReadings:
-    """Everything that could be read in a station.
-
-    Attributes
-    ----------
-    further : Readings
-        Modes that were not read yet, in the session that goes on, or in a new one where the board is held anew.
-    rows : tuple of int
-        Which of the station's modes they are.
-    old : tuple of int
-        Which of the readings at hand can be taken once more: every explanation knows what is read then.
-    again : Readings or None
-        These in another session; None where there are none, or where what is believed leaves them aside.
-    with_mass : dict of Readings
-        The same with a known mass, in the session that goes on, by the index of its spot; none where there is one
-        explanation only, for a known mass tells by what it adds alone.
-    """
+    """Everything that could be read in a station."""
 
     law: BareLaw
+    # modes that were not read yet, in the session that goes on, or in a new one where the board is held anew
     further: Readings
-    rows: tuple[int, ...]
+    rows: tuple[int, ...]  # which of the station's modes they are
+    # which of the readings at hand can be taken once more: every explanation knows what is read then
     old: tuple[int, ...]
+    # these in another session; None where there are none, or where what is believed leaves them aside
     again: Readings | None
+    # the same with a known mass, in the session that goes on, by the index of its spot; none where there is one
+    # explanation only, for a known mass tells by what it adds alone
     with_mass: Mapping[int, Readings]
 
 
@@ -55,17 +45,7 @@ def station_readings(
     law: BareLaw,
     rng: np.random.Generator,
 ) -> StationReadings:
-    """What each explanation expects of everything that could be read in a station.
-
-    Parameters
-    ----------
-    known : KnownBoard
-        The board.
-    law : BareLaw
-        Of the station.
-    rng : numpy.random.Generator
-        Deals the levels of a new session's noise to the terms.
-    """
+    """What each explanation expects of everything that could be read in a station of a board."""
     station, board = law.station, known.board
     n, n_old = len(station.setup.readings), station.n_old
     parts = [_expected(one, known, law) for one in beliefs.explanations]
@@ -106,18 +86,10 @@ def station_readings(
 def given_first(
     station: Station, old: Sequence[int], readings: Readings, kept: Sequence[Floats], shares: Sequence[Floats]
 ) -> Readings:
-    """Readings at hand taken once more, given the first reading, with which they share a part of what it is off by.
+    """Readings at hand, rows `old`, taken once more given the first, with which they share part of what it is off by.
 
-    Parameters
-    ----------
-    old : sequence of int
-        Which of its readings.
-    readings : Readings
-        As if they shared nothing.
-    kept : sequence of (n_terms,) array
-        Variance of the noise of the first readings, by explanation.
-    shares : sequence of (n_terms,) array
-        The part of it that is found again.
+    `readings` are as if they shared nothing; `kept` is the variance of the first readings' noise and `shares` the part
+    of it that is found again, (n_terms,) arrays by explanation.
     """
     rows = list(old)
     first, own = np.log(station.base.measured)[rows], ReadingErrors.of(station.base).own_variance[rows]
@@ -136,12 +108,8 @@ def given_first(
 def _expected(one: Explanation, known: KnownBoard, law: BareLaw) -> tuple[Floats, Floats]:
     """What is expected of the modes where u is zero, then of what a known mass adds; and the slopes of both.
 
-    Not a number where an explanation takes a reading for no mode, or a mode cannot be followed.
-
-    Returns
-    -------
-    shift : (n_terms, (1 + n_spots) n_modes) array
-    slopes : (n_terms, (1 + n_spots) n_modes, n_u) array
+    Arrays of (n_terms, (1 + n_spots) n_modes) and (.., n_u). Not a number where an explanation takes a reading for no
+    mode, or a mode cannot be followed.
     """
     station, n = law.station, len(law.middle)
     shift = np.tile(np.concatenate([law.middle, law.solved[1:].ravel()]), (one.n_terms, 1))

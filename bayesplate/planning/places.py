@@ -26,37 +26,21 @@ _MARGIN = 0.03
 
 @dataclass(frozen=True)
 class Placing:
-    """Where to put sensor and hammer on what vibrates, as fractions of its sides.
-
-    Attributes
-    ----------
-    sensor, hammer : (float, float)
-    seen : tuple of float
-        Residue of each mode between the two, over the largest that its figure could give: 0 on a nodal line.
-    taps : tuple of (float, float)
-        Where to tap to tell the figures apart, as many as there are modes: the first pivots of a QR decomposition.
-    """
+    """Where to put sensor and hammer on what vibrates, as fractions of its sides."""
 
     sensor: Place
     hammer: Place
+    # residue of each mode between the two, over the largest that its figure could give: 0 on a nodal line
     seen: tuple[float, ...]
+    # where to tap to tell the figures apart, as many as there are modes: the first pivots of a QR decomposition
     taps: tuple[Place, ...]
 
 
 def placing(shapes: Floats, grid: Floats, sensor: Place | None = None) -> Placing:
-    """Sensor and hammer for some modes.
+    """Sensor and hammer for modes with these deflections, (n_modes, n, n), on a grid of fractions of a side, x first.
 
-    The sensor stands where the smallest residue at the driving point is largest, the hammer where the smallest residue
-    between the two is, of the modes that the sensor can see.
-
-    Parameters
-    ----------
-    shapes : (n_modes, n, n) array
-        Deflections on the grid, x first.
-    grid : (n,) array
-        Fractions of a side.
-    sensor : (float, float), optional
-        Where it stands already.
+    The sensor stands where it does, or where the smallest residue at the driving point is largest, the hammer where the
+    smallest residue between the two is, of the modes that the sensor can see.
     """
     from scipy.linalg import qr
 

@@ -22,17 +22,11 @@ _TOO_FAR = 0.4
 
 
 def add_effects(one: Explanation, known: KnownBoard, law: BareLaw, shift: Floats, slopes: Floats) -> None:
-    """Add what the effects of an explanation do to what is expected of the modes of a station.
+    """Add what the effects of an explanation do to what is expected of the modes of a station, in place.
 
-    Parameters
-    ----------
-    law : BareLaw
-        Of the station.
-    shift : (n_terms, (1 + n_spots) n_modes) array
-        Where u is zero, the modes, then what a known mass at each spot adds to each; changed in place, to not a number
-        where a mode cannot be followed in the middle of a size, or to neither side of it.
-    slopes : (n_terms, (1 + n_spots) n_modes, n_u) array
-        Changed in place.
+    To the shift where u is zero, (n_terms, (1 + n_spots) n_modes), of the modes, then of what a known mass at each spot
+    adds to each, and to the slopes, (.., n_u). Not a number where a mode cannot be followed in the middle of a size, or
+    to neither side of it.
     """
     n = len(law.middle)
     for form in one.forms:

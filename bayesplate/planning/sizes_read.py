@@ -41,22 +41,12 @@ _PROTRACTOR = 0.5 * np.pi / 180.0
 
 @dataclass(frozen=True)
 class Measured:
-    """One way to know an input better.
-
-    Attributes
-    ----------
-    sentence : str
-        What to do.
-    n : int
-        Readings that it takes.
-    sd : float
-        Standard deviation of the input after it, in its unit.
-    """
+    """One way to know an input better."""
 
     parameter: Parameter
-    sentence: str
-    n: int
-    sd: float
+    sentence: str  # what to do
+    n: int  # readings that it takes
+    sd: float  # of the input after it, in its unit
 
     @property
     def precision(self) -> float:
@@ -129,22 +119,12 @@ def input_readings(beliefs: Beliefs, known: KnownBoard, one: Measured) -> Readin
 
 @dataclass(frozen=True)
 class Look:
-    """How an effect is looked at.
-
-    Attributes
-    ----------
-    n : int
-        Readings that it takes.
-    sd : callable
-        From the board to the standard deviation of each of the effect's parameters, SI.
-    can : callable
-        Whether there is anything to look at on a board.
-    """
+    """How an effect is looked at."""
 
     sentence: str
-    n: int
-    sd: Callable[[Board], float]
-    can: Callable[[Board], bool]
+    n: int  # readings that it takes
+    sd: Callable[[Board], float]  # from the board to the standard deviation of each of the effect's parameters, SI
+    can: Callable[[Board], bool]  # whether there is anything to look at on a board
 
 
 def _has_unweighed(board: Board) -> bool:

@@ -48,17 +48,7 @@ def beliefs_together(
     shared: Sequence[Shared],
     tell: Callable[[float], None] | None = None,
 ) -> Beliefs:
-    """What is believed of all boards of a campaign, each solved once.
-
-    Parameters
-    ----------
-    boards : sequence of Board
-        The shared effects declared.
-    priors : sequence of PriorCard
-        One per board.
-    tell : callable, optional
-        Told after every board which share of them is done.
-    """
+    """What is believed of all boards of a campaign, shared effects declared, each solved once."""
     every: list[_Linear] = []
     for board, prior in zip(boards, priors, strict=True):
         every.append(_linear(board, prior, shared))
@@ -188,20 +178,12 @@ def _columns(board: Board, prior: PriorCard, shared: Sequence[Shared], values: V
 
 @dataclass(frozen=True, eq=False)
 class FurtherBoard:
-    """One more board that could be measured.
-
-    Attributes
-    ----------
-    labels : tuple of str
-        Of the modes to read.
-    readings : Readings
-        What it says of the shared parameters.
-    """
+    """One more board that could be measured."""
 
     like: Board
     sentence: str
-    labels: tuple[str, ...]
-    readings: Readings
+    labels: tuple[str, ...]  # of the modes to read
+    readings: Readings  # what it says of the shared parameters
 
 
 def further_boards(beliefs: Beliefs, priors: Sequence[PriorCard], shared: Sequence[Shared]) -> Iterator[FurtherBoard]:

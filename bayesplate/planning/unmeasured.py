@@ -30,16 +30,9 @@ _N_PLATES = 12
 
 
 def prior_beliefs(board: Board, prior: PriorCard, rng: np.random.Generator, notes: tuple[str, ...] = ()) -> Beliefs:
-    """What the prior believes of a board.
+    """What the prior believes of a board; the notes say why its readings, if there are any, were left aside.
 
     Its frequencies are not linear over a prior that wide, so that the slopes are taken at plates drawn from it.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Deals the levels of the noise, and draws plates.
-    notes : tuple of str
-        Why its readings, if there are any, were left aside.
     """
     values, one = prior_medians(board, prior), prior_explanation(board, prior, rng)
     laws = laws_of(board, values, prior, _plates(prior, values, rng))

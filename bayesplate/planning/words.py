@@ -19,22 +19,7 @@ _CLEAR = 2.0
 def first_line(
     proposals: Sequence[ProposalEntry], explanations: Sequence[ExplanationEntry], entropy: float, goal: str | None
 ) -> str:
-    """What to do next and what it is expected to give: the best proposal that would help with what was asked for.
-
-    Parameters
-    ----------
-    proposals : sequence of ProposalEntry
-        The best first.
-    entropy : float
-        Of them, nats.
-    goal : str or None
-        See `bayesplate.planning.gains.expected_gain`.
-
-    Returns
-    -------
-    str
-        Empty where none would help.
-    """
+    """What to do next and what it is expected to give: the best proposal that helps with the goal; empty if none."""
     for one in proposals:
         shrunk, doubt = _shrunk(one.gain, goal), _of_doubt(one.gain, explanations, entropy)
         intervals = _of_intervals(shrunk)

@@ -27,19 +27,9 @@ DRAWN = ("chain", "draw")
 
 
 def tree_of(groups: Mapping[str, Variables], labels: Mapping[str, Sequence[str]], attributes: Mapping[str, str]) -> Any:
-    """A tree of groups.
+    """A tree of groups (`GROUPS`) of variables, and labels of each dimension besides chain and draw: xarray.DataTree.
 
-    Parameters
-    ----------
-    groups : dict of dict of (dimensions, array)
-        Variables by group (`GROUPS`) and name.
-    labels : dict of sequence of str
-        Of each dimension besides chain and draw.
-
-    Returns
-    -------
-    xarray.DataTree
-        What ArviZ 1.x works with; nothing is in it that was not given, so that the same draws give the same file.
+    Nothing is in it that was not given, so that the same draws give the same file.
     """
     xarray: Any = import_module("xarray")
     datasets = {"/": xarray.Dataset(attrs=dict(sorted(attributes.items())))}
@@ -60,13 +50,7 @@ def to_arviz(tree: Any) -> Any:
 
 
 def write_tree(path: Path, tree: Any) -> None:
-    """Write a tree as netCDF, completely or not at all.
-
-    Raises
-    ------
-    UnwritableError
-        If the disk is full or the place is not ours.
-    """
+    """Write a tree as netCDF, completely or not at all."""
     # Not by HDF5 itself, which ends the process at its end where a disk was full.
     write_bytes(Path(path), bytes(tree.to_netcdf(None, engine="h5netcdf")))
 
@@ -86,18 +70,9 @@ def attributes_of(inference: Inference, summary: Summary, card_text: str) -> dic
 
 
 def posterior_tree(inference: Inference, draws: Draws, attributes: Mapping[str, str]) -> Any:
-    """The draws of a fit under the names of the archive.
+    """The draws of a fit under the names of the archive: xarray.DataTree.
 
-    Parameters
-    ----------
-    attributes : dict of str
-        What is said of their origin.
-
-    Returns
-    -------
-    xarray.DataTree
-        Its group log_prior holds one variable per factor of the prior: constants, noise, and inputs if any is
-        uncertain.
+    Its group log_prior holds one variable per factor of the prior: constants, noise, and inputs if any is uncertain.
     """
     problem, convergence = inference.problem, inference.convergence
     board = problem.board

@@ -140,13 +140,7 @@ class Comparison:
 
 
 def theory_row(problem: PosedProblem, system: PaperSystem, methods: Sequence[Method], errors: Errors) -> TheoryRow:
-    """What one theory of the plate makes of a board.
-
-    Parameters
-    ----------
-    errors : Errors
-        Of the most likely constants under the exact law, in sample and refitted with each mode left out.
-    """
+    """What one theory of the plate makes of a board; errors are of the most likely constants under the exact law."""
     board = problem.board
     rows = [(setup.name, str(r.label), r.frequency.mean) for setup in board.setups for r in setup.readings]
     in_sample, left_out = cents(errors.in_sample), cents(errors.left_out)

@@ -17,13 +17,7 @@ _RULES = 3
 
 
 def laid_out(title: str, columns: Texts, rows: Sequence[Texts], width: int) -> Any:
-    """A table as rich prints it: as a grid where that fits, otherwise each row as a small list of its own.
-
-    Parameters
-    ----------
-    width : int
-        Of the terminal, characters.
-    """
+    """A table as rich prints it: as a grid where that fits, otherwise each row as a small list of its own."""
     widths = column_widths(columns, rows, width)
     return _stacked(title, columns, rows) if widths is None else _grid(title, columns, rows, widths)
 

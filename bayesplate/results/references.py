@@ -50,18 +50,7 @@ class Section:
 
 
 def references(card: Board, prior: PriorCard, board: Board) -> tuple[Section, ...]:
-    """What to cite for a fit of a card.
-
-    Parameters
-    ----------
-    board : Board
-        With the effects that the fit declares.
-
-    Returns
-    -------
-    tuple of Section
-        Model, computation, data, prior; nothing that the fit does not use.
-    """
+    """What to cite for a fit of a card, whose effects the board declares: nothing that the fit does not use."""
     systems = [system_of(board, setup) for setup in board.setups]
     theory = (THIN,) if any(system.theory == "thin" for system in systems) else ()
     effects = tuple(dict.fromkeys(entry for system in systems for one in system.effects for entry in one.references))

@@ -22,26 +22,15 @@ class EnergyShares:
 
 @dataclass(frozen=True)
 class SheetRow:
-    """One mode.
+    """One mode."""
 
-    Attributes
-    ----------
-    label : str
-        Or "cannot tell".
-    miss_cents : float or None
-        Computed over measured.
-    likely_hz : tuple of float or None
-        Where it is expected two times in three, if it was not measured.
-    a, b, c : float
-        The paper's coefficients.
-    """
-
-    label: str
+    label: str  # or "cannot tell"
     hz: float
     measured_hz: float | None
-    miss_cents: float | None
-    likely_hz: tuple[float, float] | None
+    miss_cents: float | None  # computed over measured
+    likely_hz: tuple[float, float] | None  # where it is expected two times in three, if it was not measured
     share_percent: EnergyShares
+    # a, b, c: the paper's coefficients
     a: float
     b: float
     c: float
@@ -69,19 +58,12 @@ class SheetReport:
 
 @dataclass(frozen=True)
 class ProposedLabel:
-    """What a peak without a label may be.
-
-    Attributes
-    ----------
-    label : str or None
-        In the most probable way to label all peaks; None where it is no mode of the plate.
-    probability : dict of float
-        Of each label, "none" for no mode, over all ways that were looked at; the highest first.
-    """
+    """What a peak without a label may be."""
 
     setup: str
     measured_hz: float
-    label: str | None
+    label: str | None  # in the most probable way to label all peaks; None where it is no mode of the plate
+    # of each label, "none" for no mode, over all ways that were looked at; the highest first
     probability: Mapping[str, float]
 
 

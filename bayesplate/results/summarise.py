@@ -73,13 +73,7 @@ def summarise(
     versions: Mapping[str, str],
     card_sha256: str,
 ) -> Summary:
-    """The summary of a converged fit.
-
-    Parameters
-    ----------
-    assessment : Assessment
-        Of these draws.
-    """
+    """The summary of a converged fit."""
     problem = inference.problem
     board = problem.board
     system = paper_system(board, problem.estimate, compared=False)

@@ -31,55 +31,34 @@ class Uncertain(Protocol):
     """A number with its standard deviation."""
 
     @property
-    def mean(self) -> float:
-        """The number."""
+    def mean(self) -> float: ...
 
     @property
-    def sd(self) -> float:
-        """Its standard deviation."""
+    def sd(self) -> float: ...
 
 
 class Interval(Uncertain, Protocol):
     """The same with the ends of its 90 % interval."""
 
     @property
-    def q05(self) -> float:
-        """The lower end."""
+    def q05(self) -> float: ...
 
     @property
-    def q95(self) -> float:
-        """The upper end."""
+    def q95(self) -> float: ...
 
 
 @dataclass(frozen=True)
 class Value:
-    """A number at full precision that prints with the digits that have meaning for people.
+    """A number at full precision that prints with the digits that have meaning for people."""
 
-    Attributes
-    ----------
-    mean : float or None
-        None where there is no number.
-    sd : float or None
-        Its standard deviation, which decides on the digits; None where it is printed with fixed decimals.
-    ends : (float, float) or None
-        Of an interval, in place of a mean.
-    digits : int
-        Fixed decimals.
-    signed : bool
-        Whether a positive number has its sign.
-    unit : str
-        Printed after it.
-    times : float
-        What it is multiplied by in print: 100 for a share in per cent.
-    """
-
-    mean: float | None = None
+    mean: float | None = None  # None where there is no number
+    # its standard deviation, which decides on the digits; None where it is printed with fixed decimals
     sd: float | None = None
-    ends: tuple[float, float] | None = None
-    digits: int = 0
-    signed: bool = False
-    unit: str = ""
-    times: float = 1.0
+    ends: tuple[float, float] | None = None  # of an interval, in place of a mean
+    digits: int = 0  # fixed decimals
+    signed: bool = False  # whether a positive number has its sign
+    unit: str = ""  # printed after it
+    times: float = 1.0  # what it is multiplied by in print: 100 for a share in per cent
 
     def __str__(self) -> str:
         if self.ends is not None:
