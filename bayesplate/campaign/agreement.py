@@ -21,18 +21,18 @@ REFUSED = 0.05
 class LeftOut:
     """A board when the others teach it the shared parameters."""
 
-    name: str
     log_score: float  # ln of the probability of its readings, the shared parameters learned from the others
     p_value: float  # how often a board that shares the others' parameters would want to leave them at least as much
+    refuses: bool  # whether it does not want what they teach, as many boards as were asked being allowed for
 
 
-def left_out(together: Together) -> tuple[LeftOut, ...]:
+def left_out(together: Together) -> dict[str, LeftOut]:
     """Every board left out in turn."""
-    everything = together.log_evidence()
-    return tuple(
-        LeftOut(name, everything - together.log_evidence((i,)), p_value(together, i))
+    everything, refused = together.log_evidence(), refusing(together)
+    return {
+        name: LeftOut(everything - together.log_evidence((i,)), p_value(together, i), name in refused)
         for i, name in enumerate(together.names)
-    )
+    }
 
 
 def refusing(together: Together) -> tuple[str, ...]:

@@ -6,23 +6,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesplate.campaign.agreement import left_out, refusing
+from bayesplate.campaign.agreement import left_out
 from bayesplate.campaign.boards import Member
 from bayesplate.campaign.learning import Learnt
 from bayesplate.campaign.together import values_of
+from bayesplate.diagnosis.claim import STANDARD_ERRORS, score_gain
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.results.contract import Spread
 
-Floats = NDArray[np.float64]
-
-STANDARD_ERRORS = 2.0
-"""By how many of them the boards' scores have to rise in sum."""
 LEAST_GAIN = float(np.log(20.0))
-"""By how much they have to rise in any case: a few boards that gain nearly nothing scatter as little."""
+"""By how much the boards' scores have to rise in any case: a few that gain nearly nothing scatter as little."""
 _N_DRAWS = 4000
 _LINE = 18
 
@@ -55,30 +51,28 @@ class SharedClaim:
 
 def judge(boards: Mapping[str, TaughtBoard]) -> SharedClaim:
     """Judge a shared effect by the boards that were left out."""
-    gains = np.array([one.log_score_gain for one in boards.values()])
-    total, error = float(gains.sum()), float(np.sqrt(gains.size) * gains.std(ddof=1))
+    gains = [one.log_score_gain for one in boards.values()]
+    total, error = score_gain(gains)
     refused = tuple(name for name, one in boards.items() if one.refuses)
-    better = int((gains > 0.0).sum())
-    holds = total > max(STANDARD_ERRORS * error, LEAST_GAIN) and 2 * better > gains.size and not refused
+    better = sum(gain > 0.0 for gain in gains)
+    holds = total > max(STANDARD_ERRORS * error, LEAST_GAIN) and 2 * better > len(gains) and not refused
     return SharedClaim(total, error, refused, better, holds)
 
 
 def taught_boards(learnt: Learnt, before: Mapping[str, Member], seed: int) -> dict[str, TaughtBoard]:
     """Every board left out in turn; `before` are the boards fitted without the effect, nothing shared."""
-    refused = refusing(learnt.together)
-    together = learnt.together
-    found = {}
-    for i, one in enumerate(left_out(together)):
+    together, found = learnt.together, {}
+    for i, (name, one) in enumerate(left_out(together).items()):
         rng = np.random.default_rng([seed, _LINE, i])
-        without = before[one.name]
+        without = before[name]
         _, draws = learnt.board_left_out(i, rng, seed)
         taught = values_of(together.shared, together.taught_draws(rng, _N_DRAWS, (i,)))
-        found[one.name] = TaughtBoard(
+        found[name] = TaughtBoard(
             log_score_gain=one.log_score - without.alone.log_evidence,
             before_rms_cents=rms_cents(without.inference, without.draws),
             after_rms_cents=rms_cents(learnt.members[i].inference, draws),
             p_value=one.p_value,
-            refuses=one.name in refused,
+            refuses=one.refuses,
             others={number.name: Spread.of(taught[number.name], number.unit) for number in together.shared},
         )
     return found

@@ -10,13 +10,11 @@ import numpy as np
 from bayesplate.campaign.claim import SharedClaim, TaughtBoard
 from bayesplate.campaign.common import CommonResidual, clear_of_zero
 from bayesplate.campaign.search import Explanation
+from bayesplate.diagnosis.claim import IMPROBABLE
+from bayesplate.diagnosis.verdict import CLEARLY
 from bayesplate.effects.words import effect_name, effect_names, joined
 
 FORMAT = 1
-CLEARLY = 3.0
-"""How many times more probable a shared effect must be than the next explanation to be named."""
-IMPROBABLE = 0.05
-"""What the probability of no effect has to stay below."""
 _MOST_LISTED = 12
 
 
@@ -108,7 +106,8 @@ def named(found: Sequence[Explanation]) -> tuple[str, tuple[str, ...], str]:
     if len(near) == 1:
         rest = found[1]
         times = best.probability / max(rest.probability, 1e-300)
-        return "named", shared, f"{words_of(best)} is {_times(times)} times as probable as {words_of(rest)}"
+        shown = f"{times:.0f}" if times < 1000.0 else "more than 1000"
+        return "named", shared, f"{words_of(best)} is {shown} times as probable as {words_of(rest)}"
     told = joined([words_of(one) for one in near], "or")
     return "indistinguishable group", shared, f"{told} may be as probable"
 
@@ -125,10 +124,6 @@ def words_of(one: Explanation) -> str:
         "own": f"{effect} of another size on each board",
         "one board": f"{effect} on board {one.board} alone",
     }[one.way]
-
-
-def _times(ratio: float) -> str:
-    return f"{ratio:.0f}" if ratio < 1000.0 else "more than 1000"
 
 
 def claim_sentence(diagnosis: CampaignDiagnosis) -> str:

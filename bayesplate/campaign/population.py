@@ -17,7 +17,7 @@ A. Gelman, Prior distributions for variance parameters in hierarchical models, B
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -119,7 +119,8 @@ def find_population(
     common = np.zeros((0, 0)) if common is None else common
     away = np.array([one.slopes @ np.linalg.cholesky(common) for one in boards])
     n_shared = len(common)
-    middle, width = _believed(prior)
+    middle = np.array([np.log(prior.constants[name].median) for name in MODULI])
+    width = np.array([prior.constants[name].log_sd for name in MODULI])
     seen = np.array([one.mean for one in boards])
     covariances = np.array([one.covariance for one in boards])
     own = np.diagonal(covariances, axis1=1, axis2=2).mean(axis=0)
@@ -170,12 +171,6 @@ def prior_of(population: Population, name: str, source: str, rng: np.random.Gene
         for key, values in zip(MODULI, predicted.T, strict=True)
     }
     return PriorCard.from_quantities(name, constants, source=source, title=title)
-
-
-def _believed(prior: PriorCard) -> tuple[Floats, Floats]:
-    constants: Mapping[str, Quantity] = prior.constants
-    middle = np.array([np.log(constants[name].median) for name in MODULI])
-    return middle, np.array([constants[name].log_sd for name in MODULI])
 
 
 def _diagonal(values: Floats) -> Floats:

@@ -26,7 +26,7 @@ from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.hypotheses import Hypothesis, hypotheses
 from bayesplate.diagnosis.peaks import with_own_labels
 from bayesplate.diagnosis.search import LEAST_TRACE, Ground, prepare_search
-from bayesplate.diagnosis.terms import log_sum
+from bayesplate.diagnosis.terms import log_sum, normalised
 
 Floats = NDArray[np.float64]
 Way = Literal["none", "shared", "own", "one board", "shared and own"]
@@ -157,9 +157,7 @@ def explanations(boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...
             ("one board", effect, one.name, float(none.sum() - none[i] + alone[i]), each)
             for i, one in enumerate(boards)
         ]
-    joint = np.array([log_evidence + np.log(prior) for *_, log_evidence, prior in found])
-    probability = np.exp(joint - joint.max())
-    probability /= probability.sum()
+    probability = normalised(np.array([log_evidence + np.log(prior) for *_, log_evidence, prior in found]))
     order = np.argsort(-probability, kind="stable")
     return tuple(Explanation(*found[int(i)][:4], float(probability[int(i)])) for i in order)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.board.material import MODULI
-from bayesplate.campaign.agreement import left_out, refusing
+from bayesplate.campaign.agreement import LeftOut, refusing
 from bayesplate.campaign.boards import Member
 from bayesplate.campaign.common import CommonResidual
 from bayesplate.campaign.learning import ASTRAY, Learnt
@@ -37,15 +37,6 @@ class SharedNumber:
 
 
 @dataclass(frozen=True)
-class LeftOutBoard:
-    """A board when the others teach it what is shared."""
-
-    log_score: float  # ln of the probability of its readings then
-    p_value: float  # of the board against the others: small where it does not want what they teach
-    refuses: bool  # whether it does not, as many boards as were asked being allowed for
-
-
-@dataclass(frozen=True)
 class PopulationSummary:
     """The distribution of the boards' constants."""
 
@@ -56,8 +47,27 @@ class PopulationSummary:
     boards: Mapping[str, Elastic[Spread]]  # Pa, each board's constants under the population
 
 
+@dataclass(frozen=True)
+class CampaignRun:
+    """What was run, and whether all of it converged."""
+
+    format: int
+    name: str
+    seed: int
+    versions: Mapping[str, str]
+    card_sha256: str
+    converged: bool
+
+
+@dataclass(frozen=True)
+class UnconvergedCampaign(CampaignRun):
+    """The summary of a campaign of which something failed the convergence gate: no constants."""
+
+    warnings: tuple[str, ...]
+
+
 @dataclass(frozen=True, repr=False)
-class CampaignSummary:
+class CampaignSummary(CampaignRun):
     """The summary of a converged fit of a campaign.
 
     Attributes
@@ -71,7 +81,7 @@ class CampaignSummary:
     converged : bool
     shared : dict of SharedNumber
         By name: "attached_mass.mass", "transverse_shear.G_xz / E_x".
-    left_out_boards : dict of LeftOutBoard
+    left_out_boards : dict of LeftOut
         Empty where nothing is shared.
     common_residual : dict of CommonResidual
         By label.
@@ -83,14 +93,8 @@ class CampaignSummary:
     warnings : tuple of str
     """
 
-    format: int
-    name: str
-    seed: int
-    versions: Mapping[str, str]
-    card_sha256: str
-    converged: bool
     shared: Mapping[str, SharedNumber]
-    left_out_boards: Mapping[str, LeftOutBoard]
+    left_out_boards: Mapping[str, LeftOut]
     common_residual: Mapping[str, CommonResidual]
     population: PopulationSummary | None
     boards: Mapping[str, Summary]
@@ -100,19 +104,6 @@ class CampaignSummary:
     def __repr__(self) -> str:
         shared = ", ".join(self.shared) or "nothing shared"
         return f"<CampaignSummary of {self.name}: {len(self.boards)} boards; {shared}>"
-
-
-@dataclass(frozen=True)
-class UnconvergedCampaign:
-    """The summary of a campaign of which something failed the convergence gate: no constants."""
-
-    format: int
-    name: str
-    seed: int
-    versions: Mapping[str, str]
-    card_sha256: str
-    converged: bool
-    warnings: tuple[str, ...]
 
 
 def shared_numbers(learnt: Learnt, seed: int) -> dict[str, SharedNumber]:
@@ -141,14 +132,6 @@ def _own(member: Member, rng: np.random.Generator) -> Mapping[str, np.ndarray]:
     """The shared numbers at draws of a board's own posterior, the campaign's prior in place of the board's."""
     picked = rng.choice(len(member.alone.z), size=_N_DRAWS, p=member.alone.weights)
     return values_of(member.shared, member.alone.z[picked])
-
-
-def left_out_boards(learnt: Learnt) -> dict[str, LeftOutBoard]:
-    """Every board against the others."""
-    refused = refusing(learnt.together)
-    return {
-        one.name: LeftOutBoard(one.log_score, one.p_value, one.name in refused) for one in left_out(learnt.together)
-    }
 
 
 def population_summary(population: Population, prior: str, seed: int) -> PopulationSummary:

@@ -91,7 +91,7 @@ def test_what_is_told_of_boards_that_are_left_out(fitted_campaign):
     members = {name: Member(one.inference, one.draws, ()) for name, one in alone.items()}
     taught = taught_boards(learnt, members, 1)
 
-    for i, (told, score) in enumerate(zip(taught.values(), left_out(learnt.together), strict=True)):
+    for i, (told, score) in enumerate(zip(taught.values(), left_out(learnt.together).values(), strict=True)):
         name = learnt.members[i].name
         assert told.log_score_gain == pytest.approx(score.log_score - members[name].alone.log_evidence)
         assert told.before_rms_cents == pytest.approx(rms_cents(alone[name].inference, alone[name].draws))
