@@ -44,9 +44,8 @@ if TYPE_CHECKING:
     from bayesplate.board.quantity import Quantity
     from bayesplate.board.reading import Peak, Reading
     from bayesplate.board.setup import Setup
-    from bayesplate.campaign.checking import CampaignCheck
     from bayesplate.campaign.diagnosis import CampaignDiagnosis
-    from bayesplate.campaign.summary import CampaignSummary
+    from bayesplate.campaign.summary import CampaignCheck, CampaignSummary
     from bayesplate.commands.batch import BatchResult, batch
     from bayesplate.commands.campaign import Campaign
     from bayesplate.commands.campaign_diagnose import CampaignDiagnoseResult
@@ -144,7 +143,7 @@ _HOMES = {
     "BayesplateError": "bayesplate.errors",
     "Board": "bayesplate.board.board",
     "Campaign": "bayesplate.commands.campaign",
-    "CampaignCheck": "bayesplate.campaign.checking",
+    "CampaignCheck": "bayesplate.campaign.summary",
     "CampaignDiagnoseResult": "bayesplate.commands.campaign_diagnose",
     "CampaignDiagnosis": "bayesplate.campaign.diagnosis",
     "CampaignFitResult": "bayesplate.commands.campaign_fit",

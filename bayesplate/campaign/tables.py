@@ -6,11 +6,10 @@ from collections.abc import Mapping
 
 from bayesplate.board.parameter import unit_of_people
 from bayesplate.campaign.agreement import LeftOut
-from bayesplate.campaign.checking import CampaignCheck
 from bayesplate.campaign.claim import TaughtBoard
 from bayesplate.campaign.common import CommonResidual
 from bayesplate.campaign.diagnosis import CampaignDiagnosis, words_of
-from bayesplate.campaign.summary import CampaignSummary, PopulationSummary, SharedNumber
+from bayesplate.campaign.summary import CampaignCheck, CampaignSummary, PopulationSummary, SharedNumber
 from bayesplate.results.tables import Row, Table, by_constant
 from bayesplate.results.words import GPA, interval, number, percent, plus_minus
 

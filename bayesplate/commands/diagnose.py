@@ -38,7 +38,7 @@ from bayesplate.diagnosis.verdict import Verdict, answer_words, decide
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
 from bayesplate.estimates.leave_one_out import carrying_modes, indices_of, united
 from bayesplate.files import write_text
-from bayesplate.planning.drawn_up import first_of
+from bayesplate.planning.bench import first_of
 from bayesplate.planning.explained import believed, survivors
 from bayesplate.planning.proposals import BELIEFS, Planner
 from bayesplate.report.plots import DiagnosePlots

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bayesplate.campaign.checking import CampaignCheck
 from bayesplate.campaign.diagnosis import CampaignDiagnosis, claim_sentence
-from bayesplate.campaign.summary import CampaignSummary
+from bayesplate.campaign.summary import CampaignCheck, CampaignSummary
 from bayesplate.campaign.tables import campaign_check_tables, campaign_tables, diagnosis_tables
 from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.diagnosis.tables import every_table

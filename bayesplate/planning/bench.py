@@ -1,25 +1,28 @@
-"""What to do at the bench: the modes to look for, and where sensor and hammer go."""
+"""A plan, drawn up; and what to do at the bench: the modes to look for, and where sensor and hammer go."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.board.board import Board
+from bayesplate.board.prior import PriorCard
+from bayesplate.campaign.shared import Shared
 from bayesplate.effects import Effect
 from bayesplate.effects.attached_items import fractions_on, places_on
 from bayesplate.estimates.sheet import NUMBERS_OF_MODES, Sheet, points, sheet
 from bayesplate.frequencies.prior_bands import WITHIN
+from bayesplate.frequencies.residues import NODAL_LINE
 from bayesplate.planning.beliefs import Beliefs, KnownBoard
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.laws import BareLaw
-from bayesplate.planning.places import Placing, placing
-from bayesplate.planning.plan import BenchEntry, ModeToFind
-from bayesplate.planning.proposals import Proposal
+from bayesplate.planning.plan import FORMAT, BenchEntry, ExplanationEntry, ModeToFind, Plan
+from bayesplate.planning.proposals import Planner, Proposal
 from bayesplate.planning.stations import SEARCHED, Station
+from bayesplate.planning.tables import first_line
 
 Floats = NDArray[np.float64]
 
@@ -112,3 +115,101 @@ def _sensor(board: Board, station: Station, drawn: Sheet, shaped: Effect | None)
         x, y = shaped.placed(x, y)
     low, high = drawn.drawn_at(x, 0.0)[1], drawn.drawn_at(x, 1.0)[1]
     return x, (y - low) / (high - low)
+
+
+Place = tuple[float, float]
+
+REFERENCES = (
+    "D. J. Ewins: Modal Testing: Theory, Practice and Application. 2nd ed., Research Studies Press (2000). "
+    "[the residue at the driving point, by which places are chosen]",
+    "K. Manohar, B. W. Brunton, J. N. Kutz, S. L. Brunton: Data-driven sparse sensor placement for reconstruction. "
+    "IEEE Control Syst. Mag. 38, 63-86 (2018), doi:10.1109/MCS.2018.2810460. [places by pivoted QR]",
+)
+_APART = 0.25
+"""Least distance between sensor and hammer, as a fraction of a side."""
+_MARGIN = 0.03
+"""Of the sides that is left free at the rim: nobody hits an edge."""
+
+
+@dataclass(frozen=True)
+class Placing:
+    """Where to put sensor and hammer on what vibrates, as fractions of its sides."""
+
+    sensor: Place
+    hammer: Place
+    # residue of each mode between the two, over the largest that its figure could give: 0 on a nodal line
+    seen: tuple[float, ...]
+    # where to tap to tell the figures apart, as many as there are modes: the first pivots of a QR decomposition
+    taps: tuple[Place, ...]
+
+
+def placing(shapes: Floats, grid: Floats, sensor: Place | None = None) -> Placing:
+    """Sensor and hammer for modes with these deflections, (n_modes, n, n), on a grid of fractions of a side, x first.
+
+    The sensor stands where it does, or where the smallest residue at the driving point is largest, the hammer where the
+    smallest residue between the two is, of the modes that the sensor can see.
+    """
+    from scipy.linalg import qr
+
+    inner = (grid >= _MARGIN) & (grid <= 1.0 - _MARGIN)
+    at = grid[inner]
+    kept = shapes[:, inner][:, :, inner]
+    relative = kept / np.abs(shapes).max(axis=(1, 2))[:, None, None]
+    flat = relative.reshape(len(shapes), -1)
+    places = [(float(x), float(y)) for x in at for y in at]
+    if sensor is None:
+        first = int(np.argmax((flat**2).min(axis=0)))
+    else:
+        first = int(np.argmin([np.hypot(x - sensor[0], y - sensor[1]) for x, y in places]))
+    apart = np.array([max(abs(x - places[first][0]), abs(y - places[first][1])) >= _APART for x, y in places])
+    residues = np.abs(flat * flat[:, [first]])
+    can_be_seen = np.abs(flat[:, first]) >= NODAL_LINE
+    weakest = residues[can_be_seen if can_be_seen.any() else slice(None)].min(axis=0)
+    second = int(np.argmax(np.where(apart, weakest, -1.0)))
+    taps = tuple(places[i] for i in qr(flat, mode="economic", pivoting=True)[2][: len(shapes)])
+    seen = tuple(float(one) for one in residues[:, second])
+    return Placing(places[first], places[second], seen, taps)
+
+
+def drawn_up(
+    planner: Planner,
+    name: str,
+    title: str,
+    card_sha256: str,
+    priors: Sequence[PriorCard] = (),
+    shared: Sequence[Shared] = (),
+) -> tuple[Plan, tuple[Bench, ...]]:
+    """The plan as plan.json has it, and the sheets for the bench."""
+    beliefs, listed = planner.beliefs, planner.ranked(priors, shared)
+    together = planner.sequences(listed)
+    drawn = benches(beliefs, together[-1][0] if together else listed[:1])
+    made = Plan(
+        format=FORMAT,
+        name=name,
+        title=title,
+        seed=planner.seed,
+        card_sha256=card_sha256,
+        basis=beliefs.basis,
+        goal=planner.goal,
+        costs=asdict(planner.costs),
+        explanations=_entries(beliefs),
+        entropy=beliefs.entropy,
+        first=first_of(planner, listed),
+        proposals=tuple(one.entry for one in listed),
+        sequences=tuple(entry for _, entry in together),
+        bench=tuple(one.entry for one in drawn),
+        notes=beliefs.notes,
+    )
+    return made, drawn
+
+
+def first_of(planner: Planner, listed: Sequence[Proposal]) -> str:
+    """The first line of a plan: what to do next; empty where nothing would help."""
+    beliefs = planner.beliefs
+    if beliefs.wrong is not None:
+        return beliefs.wrong
+    return first_line([one.entry for one in listed], _entries(beliefs), beliefs.entropy, planner.goal)
+
+
+def _entries(beliefs: Beliefs) -> tuple[ExplanationEntry, ...]:
+    return tuple(ExplanationEntry(one.members, one.words, one.probability) for one in beliefs.explanations)

@@ -29,7 +29,7 @@ from bayesplate.diagnosis.sizes import AT_LIMIT
 from bayesplate.diagnosis.verdict import CLEARLY, WITHIN
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import joined
-from bayesplate.planning import gains, places
+from bayesplate.planning import bench, gains
 from bayesplate.posterior.convergence import Gate
 from bayesplate.results import references as cited
 from computations.markdown import plain, table, words_table
@@ -219,7 +219,7 @@ def references(folder: Path) -> str:
 
 def planning_references(folder: Path) -> str:
     """What the plan rests on."""
-    return "\n".join(f"- {_unquoted(entry)}" for entry in (*gains.REFERENCES, *places.REFERENCES)) + "\n"
+    return "\n".join(f"- {_unquoted(entry)}" for entry in (*gains.REFERENCES, *bench.REFERENCES)) + "\n"
 
 
 def campaign_references(folder: Path) -> str:

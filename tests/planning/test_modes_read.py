@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.planning import shifts as home
+from bayesplate.planning import modes_read as home
 from bayesplate.planning.beliefs import Explanation, FormTerms
 
 N_TERMS = 12
