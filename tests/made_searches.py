@@ -17,11 +17,11 @@ from bayesplate.diagnosis.baseline import Baseline, Spectrum
 from bayesplate.diagnosis.forms import Form
 from bayesplate.diagnosis.hypotheses import Hypothesis, Swap
 from bayesplate.diagnosis.laws import FormLaw
-from bayesplate.diagnosis.noise_grid import NoiseGrid
 from bayesplate.diagnosis.null_control import NullControl
 from bayesplate.diagnosis.search import Candidate, Found, Ground
 from bayesplate.diagnosis.shifts import Table, nothing
 from bayesplate.diagnosis.signatures import signature
+from bayesplate.diagnosis.terms import NoiseGrid
 from bayesplate.diagnosis.verdict import Verdict, decide
 from bayesplate.frequencies.laws import cents
 from bayesplate.labels import Label

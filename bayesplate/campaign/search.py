@@ -76,10 +76,7 @@ class BoardSearch:
         one = self.hypothesis(effects)
         if one is None:
             return {}
-        terms = one.terms
-        seen = one.seen(self.ground.baseline, self.ground.baseline.residual[None, :])
-        n_cells = one.table.n_cells
-        by_cell = log_sum(terms.log_densities(seen)[:, 0].reshape(-1, n_cells)) - one.own.half_log_det + one.log_labels
+        by_cell = one.log_by_cell(self.ground.baseline, self.ground.baseline.residual)
         with np.errstate(divide="ignore"):
             log_prior = np.log(one.table.weights)
         possible = np.flatnonzero(np.isfinite(log_prior))

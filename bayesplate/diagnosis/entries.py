@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.candidates import Amplitude, EffectEntry, ExchangeEntry, Fate
+from bayesplate.diagnosis.result import Amplitude, EffectEntry, ExchangeEntry, Fate
 from bayesplate.diagnosis.search import PASSES, Candidate, Found
 from bayesplate.diagnosis.signatures import look_alikes
 from bayesplate.diagnosis.sizes import likely_form, size_posterior
@@ -96,12 +96,8 @@ def _where(one: Candidate) -> str:
 def _best_fit(found: Found, index: int) -> float:
     """Log density at the best size, noise averaged: what the evidence would be without the width of the prior."""
     hypothesis = found.ground.hypotheses[index]
-    log_density = hypothesis.terms.log_densities(found.seen(index))[:, 0]
-    by_cell = log_density.reshape(hypothesis.noise.weights.size, -1)
-    top = by_cell.max(axis=0)
-    with np.errstate(divide="ignore"):
-        summed = top + np.log(np.exp(by_cell - top).sum(axis=0)) - np.log(hypothesis.table.weights)
-    return float(summed[hypothesis.table.weights > 0].max()) - hypothesis.own.half_log_det + hypothesis.log_labels
+    weights, by_cell = hypothesis.table.weights, hypothesis.log_by_cell(found.ground.baseline, found.residual)
+    return float((by_cell[weights > 0] - np.log(weights[weights > 0])).max())
 
 
 def _amplitude(found: Found, index: int, one: Candidate) -> Amplitude | None:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.diagnosis.claim import Claim
-from bayesplate.diagnosis.constants import draw_constants
 from bayesplate.diagnosis.entries import effect_entry, exchange_entries, p_value_of, ratio_words
 from bayesplate.diagnosis.folds import Nested, log_score
 from bayesplate.diagnosis.hypotheses import RELABELLING, are_stated
@@ -28,7 +27,7 @@ from bayesplate.diagnosis.result import (
     PValues,
 )
 from bayesplate.diagnosis.search import PASSES, Found
-from bayesplate.diagnosis.sensitivity import WIDTHS, varied
+from bayesplate.diagnosis.sensitivity import WIDTHS, draw_constants, varied
 from bayesplate.diagnosis.stated import StatedClaim
 from bayesplate.diagnosis.verdict import Answer, Verdict, alternatives_words, answer_words, answers, p_words
 from bayesplate.effects import EFFECTS

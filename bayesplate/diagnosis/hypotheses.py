@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from bayesplate.board.board import Board
 from bayesplate.diagnosis.baseline import Baseline
-from bayesplate.diagnosis.noise_grid import NoiseGrid, noise_grid, reach_of
 from bayesplate.diagnosis.shifts import JointLaws, Table, nothing, together
-from bayesplate.diagnosis.terms import Terms, log_sum, normalised
+from bayesplate.diagnosis.terms import NoiseGrid, Terms, log_sum, noise_grid, normalised, reach_of
 from bayesplate.effects import EFFECTS
 
 Floats = NDArray[np.float64]
@@ -75,6 +74,12 @@ class Hypothesis:
     def labelled(self, baseline: Baseline, rows: Rows) -> Hypothesis:
         """The same hypothesis, the readings of a baseline taken for other modes of its spectrum."""
         return replace(self, own=baseline.labelled(rows))
+
+    def log_by_cell(self, baseline: Baseline, residual: Floats) -> Floats:
+        """ln of prior times likelihood of each cell of its table, noise averaged: (n_cells,) array."""
+        log_densities = self.terms.log_densities(self.seen(baseline, residual[None, :]))[:, 0]
+        by_cell = log_sum(log_densities.reshape(-1, self.table.n_cells))
+        return np.asarray(by_cell - self.own.half_log_det + self.log_labels)
 
     def cells(self, baseline: Baseline, residual: Floats) -> Floats:
         """Posterior probability of each cell of its table: (n_cells,) array from an (n_modes,) residual."""

@@ -14,7 +14,7 @@ from bayesplate.effects.words import effect_name, effect_names
 from bayesplate.frequencies.laws import cents
 from bayesplate.results.contract import rms
 from bayesplate.results.tables import Row, Table
-from bayesplate.results.words import number
+from bayesplate.results.words import cents_alike, number
 
 _COMPUTED = "Computed at its known size, with nothing fitted but the constants by weighted least squares, "
 AS_IT_STANDS = "as it stands"
@@ -141,8 +141,7 @@ class _Errors:
 
     def shown(self, *models: KnownModel) -> list[str]:
         """The same of some models in as many digits as the smallest of them needs."""
-        values = [self.of(one) for one in models]
-        return [f"{value:.0f}" if min(values) >= 10.0 else f"{value:.1f}" for value in values]
+        return cents_alike(*map(self.of, models))
 
 
 def _clause(one: KnownModel, as_it_stands: KnownModel, errors: _Errors) -> tuple[str, bool]:

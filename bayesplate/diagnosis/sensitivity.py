@@ -11,14 +11,16 @@ of two effects that were not solved together the shifts at a draw's constants ad
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.material import MODULI, moduli
 from bayesplate.board.quantity import Quantity
+from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.draws import TermDraws, draw_terms, joint_sizes_of, sizes_of
 from bayesplate.diagnosis.hypotheses import Hypothesis, probabilities
 from bayesplate.diagnosis.peaks import log_mean, log_of_terms, log_summed
@@ -158,3 +160,57 @@ def _correction(found: Found, index: int, rng: np.random.Generator) -> float:
     # The sum over labels is in the evidence already: what the law adds is the ratio of both sums at the same draws.
     by_terms = log_of_terms(own, own.middle + found.seen(index)[0], drawn)
     return log_mean(log_weights) - log_mean(log_summed(own, drawn.predicted, drawn.noise) - by_terms)
+
+
+Constants = Mapping[str, Floats]
+"""Draws of rigidities (N m) and moduli (Pa) by name."""
+
+
+def draw_constants(
+    found: Found,
+    rng: np.random.Generator,
+    n_draws: int,
+    among: Sequence[int] | None = None,
+    sampled: Mapping[int, Constants] | None = None,
+) -> Constants:
+    """Draws of the constants and inputs by name, (n_draws,) arrays, from the terms of hypotheses, weighted to the exact
+    law.
+
+    Over the hypotheses `among` by their probability, by default over all by that under the exact law; of hypotheses
+    that were `sampled` from those draws.
+    """
+    weighed = (under_exact_law(found) or found) if among is None else found
+    indices = np.arange(len(found.ground.hypotheses)) if among is None else np.asarray(among)
+    shares = weighed.probability[indices] / weighed.probability[indices].sum()
+    parts: list[Constants] = []
+    for index, n in zip(indices.tolist(), rng.multinomial(n_draws, shares).tolist(), strict=True):
+        if n and sampled and index in sampled:
+            picked = rng.integers(next(iter(sampled[index].values())).size, size=n)
+            parts.append({name: np.ravel(values)[picked] for name, values in sampled[index].items()})
+        elif n:
+            parts.append(_drawn(found, index, rng, n))
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _drawn(found: Found, index: int, rng: np.random.Generator, n_draws: int) -> Constants:
+    """The same under one hypothesis, whose effects may replace thickness (m) and nu_xy by their own."""
+    drawn, symmetry = draw_exact(found, index, rng, n_draws), found.ground.baseline.board.symmetry
+    inputs = {name: _input(found.ground.baseline, name, drawn.inputs) for name in ("thickness", "poisson_xy")}
+    for which in range(len(found.ground.members(index))):
+        for _, law, rows, values in sizes_of(found, index, drawn, which):
+            for free in law.form.free:
+                if free.replaces in inputs:
+                    inputs[free.replaces][rows] = values[free.name]
+    D = symmetry.rigidities(np.exp(drawn.log_rigidities).T, inputs["poisson_xy"])
+    constants = moduli(D["D_x"], D["D_y"], D["D_s"], inputs["thickness"], inputs["poisson_xy"])
+    return D | dict(zip(MODULI, constants, strict=True))
+
+
+def _input(baseline: Baseline, name: str, z: Floats) -> Floats:
+    """An input of the board from the standard coordinates of all uncertain ones: (n,) array from (n, n_inputs)."""
+    uncertain = tuple(baseline.board.uncertain_inputs)
+    if name not in uncertain:
+        return np.full(len(z), float(baseline.values[name]))
+    quantity = baseline.board.inputs[name]
+    low, high = (float(quantity.standard(bound)) for bound in (quantity.lower, quantity.upper))
+    return np.array(quantity.value(np.clip(z[:, uncertain.index(name)], low, high)))

@@ -18,9 +18,8 @@ from bayesplate.board.sessions import same_modes
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.claim import STANDARD_ERRORS, score_gain
 from bayesplate.diagnosis.known import KnownFit, acting_at_known_size, fit_with, stated_effects
-from bayesplate.diagnosis.noise_grid import noise_grid, reach_of
 from bayesplate.diagnosis.shifts import nothing
-from bayesplate.diagnosis.terms import Terms
+from bayesplate.diagnosis.terms import Terms, noise_grid, reach_of
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.results.contract import rms

@@ -7,11 +7,18 @@ from dataclasses import replace
 from pathlib import Path
 
 from bayesplate.board.parameter import unit_of_people
-from bayesplate.diagnosis.candidates import Amplitude, CandidateEntry
 from bayesplate.diagnosis.known_words import known_table
-from bayesplate.diagnosis.result import Diagnosis
-from bayesplate.diagnosis.told import known_sentences, verdict_sentences, warnings
-from bayesplate.diagnosis.words import CONDITIONS, MERITS, VERDICTS, names_of, worth_showing
+from bayesplate.diagnosis.result import Amplitude, CandidateEntry, Diagnosis
+from bayesplate.diagnosis.words import (
+    CONDITIONS,
+    MERITS,
+    VERDICTS,
+    known_sentences,
+    names_of,
+    verdict_sentences,
+    warnings,
+    worth_showing,
+)
 from bayesplate.effects.words import effect_name
 from bayesplate.results.fit_tables import write_tables
 from bayesplate.results.folder import BEFORE_AFTER, KNOWN_EFFECTS

@@ -128,6 +128,11 @@ def number(value: float | None, digits: int, *, signed: bool = False, factor: fl
     return Value(None if value is None else value * factor, digits=digits, signed=signed)
 
 
+def cents_alike(*values: float) -> list[str]:
+    """Errors that stand beside each other, cents: whole ones, with a decimal where one is below ten."""
+    return [f"{value:.0f}" if min(values) >= 10.0 else f"{value:.1f}" for value in values]
+
+
 def two_digits(value: float | None, factor: float = 1.0) -> Value:
     """A number of which only the size matters, as an error or a standard deviation in per cent: 0.028, 3.0, 17."""
     return number(value, 0 if value is None else decimals(abs(value * factor)), factor=factor)

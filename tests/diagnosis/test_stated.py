@@ -18,7 +18,7 @@ from bayesplate.commands.problem import Problem
 from bayesplate.diagnosis.baseline import Baseline, Spectrum
 from bayesplate.diagnosis.known import known_fit, stated_effects
 from bayesplate.diagnosis.stated import _states_differently, judge_stated, scores_given, stated_claims
-from bayesplate.diagnosis.told import stated_sentences
+from bayesplate.diagnosis.words import stated_sentence
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.posterior.posing import pose
 
@@ -58,12 +58,12 @@ def test_two_modes_are_too_few_to_judge_by(n_modes, is_judged):
 
 
 def test_a_claim_in_words():
-    (told,) = stated_sentences(STATED)
+    told = stated_sentence(*STATED)
     assert told == (
         "Attached mass, as stated and not chosen by the readings, takes the left-out error from 61.0 to 46.5 cents; "
         "the log score changes by +4.5 ± 2.0 over 6 modes: error reduced."
     )
-    (told,) = stated_sentences([replace(STATED[0], holds=False, predicts="water")])
+    told = stated_sentence(replace(STATED[0], holds=False, predicts="water"))
     assert "takes the error of setup 'water', predicted by the constants of the first setup alone, from 61.0" in told
     assert "That an error is reduced is not claimed: that asks for a fall by 20%" in told
     assert "error reduced." not in told
