@@ -16,14 +16,14 @@ they share one, and have another at a size of its own each: that one is summed o
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.diagnosis.baseline import Baseline
-from bayesplate.diagnosis.hypotheses import Hypothesis, hypotheses
+from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.peaks import with_own_labels
 from bayesplate.diagnosis.search import LEAST_TRACE, Ground, prepare_search
 from bayesplate.diagnosis.terms import log_sum, normalised
@@ -80,7 +80,7 @@ class BoardSearch:
         with np.errstate(divide="ignore"):
             log_prior = np.log(one.table.weights)
         possible = np.flatnonzero(np.isfinite(log_prior))
-        keys = [tuple(float(part) for part in key) for key in self._keys(one)[possible]]
+        keys = [tuple(float(part) for part in key) for key in _keys(one)[possible]]
         return {
             key: (float(log_prior[i]), float(by_cell[i] - log_prior[i])) for key, i in zip(keys, possible, strict=True)
         }
@@ -90,21 +90,21 @@ class BoardSearch:
         one = self.hypothesis((shared, own)) or self.hypothesis((own, shared))
         if one is None:
             return {}
-        first = 1 + self.ground.candidates[one.members[0]].coarse.z.shape[1]
+        first = 1 + one.table.parts[0].z.shape[1]
         kept = slice(None, first) if one.members[0] == shared else slice(first, None)
         by_cell: dict[Cell, list[tuple[float, float]]] = {}
         for key, value in self.cells(one.members).items():
             by_cell.setdefault(key[kept], []).append(value)
         return {key: _summed(np.array(values)) for key, values in by_cell.items()}
 
-    def _keys(self, one: Hypothesis) -> Floats:
-        """What a cell is on any board: form and standard coordinates of each of its effects, (n_cells, n) array."""
-        tables = [self.ground.candidates[name].coarse for name in one.members] if len(one.members) > 1 else [one.table]
-        keys = np.zeros((1, 0))
-        for table in tables:
-            own = np.column_stack([table.form, np.round(table.z, _DIGITS)])
-            keys = np.column_stack([np.repeat(keys, len(own), axis=0), np.tile(own, (len(keys), 1))])
-        return keys
+
+def _keys(one: Hypothesis) -> Floats:
+    """What a cell is on any board: form and standard coordinates of each of its effects, (n_cells, n) array."""
+    keys = np.zeros((1, 0))
+    for table in one.table.parts or (one.table,):
+        own = np.column_stack([table.form, np.round(table.z, _DIGITS)])
+        keys = np.column_stack([np.repeat(keys, len(own), axis=0), np.tile(own, (len(keys), 1))])
+    return keys
 
 
 def search_board(
@@ -112,10 +112,7 @@ def search_board(
 ) -> BoardSearch:
     """Tabulate effects on a board, and every pair of them: what one board would not show several may."""
     ground = prepare_search(baseline, tried=effects, tell=tell)
-    fine = {effect: one.fine for effect, one in ground.candidates.items()}
-    coarse = {effect: one.coarse for effect, one in ground.candidates.items()}
-    every = hypotheses(baseline, fine, coarse, paired=effects)
-    return BoardSearch(name, with_own_labels(replace(ground, hypotheses=every)))
+    return BoardSearch(name, with_own_labels(ground.with_hypotheses(effects)))
 
 
 def shown(boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
@@ -142,7 +139,10 @@ def explanations(boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...
     found: list[tuple[Way, tuple[str, ...], str, float, float]] = [
         ("none", (), "", float(none.sum()), PRIOR["none"]),
         *(("shared", pair, "", shared[pair], of_two / len(pairs)) for pair in pairs),
-        *(("shared and own", each, "", log_evidence_beside(boards, *each), mixed / len(beside)) for each in beside),
+        *(
+            ("shared and own", each, "", _over_common([one.cells_beside(*each) for one in boards]), mixed / len(beside))
+            for each in beside
+        ),
     ]
     for effect in single:
         alone = np.array([one.log_evidence(effect) for one in boards])
@@ -164,11 +164,6 @@ def log_evidence_shared(boards: Sequence[BoardSearch], effects: tuple[str, ...])
     return _over_common([one.cells(effects) for one in boards])
 
 
-def log_evidence_beside(boards: Sequence[BoardSearch], shared: str, own: str) -> float:
-    """ln of the evidence of one size for all boards of an effect, and of a size of its own for each of another."""
-    return _over_common([one.cells_beside(shared, own) for one in boards])
-
-
 def _summed(values: Floats) -> tuple[float, float]:
     """ln of prior probability and likelihood of several cells together, from those of each: (n_cells, 2) array."""
     log_prior = float(log_sum(values[:, 0]))
@@ -176,6 +171,7 @@ def _summed(values: Floats) -> tuple[float, float]:
 
 
 def _over_common(by_board: Sequence[Mapping[Cell, tuple[float, float]]]) -> float:
+    """ln of the evidence of cells that all boards have alike; -inf where there is none."""
     common = set.intersection(*(set(cells) for cells in by_board))
     if not common:
         return -np.inf

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -65,14 +65,15 @@ def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Ne
     if not verdict.index:
         return Claim()
     searches = [found, *(varied(found, width=factor) for factor in WIDTHS.values())]
-    told = {one.index for one in verdict.stands_for}
+    told, p_value = {one.index for one in verdict.stands_for}, found.p_value(verdict.index)
+    others = [sum(each.support for each in answers(one) if each.index not in told) for one in searches]
     return Claim(
         (
             _beyond_chance(folded, control),
             _better_score(found, folded),
             _below("probability of none", [one.none for one in searches]),
-            _below("probability of another", [_another(one, told) for one in searches]),
-            _passes(found.p_value(verdict.index)),
+            _below("probability of another", others),
+            Condition("prior predictive", p_value, PASSES, p_value >= PASSES),
         )
     )
 
@@ -135,14 +136,5 @@ def _better_score(found: Found, folded: Nested | None) -> Condition:
 
 
 def _below(name: ConditionName, probabilities: Sequence[float]) -> Condition:
-    largest = max(probabilities)
+    largest = float(max(probabilities))
     return Condition(name, largest, IMPROBABLE, largest < IMPROBABLE)
-
-
-def _another(found: Found, told: Container[int]) -> float:
-    """Probability of all effects but those of the hypotheses that are told."""
-    return float(sum(one.support for one in answers(found) if one.index not in told))
-
-
-def _passes(p_value: float) -> Condition:
-    return Condition("prior predictive", p_value, PASSES, p_value >= PASSES)

@@ -76,8 +76,7 @@ def known_fits(problem: PosedProblem, tell: Callable[[float], None] | None = Non
 
 
 def known_fit(problem: PosedProblem, combination: Sequence[str] | None = None) -> KnownFit:
-    """The constants fitted to a board with some of its known effects and no others; by default to the board as it
-    stands."""
+    """The constants fitted to a board with some of its known effects and no others; by default as it stands."""
     own = [name for name in known_effects(problem.board) if name in problem.board.effects]
     baseline = fit_with(problem, combination)
     kept, law = baseline.used, baseline.every.predict
@@ -115,7 +114,8 @@ def fit_with(problem: PosedProblem, combination: Sequence[str] | None, n_first: 
         start = fitted
         law = Predictor(lambda x: _values(board, x, inputs), models, "exact", n_constants=board.symmetry.n)
         for _ in range(_MOST_LABELLINGS):
-            fitted = _refitted(board, law, rows, fitted, n_first)
+            kept = np.flatnonzero(rows[:n_first] >= 0)  # readings that are a mode
+            fitted = refit(law.of(rows[kept]), log_measured(board)[kept], reading_scales(board)[kept], fitted)
             before, rows = rows, _likely(problem, law, rows, fitted)
             if np.array_equal(rows, before):
                 break
@@ -140,12 +140,6 @@ def fit_with(problem: PosedProblem, combination: Sequence[str] | None, n_first: 
         rows=rows,
         symmetry=symmetry_of(law.models),
     )
-
-
-def _refitted(board: Board, law: Predictor, rows: Rows, start: Floats, n_first: int | None) -> Floats:
-    """The constants fitted to the readings that are a mode."""
-    kept = np.flatnonzero(rows[:n_first] >= 0)
-    return refit(law.of(rows[kept]), log_measured(board)[kept], reading_scales(board)[kept], start)
 
 
 def _likely(problem: PosedProblem, law: Predictor, rows: Rows, fitted: Floats) -> Rows:

@@ -47,7 +47,7 @@ def with_own_labels(ground: Ground) -> Ground:
     for one in ground.hypotheses:
         if one.members not in found:
             known = [found[members] for members in ((), *((name,) for name in one.members))]
-            found[one.members] = _best(ground, one, [_rows(baseline, each) for each in known])
+            found[one.members] = _best(ground, one, [each.own.rows for each in known])
     return replace(ground, hypotheses=tuple(found[one.members] for one in ground.hypotheses))
 
 
@@ -68,8 +68,7 @@ def log_summed(baseline: Baseline, log_frequency: Floats, noise: Floats) -> Floa
 
 
 def log_of_terms(own: Baseline, seen: Floats, drawn: TermDraws) -> Floats:
-    """ln of the likelihood of the readings (ln f) under the labels of a baseline, by its normal terms: (n_draws,)
-    array."""
+    """ln of the likelihood of readings (ln f) under the labels of a baseline, by its terms: (n_draws,) array."""
     kept = own.is_mode
     variance = drawn.noise[:, own.setup_index[kept]] ** 2 + own.own_variance[kept]
     squares = (seen[kept] - drawn.predicted[:, own.rows[kept]]) ** 2 / variance + np.log(2.0 * np.pi * variance)
@@ -90,11 +89,6 @@ def _annealed(ground: Ground, one: Hypothesis) -> Iterator[Rows]:
             yield _labels_of(ground, drawn.at(best[None]), rows)
         rows = _labels_of(ground, drawn, rows)
         yield rows
-
-
-def _relabelled(ground: Ground, one: Hypothesis, rows: Rows) -> Rows:
-    """The likely labels at draws that rest on other labels."""
-    return _labels_of(ground, _drawn(ground, one.labelled(ground.baseline, rows)), rows)
 
 
 def _labels_of(ground: Ground, drawn: TermDraws, otherwise: Rows) -> Rows:
@@ -127,16 +121,12 @@ def _best(ground: Ground, one: Hypothesis, begun: Iterable[Rows]) -> Hypothesis:
     tried = {tuple(rows): rows for rows in begun}
     for rows in list(tried.values()):
         for _ in range(_ROUNDS):
-            rows = _relabelled(ground, one, rows)
+            rows = _labels_of(ground, _drawn(ground, one.labelled(ground.baseline, rows)), rows)
             if tuple(rows) in tried:
                 break
             tried[tuple(rows)] = rows
     labelled = [one.labelled(ground.baseline, rows) for rows in tried.values()]
     return _summed(ground, labelled)
-
-
-def _rows(baseline: Baseline, one: Hypothesis) -> Rows:
-    return one.own.rows
 
 
 def _summed(ground: Ground, labelled: Sequence[Hypothesis]) -> Hypothesis:
@@ -150,14 +140,15 @@ def _summed(ground: Ground, labelled: Sequence[Hypothesis]) -> Hypothesis:
     evidence = np.array([_log_evidence(ground, one) for one in labelled])
     drawn = [_drawn(ground, one) for one in labelled]
     full = [log_summed(ground.baseline, each.predicted, each.noise) for each in drawn]
+    read = ground.baseline.log_readings
     both = zip(full, labelled, drawn, strict=True)
-    alone = evidence + [log_mean(sums - _log_of(ground, one, each)) for sums, one, each in both]
+    alone = evidence + [log_mean(sums - log_of_terms(one.own, read, each)) for sums, one, each in both]
     kept = np.argsort(-alone)[:_MOST_WAYS]
     kept = kept[alone[kept] > alone[kept[0]] - _WORTH]
     log_share = alone[kept] - logsumexp(alone[kept])
     log_weights = []
     for share, at in zip(log_share, kept, strict=True):
-        densities = [_log_of(ground, labelled[other], drawn[at]) - evidence[other] for other in kept]
+        densities = [log_of_terms(labelled[other].own, read, drawn[at]) - evidence[other] for other in kept]
         log_weights.append(share + full[at] - logsumexp(np.array(densities) + log_share[:, None], axis=0))
     weights = np.concatenate(log_weights)
     log_sum = float(logsumexp(weights)) - np.log(_N_DRAWS)
@@ -174,11 +165,6 @@ def _summed(ground: Ground, labelled: Sequence[Hypothesis]) -> Hypothesis:
 def _log_evidence(ground: Ground, one: Hypothesis) -> float:
     """Under its own labels alone, by its normal terms."""
     return float(one.terms.log_evidence(one.seen(ground.baseline, ground.baseline.residual[None, :]))[0])
-
-
-def _log_of(ground: Ground, one: Hypothesis, drawn: TermDraws) -> Floats:
-    own = one.own
-    return log_of_terms(own, own.middle + one.seen(ground.baseline, ground.baseline.residual[None, :])[0], drawn)
 
 
 def log_mean(values: Floats) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -66,6 +66,13 @@ class Ground:
         """Effects that may be one of two: those whose trace the search could see."""
         return tuple(name for name, one in self.candidates.items() if not one.trace < LEAST_TRACE)
 
+    def with_hypotheses(self, paired: Sequence[str]) -> Ground:
+        """The same candidates and every hypothesis about them, pairs being of these effects."""
+        fine, coarse = (
+            {name: getattr(one, kind) for name, one in self.candidates.items()} for kind in ("fine", "coarse")
+        )
+        return replace(self, hypotheses=hypotheses(self.baseline, fine, coarse, paired))
+
     def members(self, index: int) -> tuple[Candidate, ...]:
         """The effects of a hypothesis; none where it only exchanges labels."""
         return tuple(self.candidates[name] for name in self.hypotheses[index].members if name in self.candidates)
@@ -126,23 +133,16 @@ def prepare_search(
     tried: Sequence[str] | None = None,
     tell: Callable[[float], None] | None = None,
 ) -> Ground:
-    """Tabulate every candidate of a board, its forms solved by `solve`; without effects that leave no plate at any
-    size."""
+    """Tabulate the candidates of a board, their forms solved by `solve`; without any that leaves no plate."""
     every = {name: each for name, each in forms(baseline.board).items() if tried is None or name in tried}
-
-    def candidate(name: str) -> Candidate:
-        return _candidate(baseline, name, tuple(solve(baseline, form).placed(baseline) for form in every[name]))
-
     made = []
-    for name in every:
-        made.append(candidate(name))
+    for name, each in every.items():
+        made.append(_candidate(baseline, name, tuple(solve(baseline, form).placed(baseline) for form in each)))
         if tell is not None:
             tell(len(made) / len(every))
     candidates = {one.name: one for one in made if one.fine.n_cells and one.coarse.n_cells}
     ground = Ground(baseline, candidates, ())
-    fine = {name: one.fine for name, one in candidates.items()}
-    coarse = {name: one.coarse for name, one in candidates.items()}
-    return Ground(baseline, candidates, hypotheses(baseline, fine, coarse, ground.paired))
+    return ground.with_hypotheses(ground.paired)
 
 
 def search(ground: Ground, residual: Floats | None = None) -> Found:

@@ -132,19 +132,15 @@ def _sizes(found: Found, answer: Answer, cells: Rows, first: int) -> tuple[tuple
     Coordinates and their changes over one standard deviation of the cell are (n_cells, n_tangents) arrays. Forms that
     are not likely are taken for the likeliest.
     """
-    ground = found.ground
-    candidates = [ground.candidates[name] for name in answer.members if name in ground.candidates]
+    ground, whole = found.ground, found.ground.hypotheses[answer.index].table
+    candidates = ground.members(answer.index)
     if not candidates:
         return (), np.zeros((len(cells), 0)), np.zeros((len(cells), 0))
-    tables = [one.fine if len(candidates) == 1 else one.coarse for one in candidates]
-    of_each = [cells] if len(tables) == 1 else np.divmod(cells, tables[1].n_cells)
-    z, step = (
-        np.concatenate([getattr(table, name)[at] for table, at in zip(tables, of_each, strict=True)], axis=1)
-        for name in ("z", "z_slopes")
-    )
+    parts = [whole.member(i, cells) for i in range(len(candidates))]
+    z, step = (np.concatenate([getattr(table, name)[at] for table, at in parts], axis=1) for name in ("z", "z_slopes"))
     step[step == 0.0] = 1.0  # columns that only other forms have
-    starts = first + np.cumsum([0, *(table.z.shape[1] for table in tables)])
-    index = np.stack([table.form[at] for table, at in zip(tables, of_each, strict=True)])
+    starts = first + np.cumsum([0, *(table.z.shape[1] for table, _ in parts)])
+    index = np.stack([table.form[at] for table, at in parts])
     keys, which, counts = np.unique(index, axis=1, return_inverse=True, return_counts=True)
     which = np.where(counts[which] < _LIKELY * len(cells), counts.argmax(), which)
     forms = []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -35,10 +34,6 @@ class Gain:
     shared: Mapping[str, float]  # of a campaign: the same as E_x for each parameter that its boards share
     score: float  # what the plan is ordered by, nats
     score_per_minute: float
-
-    def shrinkage(self, name: str) -> float:
-        """ln of the standard deviation of a modulus before over that after."""
-        return -math.log(getattr(self, name))
 
 
 @dataclass(frozen=True)

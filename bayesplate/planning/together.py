@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.board.attached import AttachedItem
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.board.prior import PriorCard
@@ -218,7 +217,10 @@ def _cut(one: KnownBoard, noise: Floats, prior: PriorCard, shared: Sequence[Shar
         name: replace(q, mean=SHORT * q.mean, sd=SHORT * q.sd, readings=(), at_x=(), at_y=())
         for name, q in halved.items()
     }
-    first = replace(board.setups[0], readings=(), peaks=(), attached=_moved(board))
+    attached = tuple(  # at the same fraction of the shorter board
+        replace(item, places=tuple((SHORT * x, y) for x, y in item.places)) for item in board.setups[0].attached
+    )
+    first = replace(board.setups[0], readings=(), peaks=(), attached=attached)
     bare = replace(board.with_priors(cut), setups=(first,), chosen=())
     values = {name: value for name, value in one.values.items() if name in bare.inputs or name in RIGIDITIES}
     values |= {name: np.asarray(SHORT * float(one.values[name])) for name in halved}
@@ -226,10 +228,3 @@ def _cut(one: KnownBoard, noise: Floats, prior: PriorCard, shared: Sequence[Shar
     read = law.station.setup.readings[: len(board.setups[0].readings)]
     station = replace(law.station, base=replace(law.station.base, readings=read), n_old=len(read))
     return _judged(bare, prior, shared, values, noise, (replace(law, station=station),)).known
-
-
-def _moved(board: Board) -> tuple[AttachedItem, ...]:
-    """What is attached, at the same fraction of the shorter board."""
-    return tuple(
-        replace(item, places=tuple((SHORT * x, y) for x, y in item.places)) for item in board.setups[0].attached
-    )

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bayesplate.board.material import MODULI
-from bayesplate.estimates.coefficients import CoefficientRows
 from bayesplate.estimates.leave_one_out import CarryingMode, Errors
 from bayesplate.estimates.paper import PaperSystem
 from bayesplate.frequencies.laws import cents
@@ -149,7 +148,15 @@ def theory_row(problem: PosedProblem, system: PaperSystem, methods: Sequence[Met
         effects=tuple(board.effects),
         inputs={one.name: float(one.prior.mean) for one in board.parameters if one.is_of_effect},
         coefficients=tuple(
-            origin_of(setup.name, origin) for setup, origin in zip(board.setups, system.origins, strict=True)
+            Origin(
+                setup.name,
+                one.source,
+                one.theory,
+                one.aspect_ratio,
+                one.sentence,
+                {str(label): r for label, r in one.r_squared.items()},
+            )
+            for setup, one in zip(board.setups, system.origins, strict=True)
         ),
         methods=tuple(_method_row(method, rows) for method in methods),
         modes=tuple(
@@ -168,12 +175,6 @@ def judged_alike(rows: Sequence[TheoryRow], carrying: Sequence[CarryingMode]) ->
         return replace(row, error=replace(row.error, leave_one_out_rms_cents=left_out))
 
     return tuple(map(judged, rows))
-
-
-def origin_of(setup: str, origin: CoefficientRows) -> Origin:
-    """Where the coefficients of a setup come from, as it stands in compare.json."""
-    r_squared = {str(label): r for label, r in origin.r_squared.items()}
-    return Origin(setup, origin.source, origin.theory, origin.aspect_ratio, origin.sentence, r_squared)
 
 
 def better_theory(thin: TheoryRow, sheared: TheoryRow) -> BetterTheory:

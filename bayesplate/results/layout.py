@@ -52,12 +52,8 @@ def _least(cell: str) -> int:
     """The least width at which a cell stays whole: that of its longest word, or its own if it is a short number."""
     parts = []
     for line in cell.split("\n"):
-        parts += [line] if len(line) <= _UNBROKEN and _holds_a_number(line) else line.split()
+        parts += [line] if len(line) <= _UNBROKEN and any(map(str.isdigit, line)) else line.split()
     return max(map(len, parts), default=0)
-
-
-def _holds_a_number(line: str) -> bool:
-    return any(character.isdigit() for character in line)
 
 
 def _grid(title: str, columns: Texts, rows: Sequence[Texts], widths: Sequence[int]) -> Any:
