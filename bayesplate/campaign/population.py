@@ -160,7 +160,7 @@ def require_moduli(prior: PriorCard, place: str) -> None:
         raise InputError(Fault(place, wanted, f"{prior.name}, one of D_x, D_y, D_s, which go with the thickness"))
 
 
-def prior_of(population: Population, name: str, source: str, rng: np.random.Generator, title: str = "") -> PriorCard:
+def prior_of(population: Population, name: str, source: str, rng: np.random.Generator) -> PriorCard:
     """What the boards teach of the next one, as a prior card.
 
     Each constant is log-normal with the mean and standard deviation of the prediction's logarithm.
@@ -170,7 +170,7 @@ def prior_of(population: Population, name: str, source: str, rng: np.random.Gene
         key: Quantity.from_median(float(np.exp(values.mean())), float(np.exp(values.std())))
         for key, values in zip(MODULI, predicted.T, strict=True)
     }
-    return PriorCard.from_quantities(name, constants, source=source, title=title)
+    return PriorCard.from_quantities(name, constants, source=source)
 
 
 def _diagonal(values: Floats) -> Floats:

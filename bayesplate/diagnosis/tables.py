@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from bayesplate.board.parameter import unit_of_people
 from bayesplate.diagnosis.known_words import known_table
-from bayesplate.diagnosis.result import Amplitude, CandidateEntry, Diagnosis
+from bayesplate.diagnosis.result import Amplitude, CandidateEntry, Diagnosis, Finalist
 from bayesplate.diagnosis.words import (
     CONDITIONS,
     MERITS,
@@ -20,6 +20,7 @@ from bayesplate.diagnosis.words import (
     worth_showing,
 )
 from bayesplate.effects.words import effect_name
+from bayesplate.results.contract import Spread
 from bayesplate.results.fit_tables import write_tables
 from bayesplate.results.folder import BEFORE_AFTER, KNOWN_EFFECTS
 from bayesplate.results.tables import Cell, Row, Table, by_constant, constants_table, notebook
@@ -146,15 +147,10 @@ def sizes_table(diagnosis: Diagnosis) -> Table | None:
     are_several = len(diagnosis.finalists) > 1
     for one in diagnosis.finalists:
         explanation = (" and ".join(map(effect_name, one.effects)),) if are_several else ()
-        for owner, effects in one.sizes.items():
-            where = "" if owner == "board" else f", {owner}"
-            for effect, parameters in effects.items():
-                for parameter, spread in parameters.items():
-                    factor, unit = unit_of_people(spread.unit)
-                    after = f" {unit}" * bool(unit)
-                    size = plus_minus(spread, factor, after)
-                    range_ = None if spread.sd == 0.0 else interval(spread, factor, after)
-                    rows.append((*explanation, f"{effect_name(effect)}{where}", parameter, size, range_))
+        for owner, effect, parameter, spread, factor, unit in _every_size(one):
+            where, after = "" if owner == "board" else f", {owner}", f" {unit}" * bool(unit)
+            range_ = None if spread.sd == 0.0 else interval(spread, factor, after)
+            rows.append((*explanation, f"{effect}{where}", parameter, plus_minus(spread, factor, after), range_))
     columns = (*(["fitted with"] if are_several else []), "effect", "size", "mean ± sd", "90 % interval")
     return Table("Sizes of what was fitted again", columns, tuple(rows)) if rows else None
 
@@ -224,27 +220,21 @@ def before_after_table(diagnosis: Diagnosis) -> Table:
     title = f"Before and after; verdict: {diagnosis.verdict}"
     columns = ("", "before", "after", "shift, sd", "averaged")
     keys = ("quantity", "before", "after", "shift_in_sd", "averaged")
-    if diagnosis.is_refitted:
-        rows += [(name, None, size, None, None) for name, size in _sizes(diagnosis)]
-        return Table(title, columns, tuple(rows), keys)
+    for added in (one for one in diagnosis.finalists if one.effects == diagnosis.refitted):
+        for owner, effect, parameter, spread, factor, unit in _every_size(added):
+            words = f"{effect} {parameter}, {owner}" + f", {unit}" * bool(unit)
+            rows.append((words, None, number(spread.mean, decimals(spread.sd * factor), factor=factor), None, None))
+    kept = range(len(columns)) if diagnosis.is_refitted else (0, 1, 4)
+    cells = tuple(tuple(row[i] for i in kept) for row in rows)
+    return Table(title, tuple(columns[i] for i in kept), cells, tuple(keys[i] for i in kept))
 
-    def known(row: tuple[Cell, ...]) -> tuple[Cell, ...]:
-        return (*row[:2], row[4])
 
-    return Table(title, (*columns[:2], columns[4]), tuple(map(known, rows)), (*keys[:2], keys[4]))
-
-
-def _sizes(diagnosis: Diagnosis) -> list[tuple[str, Value]]:
-    """Name with unit, and mean, of each size of what was added."""
-    found = []
-    for one in diagnosis.finalists:
-        for owner, effects in one.sizes.items() if one.effects == diagnosis.refitted else ():
-            for effect, parameters in effects.items():
-                for parameter, spread in parameters.items():
-                    factor, unit = unit_of_people(spread.unit)
-                    words = f"{effect_name(effect)} {parameter}, {owner}" + f", {unit}" * bool(unit)
-                    found.append((words, number(spread.mean, decimals(spread.sd * factor), factor=factor)))
-    return found
+def _every_size(one: Finalist) -> Iterator[tuple[str, str, str, Spread, float, str]]:
+    """Board or setup, effect in words, parameter and spread of each size, with the factor and the unit of people."""
+    for owner, effects in one.sizes.items():
+        for effect, parameters in effects.items():
+            for parameter, spread in parameters.items():
+                yield owner, effect_name(effect), parameter, spread, *unit_of_people(spread.unit)
 
 
 def write_diagnosis_tables(folder: Path, diagnosis: Diagnosis, title: str) -> tuple[Path, ...]:

@@ -54,9 +54,8 @@ def benches(beliefs: Beliefs, steps: Sequence[Proposal]) -> tuple[Bench, ...]:
     return tuple(made)
 
 
-def bands(beliefs: Beliefs, readings: Readings, within: Sequence[float] = BAND) -> Floats:
-    """Where each reading will lie, over all explanations: (n, n_within) array at these probabilities, in the readings'
-    unit."""
+def bands(beliefs: Beliefs, readings: Readings) -> Floats:
+    """Where each reading will lie, over all explanations, at the probabilities of `BAND`: (n, 3) array."""
     from scipy.special import ndtri
 
     levels = ndtri((np.arange(_LEVELS) + 0.5) / _LEVELS)[:, None, None]
@@ -68,9 +67,9 @@ def bands(beliefs: Beliefs, readings: Readings, within: Sequence[float] = BAND) 
         drawn.append((expected + np.sqrt(variance) * levels).reshape(-1, readings.n))
         weights.append(np.full(len(drawn[-1]), one.probability / len(drawn[-1])))
     values, shares = np.concatenate(drawn), np.concatenate(weights)
-    ends = np.empty((readings.n, len(within)))
+    ends = np.empty((readings.n, len(BAND)))
     for i, order in enumerate(np.argsort(values, axis=0).T):
-        ends[i] = np.interp(within, np.cumsum(shares[order]) - 0.5 * shares[order], values[order, i])
+        ends[i] = np.interp(BAND, np.cumsum(shares[order]) - 0.5 * shares[order], values[order, i])
     return ends
 
 
