@@ -14,12 +14,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.board.quantity import Floats
 from bayesplate.diagnosis.terms import log_sum
 from bayesplate.posterior.mixture import Mixture
-
-Floats = NDArray[np.float64]
 
 N_POINTS = 1024
 """At which the density is looked at, among the draws and as many beside them."""

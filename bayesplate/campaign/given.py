@@ -8,11 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.quantity import Floats
 from bayesplate.campaign.shared import Shared
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.target import Posterior
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

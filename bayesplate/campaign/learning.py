@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.board.quantity import Floats
 from bayesplate.campaign.boards import N_SOLVED, Member, Sample
 from bayesplate.campaign.likelihood import LogDensity, moments
 from bayesplate.campaign.together import Together, walk
@@ -16,8 +16,6 @@ from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings
-
-Floats = NDArray[np.float64]
 
 ASTRAY = 0.3
 """Standard deviations of the shared parameters by which a board's draws may be off their likelihood."""

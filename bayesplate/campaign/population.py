@@ -21,18 +21,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.material import MODULI
 from bayesplate.board.prior import PriorCard
-from bayesplate.board.quantity import Quantity
+from bayesplate.board.quantity import Floats, Quantity
 from bayesplate.errors import Fault, InputError
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Chains, SamplerSettings, sample
-
-Floats = NDArray[np.float64]
 
 _STEADY = 1e-3
 """Standard deviation of ln E below which a population has none for all practical purposes."""

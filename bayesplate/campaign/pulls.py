@@ -6,12 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesplate.board.quantity import Quantity
+from bayesplate.board.quantity import Floats, Quantity
 from bayesplate.campaign.likelihood import moments
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,15 +21,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial.hermite_e import hermegauss
-from numpy.typing import NDArray
 
-from bayesplate.board.quantity import Quantity
+from bayesplate.board.quantity import Floats, Quantity
 from bayesplate.campaign.likelihood import Likelihood
 from bayesplate.campaign.pulls import Pull
 from bayesplate.campaign.shared import Shared
 from bayesplate.diagnosis.terms import log_sum
-
-Floats = NDArray[np.float64]
 
 _NODES = {1: 9, 2: 7, 3: 5}
 """Along each direction, by the number of directions."""

@@ -20,15 +20,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.board.quantity import Floats
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.peaks import with_own_labels
 from bayesplate.diagnosis.search import LEAST_TRACE, Ground, prepare_search
 from bayesplate.diagnosis.terms import log_sum, normalised
 
-Floats = NDArray[np.float64]
 Way = Literal["none", "shared", "own", "one board", "shared and own"]
 Cell = tuple[float, ...]
 

@@ -6,18 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.board import Board, Values
 from bayesplate.board.campaign import CampaignCard, SharedSection
 from bayesplate.board.material import MODULI, moduli
 from bayesplate.board.parameter import Parameter
-from bayesplate.board.quantity import Quantity
+from bayesplate.board.quantity import Floats, Quantity
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.base import Ratio
 from bayesplate.errors import Fault, InputError
-
-Floats = NDArray[np.float64]
 
 MOST_PARAMETERS = 3
 """Nodes over more would grow as a power of their number."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.board.quantity import Floats
 from bayesplate.campaign.likelihood import Likelihood, LogDensity, moments, spread_points
 from bayesplate.campaign.pulls import Pull, moments_before, normal_posterior
 from bayesplate.campaign.scatter import Scatter, ScatteredLikelihood, expected_width, scatters_of, widths
@@ -18,8 +18,6 @@ from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.mixture import Mixture
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
 from bayesplate.posterior.statistics import effective_draws
-
-Floats = NDArray[np.float64]
 
 _LINE = 21
 FEWEST_POINTS = 500

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.board.board import Board
+from bayesplate.board.quantity import Floats
 from bayesplate.board.sessions import same_modes, under_prior_scales
 from bayesplate.estimates.least_squares import log_measured, reading_scales
 from bayesplate.estimates.refit import Predict, refit, sensitivities
@@ -31,7 +32,6 @@ from bayesplate.plate.naming import Place
 from bayesplate.posterior.laplace import every_predictor
 from bayesplate.posterior.posing import PosedProblem
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.board.quantity import Floats
 from bayesplate.diagnosis.folds import Nested, carrying, log_score_gains, nested
 from bayesplate.diagnosis.null_control import NullControl
 from bayesplate.diagnosis.search import PASSES, Found
@@ -17,7 +17,6 @@ from bayesplate.diagnosis.sizes import at_limit
 from bayesplate.diagnosis.verdict import Verdict, answers, stands_out, turned
 from bayesplate.estimates.leave_one_out import indices_of
 
-Floats = NDArray[np.float64]
 ConditionName = Literal[
     "chance selection", "log score", "probability of none", "probability of another", "prior predictive"
 ]

@@ -6,16 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesplate.diagnosis.baseline import Baseline
+from bayesplate.board.quantity import Floats
+from bayesplate.diagnosis.baseline import Baseline, Rows
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.laws import FormLaw
 from bayesplate.diagnosis.search import Found
 from bayesplate.diagnosis.terms import normalised
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.intp]
 OfForms = Iterator[tuple[int, FormLaw, Rows, Floats]]
 """Form by form: its index, its law, the draws that it has, and their sizes."""
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.diagnosis.result import Amplitude, EffectEntry, ExchangeEntry, Fate
 from bayesplate.diagnosis.search import PASSES, Candidate, Found
@@ -16,7 +15,6 @@ from bayesplate.effects import EFFECTS, effects_of
 from bayesplate.posterior.slips import times
 from bayesplate.results.contract import finite
 
-Floats = NDArray[np.float64]
 Told = tuple[Fate, str | None]
 """What became of a candidate, and the reason; None for what was not rejected."""
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.material import MODULI, RIGIDITIES
+from bayesplate.board.quantity import Floats
 from bayesplate.diagnosis.claim import Claim
 from bayesplate.diagnosis.entries import effect_entry, exchange_entries, p_value_of, ratio_words
 from bayesplate.diagnosis.folds import Nested, log_score
@@ -38,8 +38,6 @@ from bayesplate.posterior.draws import Draws
 from bayesplate.results.contract import Spread, finite, rms
 from bayesplate.results.modes import foretold
 from bayesplate.results.summary import Summary
-
-Floats = NDArray[np.float64]
 
 _AVERAGE_LINE = 11
 _N_AVERAGED = 8000

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.quantity import Floats
+from bayesplate.diagnosis.baseline import Rows
 from bayesplate.diagnosis.hypotheses import Hypothesis, odds_against_none, probabilities
 from bayesplate.diagnosis.search import Found, Ground
 from bayesplate.estimates.leave_one_out import CarryingMode, carrying_modes, leverages_of, united
-
-Floats = NDArray[np.float64]
 
 NEEDED = 0.1
 """Probability of no effect below which one is needed, whatever the null simulations say."""
@@ -37,7 +37,7 @@ class Nested:
     # reading is no mode then
     after: Floats
     # (n_sets, n_modes) array of int: index of the hypothesis that the fold of each reading chose
-    chosen: NDArray[np.intp]
+    chosen: Rows
     # readings that count neither before nor after, for their mode alone carries a constant or a size
     carried: tuple[int, ...] = ()
 
@@ -80,7 +80,7 @@ def nested(ground: Ground, residuals: Floats, needed_from: float = CERTAINLY_NEE
     return Nested(errors[0].T, after.T, chosen.T)
 
 
-def choices(found: Sequence[Hypothesis], evidences: Floats, needed_from: float = CERTAINLY_NEEDED) -> NDArray[np.intp]:
+def choices(found: Sequence[Hypothesis], evidences: Floats, needed_from: float = CERTAINLY_NEEDED) -> Rows:
     """The most probable effect by each evidence, or none where the odds against none are too low.
 
     From an (n_hypotheses, ...) array one of the same shape but for its first axis.
@@ -99,9 +99,7 @@ def log_score(ground: Ground, index: int, residual: Floats, carried: Collection[
     return float(_log_scores(ground, index, residual)[_foretold(ground, carried)].sum())
 
 
-def log_score_gains(
-    ground: Ground, residual: Floats, chosen: NDArray[np.intp], carried: Collection[int] = ()
-) -> Floats:
+def log_score_gains(ground: Ground, residual: Floats, chosen: Rows, carried: Collection[int] = ()) -> Floats:
     """What the choice of each reading's fold adds to the log density of the readings left out: one per mode that
     counts."""
     scores = {int(index): _log_scores(ground, int(index), residual) for index in {0, *chosen}}

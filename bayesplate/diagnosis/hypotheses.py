@@ -8,16 +8,13 @@ from functools import cached_property
 from itertools import combinations, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.board import Board
-from bayesplate.diagnosis.baseline import Baseline
+from bayesplate.board.quantity import Floats
+from bayesplate.diagnosis.baseline import Baseline, Rows
 from bayesplate.diagnosis.shifts import JointLaws, Table, nothing, together
 from bayesplate.diagnosis.terms import NoiseGrid, Terms, log_sum, noise_grid, normalised, reach_of
 from bayesplate.effects import EFFECTS
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.intp]
 
 NONE, ONE, TWO = 0.5, 0.4, 0.1
 """Prior probability that nothing, one effect, or two are behind a residual; each shared equally by those tried."""

@@ -14,13 +14,12 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import RIGIDITIES, moduli
-from bayesplate.board.quantity import Quantity
+from bayesplate.board.quantity import Floats, Quantity
 from bayesplate.board.sessions import same_modes
-from bayesplate.diagnosis.baseline import Baseline, Spectrum, baseline_of, labelled_rows, symmetry_of
+from bayesplate.diagnosis.baseline import Baseline, Rows, Spectrum, baseline_of, labelled_rows, symmetry_of
 from bayesplate.diagnosis.peaks import likely_labels
 from bayesplate.effects import EFFECTS, Effect
 from bayesplate.estimates.least_squares import log_measured, reading_scales
@@ -33,9 +32,7 @@ from bayesplate.posterior.laplace import exact_models
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.posing import PosedProblem
 
-Floats = NDArray[np.float64]
 Models = Sequence[SetupModel]
-Rows = NDArray[np.intp]
 
 MOST_TOGETHER = 3
 """Known effects that are computed together, at most."""

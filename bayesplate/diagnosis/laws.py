@@ -13,11 +13,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.board import Values
 from bayesplate.board.material import RIGIDITIES
-from bayesplate.diagnosis.baseline import Baseline, symmetry_of
+from bayesplate.board.quantity import Floats
+from bayesplate.diagnosis.baseline import Baseline, Rows, symmetry_of
 from bayesplate.diagnosis.forms import Form
 from bayesplate.frequencies.laws import ExactLaw
 from bayesplate.frequencies.model import OtherMode, SetupModel, setup_model
@@ -27,8 +27,6 @@ from bayesplate.plate.reduced import ReducedClass, ReducedOrderModel
 from bayesplate.plate.terms import Parity, Weights
 from bayesplate.posterior.laplace import exact_models
 from bayesplate.posterior.parameters import Parameters
-
-Floats = NDArray[np.float64]
 
 _ACCEPTED_CENTS = 0.05
 """Error of a law where it is checked, cents. It errs more at the ends of a prior: with half a cent here, transverse
@@ -44,14 +42,12 @@ class Following:
     block: ReducedClass
     # (n_modes, r) array: shape times mass of its lowest modes: their product with another shape is the share
     shapes: Floats
-    wanted: NDArray[np.intp]  # (n_wanted,) array of int: which of them are labelled
+    wanted: Rows  # (n_wanted,) array of int: which of them are labelled
     # tuple of array of int: positions in `wanted` of the modes of one symmetry class, in the order of their ranks
-    groups: tuple[NDArray[np.intp], ...]
+    groups: tuple[Rows, ...]
 
     @classmethod
-    def of(
-        cls, block: ReducedClass, without: Weights, wanted: NDArray[np.intp], groups: tuple[NDArray[np.intp], ...]
-    ) -> Following:
+    def of(cls, block: ReducedClass, without: Weights, wanted: Rows, groups: tuple[Rows, ...]) -> Following:
         """Take the shapes at the weights of one draw without the effect."""
         _, vectors = block.modes(without, int(wanted.max()) + 1 + _BEYOND)
         return cls(block, vectors[0].T @ block.mass(without)[0], wanted, groups)

@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.quantity import Floats
 from bayesplate.diagnosis.folds import ALWAYS, CERTAINLY_NEEDED, Nested, nested
 from bayesplate.diagnosis.hypotheses import log_evidences, odds_against_none
 from bayesplate.diagnosis.search import Ground, noise_of_board
-
-Floats = NDArray[np.float64]
 
 N_SETS = 500
 """Simulated boards at most, a batch at a time until the answer is certain."""

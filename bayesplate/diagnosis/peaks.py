@@ -13,18 +13,15 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesplate.diagnosis.baseline import Baseline
+from bayesplate.board.quantity import Floats
+from bayesplate.diagnosis.baseline import Baseline, Rows
 from bayesplate.diagnosis.draws import TermDraws, draw_hypothesis
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.search import Ground
 from bayesplate.estimates.labelling import LIKELY
 from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.posterior.statistics import resampled
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.intp]
 
 _N_DRAWS, _N_WIDE, _N_BEST = 64, 256, 3
 _NOISES = (8.0, 4.0, 2.0, 1.0)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.board.quantity import Floats
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.forms import Form, forms
 from bayesplate.diagnosis.hypotheses import (
@@ -22,8 +22,6 @@ from bayesplate.diagnosis.laws import FormLaw, form_law
 from bayesplate.diagnosis.shifts import COARSE, Table, refitted, tabulate
 from bayesplate.diagnosis.signatures import Signature, signature
 from bayesplate.diagnosis.terms import Terms
-
-Floats = NDArray[np.float64]
 
 LEAST_TRACE = 2.0
 """Length of a trace, in units of the readings' uncertainty, from which an effect may be one of two."""

@@ -16,18 +16,15 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.material import MODULI, moduli
-from bayesplate.board.quantity import Quantity
+from bayesplate.board.quantity import Floats, Quantity
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.draws import TermDraws, draw_terms, joint_sizes_of, sizes_of
 from bayesplate.diagnosis.hypotheses import Hypothesis, probabilities
 from bayesplate.diagnosis.peaks import log_mean, log_of_terms, log_summed
 from bayesplate.diagnosis.search import Found, search
 from bayesplate.diagnosis.shifts import Table
-
-Floats = NDArray[np.float64]
 
 WIDTHS = {"halved": 0.5, "doubled": 2.0}
 """Factors of the standard deviation of the priors of all sizes."""

@@ -19,13 +19,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.board.quantity import Quantity
-from bayesplate.diagnosis.baseline import Baseline
+from bayesplate.board.quantity import Floats, Quantity
+from bayesplate.diagnosis.baseline import Baseline, Rows
 from bayesplate.diagnosis.forms import Form, with_forms
 from bayesplate.diagnosis.laws import FormLaw, form_law
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.intp]
 JointLaws = Mapping[tuple[int, int], FormLaw]
 """Laws of two effects at once, by the indices of their forms; the free parameters are those of the first, then those
 of the second."""

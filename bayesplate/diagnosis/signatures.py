@@ -11,20 +11,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.board import Board
 from bayesplate.board.material import MODULI, moduli
 from bayesplate.board.parameter import Parameter
-from bayesplate.board.quantity import Quantity
+from bayesplate.board.quantity import Floats, Quantity
 from bayesplate.diagnosis.baseline import Baseline, baseline_of
 from bayesplate.effects import EFFECTS, declare, effects_of
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import system_of
 from bayesplate.posterior.posing import PosedProblem
-
-Floats = NDArray[np.float64]
 
 LOOK_ALIKE = 0.95
 """Cosine of two visible parts above which two effects look alike: they differ by less than a third of their trace.

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.board import Board
 from bayesplate.board.parameter import unit_of_people
-from bayesplate.board.quantity import Quantity
+from bayesplate.board.quantity import Floats, Quantity
 from bayesplate.diagnosis.draws import draw_terms, standard_sizes_of
 from bayesplate.diagnosis.forms import with_forms, with_labels_exchanged
 from bayesplate.diagnosis.search import Found
-
-Floats = NDArray[np.float64]
 
 AT_LIMIT = 0.005
 """Prior probability between the posterior median of a size and a bound below which the size is at its limit."""

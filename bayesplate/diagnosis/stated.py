@@ -11,9 +11,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.board import Board
+from bayesplate.board.quantity import Floats
 from bayesplate.board.sessions import same_modes
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.claim import STANDARD_ERRORS, score_gain
@@ -23,8 +23,6 @@ from bayesplate.diagnosis.terms import Terms, noise_grid, reach_of
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.results.contract import rms
-
-Floats = NDArray[np.float64]
 
 LEAST_FALL = 0.2
 """Share of the error by which it has to fall."""

@@ -15,13 +15,11 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.board import Board
-from bayesplate.diagnosis.baseline import Baseline
+from bayesplate.board.quantity import Floats
+from bayesplate.diagnosis.baseline import Baseline, Rows
 from bayesplate.diagnosis.shifts import Table
-
-Floats = NDArray[np.float64]
 
 _MOST_NUMBERS = 200_000
 """Held at once of any one kind: larger arrays cost more to fetch and to give back than to fill."""
@@ -182,7 +180,7 @@ def noise_grid(board: Board, *, few: bool = False, reach: Sequence[float] = ()) 
     return NoiseGrid(np.stack(each, axis=1), weights / weights.sum())
 
 
-def reach_of(board: Board, setup_index: NDArray[np.intp], residual: Floats) -> tuple[float, ...]:
+def reach_of(board: Board, setup_index: Rows, residual: Floats) -> tuple[float, ...]:
     """How far up the levels of each setup's noise have to go for its residual (ln f; NaN: no mode): standard
     coordinates."""
     found = []

@@ -17,13 +17,12 @@ from bayesplate.board.board import Board, Values
 from bayesplate.board.material import MODULI, RIGIDITIES, moduli
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.prior import PriorCard
-from bayesplate.board.quantity import Quantity
+from bayesplate.board.quantity import Floats, Quantity
 from bayesplate.frequencies.prior_bands import prior_medians, with_rigidities
 from bayesplate.planning.laws import BareLaw, bare_law
 from bayesplate.planning.stations import new_stations, old_stations
 from bayesplate.posterior.parameters import Parameters
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 N_TERMS = 96

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.board import Board
 from bayesplate.board.prior import PriorCard
+from bayesplate.board.quantity import Floats
 from bayesplate.campaign.shared import Shared
 from bayesplate.effects import Effect
 from bayesplate.effects.attached_items import fractions_on, places_on
@@ -23,8 +23,6 @@ from bayesplate.planning.plan import FORMAT, BenchEntry, ExplanationEntry, ModeT
 from bayesplate.planning.proposals import Planner, Proposal
 from bayesplate.planning.stations import SEARCHED, Station
 from bayesplate.planning.tables import first_line
-
-Floats = NDArray[np.float64]
 
 BAND = (WITHIN[0], 0.5, WITHIN[1])
 """Probabilities of the ends of a band and of its middle."""

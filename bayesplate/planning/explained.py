@@ -15,9 +15,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.prior import PriorCard
+from bayesplate.board.quantity import Floats
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.forms import with_forms
 from bayesplate.diagnosis.readings import wrong_reading
@@ -32,12 +32,10 @@ from bayesplate.planning.beliefs import (
     Explanation,
     FormTerms,
     KnownBoard,
+    Rows,
     laws_of,
     log_moduli,
 )
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.intp]
 
 UNEXPLAINED = (
     "no effect that is tried explains the readings, so that nothing is said of telling effects apart: what is planned "

@@ -12,14 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.material import MODULI
+from bayesplate.board.quantity import Floats
 from bayesplate.diagnosis.terms import log_sum, normalised
 from bayesplate.planning.beliefs import Beliefs, Explanation, entropy
 from bayesplate.planning.plan import Gain
-
-Floats = NDArray[np.float64]
 
 REFERENCES = (
     "D. V. Lindley: On a measure of the information provided by an experiment. Ann. Math. Stat. 27, 986-1005 (1956), "

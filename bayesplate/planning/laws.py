@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.board import Board, Values, density, vibrating_lengths
+from bayesplate.board.quantity import Floats
 from bayesplate.board.sessions import under_prior_scales
 from bayesplate.effects.attached_items import board_mass
 from bayesplate.errors import BayesplateError
@@ -19,8 +19,6 @@ from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.planning.stations import SEARCHED, Station
 from bayesplate.plate.solve import Modes
 from bayesplate.posterior.parameters import Parameters
-
-Floats = NDArray[np.float64]
 
 _SHARE = 0.02
 """Of the board's mass that a known mass has, about: it shifts a mode by up to some per cent."""

@@ -6,16 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.board.quantity import Floats
 from bayesplate.board.sessions import shared_share, unknown_discrepancies
 from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.planning.beliefs import Beliefs, Explanation, FormTerms, KnownBoard, levels
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.laws import BareLaw, SolvedStation
 from bayesplate.planning.stations import Station
-
-Floats = NDArray[np.float64]
 
 REPEATED = 2e-4
 """Relative scatter of a frequency that is read once more in one session: what five hits on a free board leave open."""

@@ -12,15 +12,13 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.board import Board
 from bayesplate.board.parameter import Parameter
+from bayesplate.board.quantity import Floats
 from bayesplate.board.random_field import conditioned, sd_after, thickness_readings, width_readings
 from bayesplate.planning.beliefs import Beliefs, KnownBoard
 from bayesplate.planning.gains import Readings
-
-Floats = NDArray[np.float64]
 
 MORE = 5
 """Readings of a thing that has no places."""

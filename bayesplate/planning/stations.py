@@ -6,11 +6,10 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.board import Board, Values
 from bayesplate.board.prior import PriorCard
-from bayesplate.board.quantity import Quantity
+from bayesplate.board.quantity import Floats, Quantity
 from bayesplate.board.reading import Reading
 from bayesplate.board.setup import Ends, Setup, assumed_noise
 from bayesplate.effects import effects_of
@@ -20,8 +19,6 @@ from bayesplate.frequencies.residues import NODAL_LINE, deflections
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
-
-Floats = NDArray[np.float64]
 
 FURTHER = 8
 """Modes beyond those that were read from which the best are chosen."""

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.board.prior import PriorCard
+from bayesplate.board.quantity import Floats
 from bayesplate.campaign.given import GivenShared
 from bayesplate.campaign.scatter import expected_width
 from bayesplate.campaign.shared import Shared
@@ -24,8 +24,6 @@ from bayesplate.planning.stations import new_stations
 from bayesplate.posterior.laplace import noise_widenings
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.target import Posterior
-
-Floats = NDArray[np.float64]
 
 LINEAR = (
     "to first order about each board's least-squares estimate, peaks without a label taken for the modes that are "

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.board.material import MODULI, RIGIDITIES, moduli
+from bayesplate.board.quantity import Floats
 from bayesplate.estimates.identifiability import remarks
 from bayesplate.estimates.leave_one_out import carrying_sentence
 from bayesplate.estimates.paper import PaperSystem, paper_system
@@ -36,8 +36,6 @@ from bayesplate.results.summary import (
     Summary,
     Unconverged,
 )
-
-Floats = NDArray[np.float64]
 
 HIGH_EXACT_ERROR = 0.5
 """Cents by which the exact law may miss full solves before a summary warns."""
