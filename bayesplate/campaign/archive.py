@@ -11,7 +11,7 @@ from bayesplate.campaign.learning import Learnt
 from bayesplate.campaign.together import values_of
 from bayesplate.posterior.inference import MOST_DRAWS_A_CHAIN
 from bayesplate.posterior.thinning import thin_walker_major
-from bayesplate.results.archive import DRAWN, tree_of
+from bayesplate.results.archive import DRAWN, sample_stats, tree_of
 
 
 def archive_name(name: str) -> str:
@@ -34,10 +34,7 @@ def shared_tree(learnt: Learnt, attributes: Mapping[str, str]) -> Any:
         {
             "posterior": {archive_name(name): (DRAWN, np.asarray(each)) for name, each in values.items()},
             "log_likelihood": {"board": ((*DRAWN, "name"), likelihood)},
-            "sample_stats": {
-                "lp": (DRAWN, log_posterior),
-                **{name: (("parameter",), getattr(convergence, name)) for name in ("tau", "rhat", "ess")},
-            },
+            "sample_stats": sample_stats(log_posterior, convergence),
         },
         {"name": together.names, "parameter": [archive_name(one.name) for one in together.coordinates]},
         attributes,

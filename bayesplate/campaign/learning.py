@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -32,10 +33,20 @@ class Learnt:
     chains: Chains  # of the standard coordinates of what is learned: `Together.coordinates`
     convergence: Convergence
 
-    @property
+    @cached_property
     def astray(self) -> Floats:
-        """How far each board's draws are off the likelihood that they gave: see `_astray`; (n_boards,) array."""
-        return np.array([_astray(self.together, i, one) for i, one in enumerate(self.samples)])
+        """How far each board's draws under what all teach are off what all teach: (n_boards,) array.
+
+        The two are the same but for the polynomial that stands for the board's likelihood: the largest difference of a
+        mean, in standard deviations, less two of its standard errors.
+        """
+        found = np.empty(len(self.samples))
+        for i, drawn in enumerate(self.samples):
+            mean, covariance = self.together.under_all(i)
+            weights = drawn.weights_under(self.together.log_taught((i,)))
+            off = np.abs(moments(drawn.z, weights)[0] - mean) / np.sqrt(np.diagonal(covariance))
+            found[i] = off.max() - 2.0 * drawn.effective(weights) ** -0.5
+        return found
 
     def board(self, index: int, rng: np.random.Generator, seed: int) -> tuple[Inference, Draws, float]:
         """A board's posterior under what all boards teach, and how many independent draws it rests on.
@@ -100,16 +111,3 @@ def _halfway(member: Member, together: Together, board: int) -> LogDensity:
     """ln of a density between the prior and what all boards but one teach of the shared parameters."""
     log_taught = together.log_taught((board,))
     return lambda z: 0.5 * (member.log_prior(z) + log_taught(z))
-
-
-def _astray(together: Together, board: int, drawn: Sample) -> float:
-    """How far the draws of a board under what all teach are off what all teach.
-
-    The two are the same but for the polynomial that stands for the board's likelihood: the largest difference of a
-    mean, in standard deviations, less two of its standard errors.
-    """
-    mean, covariance = together.under_all(board)
-    weights = drawn.weights_under(together.log_taught((board,)))
-    own, _ = moments(drawn.z, weights)
-    off = np.abs(own - mean) / np.sqrt(np.diagonal(covariance))
-    return float(off.max() - 2.0 * drawn.effective(weights) ** -0.5)

@@ -140,7 +140,8 @@ class Together:
         """
         if len(self.coordinates) == len(self.shared):
             return lambda z: self.log_density(z, without)
-        draws, bounds = self.taught_draws(np.random.default_rng(_LINE), _N_FITTED, without), self._lower_bounds
+        draws = self.taught_draws(np.random.default_rng(_LINE), _N_FITTED, without)
+        bounds = np.array([one.prior.standard_bounds[0] for one in self.shared])  # minus infinity where there is none
         for i in np.flatnonzero(np.isfinite(bounds)):  # their mirror image beside them, or the density would fall off
             mirrored = draws.copy()
             mirrored[:, i] = 2.0 * bounds[i] - mirrored[:, i]
@@ -154,11 +155,6 @@ class Together:
             return np.where(inside, mixture.log_density(z), -np.inf)
 
         return log_density
-
-    @property
-    def _lower_bounds(self) -> Floats:
-        """Of the standard coordinates of the numbers: (n_shared,) array, minus infinity where there is none."""
-        return np.array([one.prior.standard_bounds[0] for one in self.shared])
 
     @cached_property
     def _at_points(self) -> tuple[Floats, Floats]:

@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.board.prior import StatedPrior
+from bayesplate.board.quantity import Floats
 from bayesplate.files import write_bytes
 from bayesplate.libraries import load_arviz
+from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.results.contract import as_json
@@ -74,7 +76,7 @@ def posterior_tree(inference: Inference, draws: Draws, attributes: Mapping[str, 
 
     Its group log_prior holds one variable per factor of the prior: constants, noise, and inputs if any is uncertain.
     """
-    problem, convergence = inference.problem, inference.convergence
+    problem = inference.problem
     board = problem.board
     factors = problem.posterior.log_prior_factors(draws.flat)
     all_sure = not any(problem.posterior.peaks)
@@ -89,10 +91,7 @@ def posterior_tree(inference: Inference, draws: Draws, attributes: Mapping[str, 
             "log_prior": {name: (DRAWN, values.reshape(draws.log_posterior.shape)) for name, values in factors.items()},
             "log_likelihood": {likelihood: ((*DRAWN, of_what), draws.log_likelihood)},
             "posterior_predictive": {"frequency": ((*DRAWN, "reading"), draws.predictive)},
-            "sample_stats": {
-                "lp": (DRAWN, draws.log_posterior),
-                **{name: (("parameter",), getattr(convergence, name)) for name in ("tau", "rhat", "ess")},
-            },
+            "sample_stats": sample_stats(draws.log_posterior, inference.convergence),
             "observed_data": {"frequency": (("reading",), np.concatenate([setup.measured for setup in board.setups]))},
         },
         {
@@ -103,6 +102,12 @@ def posterior_tree(inference: Inference, draws: Draws, attributes: Mapping[str, 
         },
         attributes,
     )
+
+
+def sample_stats(log_posterior: Floats, convergence: Convergence) -> Variables:
+    """The log posterior of each draw, and the sampler's health by parameter."""
+    health = {name: (("parameter",), getattr(convergence, name)) for name in ("tau", "rhat", "ess")}
+    return {"lp": (DRAWN, log_posterior), **health}
 
 
 def _stated(prior: StatedPrior) -> dict[str, Any]:
