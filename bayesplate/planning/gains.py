@@ -8,7 +8,7 @@ readings are drawn from what is believed now, and what would be believed after e
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +41,11 @@ class Readings:
     slopes: tuple[Floats, ...]  # (n_terms, n, n_u) arrays
     variance: tuple[Floats, ...]  # (n_terms, n) arrays: of the noise
 
+    @classmethod
+    def of(cls, every: Iterable[tuple[Floats, Floats, Floats]]) -> Readings:
+        """From shift, slopes and variance under each explanation."""
+        return cls(*zip(*every, strict=True))
+
     @property
     def n(self) -> int:
         return int(self.shift[0].shape[1])
@@ -53,11 +58,8 @@ class Readings:
 
 def together(every: Sequence[Readings]) -> Readings:
     """Several sets of readings as one."""
-
-    def joined(parts: Sequence[tuple[Floats, ...]]) -> tuple[Floats, ...]:
-        return tuple(np.concatenate(of_one, axis=1) for of_one in zip(*parts, strict=True))
-
-    return Readings(*(joined([getattr(one, name) for one in every]) for name in ("shift", "slopes", "variance")))
+    parts = zip(*((one.shift, one.slopes, one.variance) for one in every), strict=True)
+    return Readings(*(tuple(np.concatenate(of_one, axis=1) for of_one in zip(*part, strict=True)) for part in parts))
 
 
 def expected_gain(

@@ -91,15 +91,15 @@ def given_first(
     rows = list(old)
     first, own = np.log(station.base.measured)[rows], ReadingErrors.of(station.base).own_variance[rows]
     new = ReadingErrors.of(station.setup).own_variance[rows]
-    shift, slopes, variance = [], [], []
+    every = []
     for k, (each, part) in enumerate(zip(kept, shares, strict=True)):
         share = part[:, None]
         common = share * each[:, None]
         told = common / (each[:, None] + own)
-        shift.append((1.0 - told) * readings.shift[k] + told * first)
-        slopes.append((1.0 - told)[:, :, None] * readings.slopes[k])
-        variance.append(new + (1.0 - share) * (readings.variance[k] - new) + common * (1.0 - told))
-    return Readings(tuple(shift), tuple(slopes), tuple(variance))
+        shift = (1.0 - told) * readings.shift[k] + told * first
+        variance = new + (1.0 - share) * (readings.variance[k] - new) + common * (1.0 - told)
+        every.append((shift, (1.0 - told)[:, :, None] * readings.slopes[k], variance))
+    return Readings.of(every)
 
 
 def _expected(one: Explanation, known: KnownBoard, law: BareLaw) -> tuple[Floats, Floats]:

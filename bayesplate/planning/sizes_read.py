@@ -106,13 +106,11 @@ def column_of(known: KnownBoard, parameter: Parameter) -> Floats:
 def input_readings(beliefs: Beliefs, known: KnownBoard, one: Measured) -> Readings:
     """A measurement of an input of a board as one reading of its standard coordinate."""
     along = column_of(known, one.parameter)
-    shift, slopes, variance = [], [], []
-    for explanation in beliefs.explanations:
-        n_terms, _, n_u = explanation.covariance.shape
-        shift.append(np.zeros((n_terms, 1)))
-        slopes.append(np.tile(np.pad(along, (0, n_u - along.size)), (n_terms, 1, 1)))
-        variance.append(np.full((n_terms, 1), 1.0 / one.precision))
-    return Readings(tuple(shift), tuple(slopes), tuple(variance))
+    every = []
+    for n_terms, n_u in (each.mean.shape for each in beliefs.explanations):
+        slopes = np.tile(np.pad(along, (0, n_u - along.size)), (n_terms, 1, 1))
+        every.append((np.zeros((n_terms, 1)), slopes, np.full((n_terms, 1), 1.0 / one.precision)))
+    return Readings.of(every)
 
 
 @dataclass(frozen=True)
@@ -159,7 +157,7 @@ def look_readings(beliefs: Beliefs, effect: str) -> Readings | None:
     if not having or not look.can(board):
         return None
     free = [one for one, name in zip(having[0].parameters, having[0].effects, strict=True) if name == effect]
-    shift, slopes, variance = [], [], []
+    every = []
     for one in beliefs.explanations:
         value = np.tile([0.0 if p.null is None else p.null for p in free], (one.n_terms, 1))
         along = np.zeros((one.n_terms, len(free), one.mean.shape[1]))
@@ -170,7 +168,5 @@ def look_readings(beliefs: Beliefs, effect: str) -> Readings | None:
                 change = (parameter.prior.value(at + sd) - parameter.prior.value(at - sd)) / (2.0 * sd)
                 along[form.rows, j, column] = change
                 value[form.rows, j] = parameter.prior.value(at) - change * at
-        shift.append(value)
-        slopes.append(along)
-        variance.append(np.full((one.n_terms, len(free)), look.sd(board) ** 2))
-    return Readings(tuple(shift), tuple(slopes), tuple(variance))
+        every.append((value, along, np.full((one.n_terms, len(free)), look.sd(board) ** 2)))
+    return Readings.of(every)
