@@ -10,6 +10,7 @@ import numpy as np
 
 from bayesplate.board.material import MODULI
 from bayesplate.diagnosis.known import KnownFit
+from bayesplate.diagnosis.stated import LEAST_FALL, StatedClaim
 from bayesplate.effects.words import effect_name, effect_names
 from bayesplate.frequencies.laws import cents
 from bayesplate.results.contract import rms
@@ -185,3 +186,21 @@ def _only_together(known: Sequence[KnownModel], errors: _Errors) -> list[str]:
                 f"{shown[0]} to {shown[1]} cents, {other} alone to {shown[2]}, both to {shown[3]}."
             )
     return said
+
+
+def stated_sentence(one: StatedClaim) -> str:
+    """What is predicted, the error without and with the stated effects, and whether it is reduced."""
+    who = f"{effect_names(one.effects)}, as stated and not chosen by the readings,"
+    verb = "takes" if len(one.effects) == 1 else "take"
+    if one.predicts:
+        what = f"the error of setup '{one.predicts}', predicted by the constants of the first setup alone,"
+    else:
+        what = "the left-out error"
+    told = (
+        f"{who[0].upper()}{who[1:]} {verb} {what} from {one.before_rms_cents:.1f} to {one.after_rms_cents:.1f} cents; "
+        f"the log score changes by {one.log_score_gain:+.1f} ± {one.standard_error:.1f} over {one.n_modes} modes"
+    )
+    if one.holds:
+        return f"{told}: error reduced."
+    needs = f"that asks for a fall by {LEAST_FALL:.0%} and a score that rises by more than two standard errors"
+    return f"{told}. That an error is reduced is not claimed: {needs}."

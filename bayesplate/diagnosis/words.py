@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from bayesplate.board.board import Board
 from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.claim import ConditionName
-from bayesplate.diagnosis.known_words import known_sentence
+from bayesplate.diagnosis.known_words import known_sentence, stated_sentence
 from bayesplate.diagnosis.result import CandidateEntry, Diagnosis, EffectEntry, Errors, ExchangeEntry
 from bayesplate.diagnosis.signatures import LOOK_ALIKE
-from bayesplate.diagnosis.stated import LEAST_FALL, StatedClaim
 from bayesplate.diagnosis.verdict import Word
 from bayesplate.effects.words import effect_name, effect_names, joined
 from bayesplate.estimates.leave_one_out import carrying_sentence
@@ -284,24 +283,6 @@ def warnings(diagnosis: Diagnosis) -> list[str]:
 def remarks(diagnosis: Diagnosis) -> list[str]:
     """What else there is to know: the reason of the verdict, notes of the run."""
     return [f"The reason: {diagnosis.reason}.", *diagnosis.notes]
-
-
-def stated_sentence(one: StatedClaim) -> str:
-    """What is predicted, the error without and with the stated effects, and whether it is reduced."""
-    who = f"{effect_names(one.effects)}, as stated and not chosen by the readings,"
-    verb = "takes" if len(one.effects) == 1 else "take"
-    if one.predicts:
-        what = f"the error of setup '{one.predicts}', predicted by the constants of the first setup alone,"
-    else:
-        what = "the left-out error"
-    told = (
-        f"{who[0].upper()}{who[1:]} {verb} {what} from {one.before_rms_cents:.1f} to {one.after_rms_cents:.1f} cents; "
-        f"the log score changes by {one.log_score_gain:+.1f} ± {one.standard_error:.1f} over {one.n_modes} modes"
-    )
-    if one.holds:
-        return f"{told}: error reduced."
-    needs = f"that asks for a fall by {LEAST_FALL:.0%} and a score that rises by more than two standard errors"
-    return f"{told}. That an error is reduced is not claimed: {needs}."
 
 
 def relabelled_sentence(before: Board, after: Board, words: str) -> str:

@@ -17,8 +17,8 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.commands.problem import Problem
 from bayesplate.diagnosis.baseline import Baseline, Spectrum
 from bayesplate.diagnosis.known import known_fit, stated_effects
+from bayesplate.diagnosis.known_words import stated_sentence
 from bayesplate.diagnosis.stated import _states_differently, judge_stated, scores_given, stated_claims
-from bayesplate.diagnosis.words import stated_sentence
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.posterior.posing import pose
 
