@@ -24,7 +24,7 @@ FEWEST = 2
 class CommonResidual:
     """Residuals of one mode, measured over predicted, cents."""
 
-    mean_cents: float  # weighted by each board's noise
+    mean_cents: float  # mean of the residuals, each weighted by its board's noise
     # standard error of the mean: of the noise, or of the scatter between the boards where that is larger
     error_cents: float
     # of that error: those of the boards, and where it is of the noise those of the residuals that tell it

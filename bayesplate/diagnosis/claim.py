@@ -38,11 +38,13 @@ class Condition:
     """One condition of the claim."""
 
     # "chance selection": nested left-out error after over before, to be below that of 95 % of null simulations made to
-    # choose. "log score": nested gain, to exceed two standard errors. "probability of none", and "of another" than the
-    # verdict tells: the largest over the widths of the sizes' priors, to be below 0.05. "prior predictive": p-value
-    # with the effect, at least 0.05.
+    # choose. "log score": nested gain, to exceed two standard errors. "probability of none": the largest over the
+    # widths of the sizes' priors, to be below 0.05. "probability of another": that something else is lacking than what
+    # the verdict tells, the largest over the same widths, to be below 0.05. "prior predictive": p-value with the
+    # effect, at least 0.05.
     name: ConditionName
-    value: float | None  # None where too few readings leave nothing to judge by; the limit likewise
+    # value, limit: None where too few readings leave nothing to judge by
+    value: float | None
     limit: float | None
     is_met: bool
 

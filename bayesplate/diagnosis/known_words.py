@@ -32,14 +32,16 @@ class KnownModel:
     effects: tuple[str, ...]  # those beyond what is declared; empty for the board as it stands
     # declared ones that are left out, as the stated mass of a sensor, to show what they do; mostly none
     without: tuple[str, ...]
-    # by weighted least squares, all inputs at their nominal values, open sizes where the fit has them
+    # of the readings, by weighted least squares, all inputs at their nominal values, declared sizes that the card
+    # leaves open where the fit has them
     in_sample_rms_cents: float
-    # of each reading that every model can predict from the others; None where they are too few
+    # of each reading, predicted by a fit that has not seen it; of those that every model predicts so, but of modes that
+    # alone carry a constant or a size in any of the models compared; None where they are too few
     leave_one_out_rms_cents: float | None
     change_percent: Mapping[str, float]  # of E_x, E_y, G_xy against the board as it stands
     combination: tuple[str, ...]  # all known effects that it has, declared or not
     n_left_out: int  # readings that have a left-out error
-    n_readings: int
+    n_readings: int  # all of them
 
 
 def known_models(fits: Sequence[KnownFit], carried: Sequence[int] = ()) -> tuple[KnownModel, ...]:

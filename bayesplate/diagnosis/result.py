@@ -40,7 +40,7 @@ class PValues:
 class Histogram:
     """Numbers of simulated sets by a value."""
 
-    edges: tuple[float, ...]  # n_bins + 1 of them
+    edges: tuple[float, ...]
     counts: tuple[int, ...]
 
 
@@ -49,15 +49,15 @@ class NullControlSummary:
     """What the same search makes of simulated readings without any effect."""
 
     n_sets: int
-    flagged_percent: float  # sets in which an effect would be called needed
-    log_odds: float | None  # ln odds of these readings that something is lacking
+    flagged_percent: float  # share of the sets in which an effect would be called needed
+    log_odds: float | None  # ln odds of these readings that something is lacking; None where nothing could be
     log_odds_needed: float  # those above which an effect is needed
     log_odds_of_sets: Histogram | None  # None where nothing could be lacking
     # nested error after over before of these readings; None of too few
     nested_ratio: float | None
-    # 95 of 100 sets that are made to choose their most probable effect stay above it
+    # what 95 of 100 sets stay above that are made to choose their most probable effect
     nested_ratio_to_beat: float | None
-    nested_ratio_percentile: float | None  # sets with a larger ratio, percent
+    nested_ratio_percentile: float | None  # share of the sets with a larger ratio than these readings, percent
     # of as many sets as were needed to tell; this, its limit and the percentile None where nothing is claimed
     nested_ratio_of_sets: Histogram | None
 
@@ -226,7 +226,8 @@ class Amplitude:
 
     parameter: str
     form: str  # empty if the effect has one only
-    q05: float  # quantiles in `unit`
+    # q05, q50, q95: in `unit`
+    q05: float
     q50: float
     q95: float
     unit: str
@@ -239,15 +240,16 @@ class EffectEntry:
     name: str
     setup: str  # "board" for an effect of the whole board
     raw_rms_cents: float | None  # shift of the modes at the nominal size; None where there is no frequency
-    # what refitted constants leave of it, by the same weights; None where nothing is left
+    # what is left of it after the constants are fitted again, both with the weights of that fit, so that it is never
+    # the larger; None where nothing is left because there are as many constants as modes
     visible_rms_cents: float | None
-    visible_cents: tuple[float | None, ...]  # mode by mode
-    below_detection_limit: bool  # these readings could not show it even if it were there
+    visible_cents: tuple[float | None, ...]  # the same mode by mode
+    below_detection_limit: bool  # whether these readings could not show it even if it were there
     bias_percent: Mapping[str, float]  # what ignoring it does to each modulus
     inclusion_probability: float
     inclusion_probability_with_doubled_priors: float
     log_bayes_factor: float  # against no effect
-    ockham_log_factor: float  # the part of it that the width of the prior costs
+    ockham_log_factor: float  # the part of the Bayes factor that the width of the prior costs
     p_value: float | None
     amplitude: Amplitude | None  # None if it has no size
     learnt_bits: Mapping[str, float]  # how far the posterior of each size left its prior, by parameter

@@ -36,10 +36,12 @@ class StatedClaim:
 
     # at their stated sizes, or the medians of their priors; nothing but the constants is fitted
     effects: tuple[str, ...]
-    predicts: str  # the setup predicted by the constants of the first alone; empty: each mode by the others
+    # the setup that is predicted by constants of the first setup alone; empty where each mode is predicted by the
+    # others
+    predicts: str
     before_rms_cents: float  # error of the predicted readings without these effects
-    after_rms_cents: float
-    log_score_gain: float  # what the effects add to the log density of each prediction, in sum
+    after_rms_cents: float  # the same with them
+    log_score_gain: float  # sum over the modes of what the effects add to the log density of each prediction
     standard_error: float  # of that, from its scatter over the modes
     n_modes: int  # which have a prediction both without and with the effects
     holds: bool  # whether the error falls by a fifth at least and the score rises by more than two standard errors

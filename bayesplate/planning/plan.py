@@ -21,15 +21,17 @@ class ExplanationEntry:
 class Gain:
     """What readings are expected to give."""
 
-    E_x: float  # expected sd of the constant's logarithm after, over that before; of several boards the geometric mean
+    # E_x, E_y, G_xy: expected standard deviation of the constant's logarithm after, over that before; of several boards
+    # the geometric mean
+    E_x: float
     E_y: float
     G_xy: float
     constants: float  # mean of the logarithms of before over after, nats
     constants_error: float  # its standard error; 0 where it is exact
     explanations: float | None  # expected drop of the entropy of the explanations, nats; None where there is one only
     explanations_error: float | None  # its standard error
-    # half the log determinant of what the constants (of an isotropic board E, of boards that share something that)
-    # gain, the explanation being known, nats
+    # half the log determinant of what the constants gain, the explanation being known, nats; of an isotropic board of
+    # what E gains; where boards share something, of what that gains
     information: float
     shared: Mapping[str, float]  # of a campaign: the same as E_x for each parameter that its boards share
     score: float  # what the plan is ordered by, nats
@@ -64,7 +66,8 @@ class ModeToFind:
 
     label: str
     hz: float  # where it is expected: the median over all explanations
-    low_hz: float  # between these it lies two times in three
+    # low_hz, high_hz: between which it lies two times in three
+    low_hz: float
     high_hz: float
     # residue between hammer and sensor over the largest that its figure could give: 0 on a nodal line, 1 at best
     seen: float
@@ -77,7 +80,8 @@ class BenchEntry:
     board: str
     setup: str
     edges: Mapping[str, str]
-    sensor_mm: tuple[float, float]  # on the whole board, as all places
+    # sensor_mm, hammer_mm: places on the whole board
+    sensor_mm: tuple[float, float]
     hammer_mm: tuple[float, float]
     taps_mm: tuple[tuple[float, float], ...]  # where to tap to tell the figures apart
     modes: tuple[ModeToFind, ...]

@@ -56,8 +56,8 @@ class ModeRow:
     left_out_cents: float | None
     leverage: float  # share of the mode in its own prediction, what else is free counted in
     label_correlation: float  # of the mode's shape with what its label names
-    # "card": stated as sure; "doubtful": with a doubt; "proposed": the likeliest of a peak without one
-    # (`Summary.peaks`)
+    # whether the card states the label as sure or with a doubt, or the peak has none and this one is its likeliest; the
+    # probabilities of the latter two stand in `Summary.peaks`
     label_origin: LabelOrigin = "card"
 
 
@@ -168,9 +168,8 @@ class Spectrum:
     """How the peaks of a setup were taken for modes."""
 
     setup: str
-    # beforehand: that a mode left no peak, and that a peak is no mode
-    missed_probability: float
-    spurious_probability: float
+    missed_probability: float  # beforehand, that a mode left no peak
+    spurious_probability: float  # beforehand, that a peak is no mode
     modes: tuple[PredictedMode, ...]  # in the order of frequency, up to a little above the highest peak
 
 

@@ -89,7 +89,9 @@ class ErrorFigures:
     leave_one_out_rms_cents: float | None
     linearisation_rms_cents: float | None  # linear less exact law over the posterior
     exact_law_worst_cents: float  # exact law against full solves
-    surrogate_rms_cents: float | None  # surrogate of the exact law less that law over the posterior; None without one
+    # surrogate_rms_cents, surrogate_worst_cents: surrogate of the exact law less that law over the posterior; None
+    # where the walkers walked on none
+    surrogate_rms_cents: float | None
     surrogate_worst_cents: float | None
 
 
@@ -98,7 +100,7 @@ class Run:
     """What was run, before any result."""
 
     format: int
-    name: str
+    name: str  # of the board
     seed: int
     versions: Mapping[str, str]
     card_sha256: str
