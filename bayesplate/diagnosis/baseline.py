@@ -36,7 +36,7 @@ Rows = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
-class Spectrum:
+class PossibleModes:
     """All modes that the readings of a board may be, linear in constants and inputs around the estimate.
 
     One setup after the other: the labelled modes first, then those of peaks.
@@ -77,7 +77,7 @@ class Baseline:
     values: Mapping[str, Floats]  # rigidities and inputs at the estimate, SI
     log_rigidities: Floats  # (n_constants,) array: x_hat
     log_readings: Floats  # (n_modes,) array: ln measured (Hz)
-    every: Spectrum  # all modes that the readings may be
+    every: PossibleModes  # all modes that the readings may be
     # (n_modes,) array of int: which of them each reading is; -1: none, and then what the arrays below say of the
     # reading means nothing
     rows: Rows
@@ -212,7 +212,7 @@ def baseline_of(problem: PosedProblem) -> Baseline:
     values = parameters.values_at(problem.centre)
     input_slopes, inputs = under_prior_scales(board, values, slopes[:, n:], at[n:])
     discrepancies = [np.broadcast_to(one.discrepancies(values)[0], len(one.every_place)) for one in models]
-    every = Spectrum(
+    every = PossibleModes(
         log_frequency=predict(at[None, :])[0],
         slopes=slopes[:, :n],
         input_slopes=input_slopes,

@@ -12,7 +12,7 @@ import numpy as np
 from bayesplate.board.board import Board
 from bayesplate.board.quantity import Floats
 from bayesplate.diagnosis.baseline import Baseline, Rows
-from bayesplate.diagnosis.shifts import JointLaws, Table, nothing, together
+from bayesplate.diagnosis.shifts import Cells, JointLaws, nothing, together
 from bayesplate.diagnosis.terms import NoiseGrid, Terms, log_sum, noise_grid, normalised, reach_of
 from bayesplate.effects import EFFECTS
 
@@ -51,7 +51,7 @@ class Hypothesis:
 
     members: tuple[str, ...]  # effects that are present; empty for none
     prior: float
-    table: Table  # of all modes that readings may be
+    table: Cells  # of all modes that readings may be
     noise: NoiseGrid
     own: Baseline  # the baseline with the labels that readings have if it is the case
     swap: Swap | None = None  # the two labels that it exchanges
@@ -85,7 +85,7 @@ class Hypothesis:
 
 
 def hypotheses(
-    baseline: Baseline, fine: Mapping[str, Table], coarse: Mapping[str, Table], paired: Sequence[str]
+    baseline: Baseline, fine: Mapping[str, Cells], coarse: Mapping[str, Cells], paired: Sequence[str]
 ) -> tuple[Hypothesis, ...]:
     """Every hypothesis about a board: none first, then single effects, exchanged labels, and pairs of those `paired`.
 

@@ -19,7 +19,7 @@ from bayesplate.board.board import Board, Values
 from bayesplate.board.material import RIGIDITIES, moduli
 from bayesplate.board.quantity import Floats, Quantity
 from bayesplate.board.sessions import same_modes
-from bayesplate.diagnosis.baseline import Baseline, Rows, Spectrum, baseline_of, labelled_rows, symmetry_of
+from bayesplate.diagnosis.baseline import Baseline, PossibleModes, Rows, baseline_of, labelled_rows, symmetry_of
 from bayesplate.diagnosis.peaks import likely_labels
 from bayesplate.effects import EFFECTS, Effect
 from bayesplate.estimates.least_squares import log_measured, reading_scales
@@ -125,7 +125,7 @@ def fit_with(problem: PosedProblem, combination: Sequence[str] | None, n_first: 
         values=_values(board, fitted, inputs),
         log_rigidities=fitted,
         log_readings=log_measured(board),
-        every=Spectrum(
+        every=PossibleModes(
             log_frequency=law(fitted[None, :])[0],
             slopes=sensitivities(law, fitted),
             input_slopes=np.zeros((sum(len(one.every_place) for one in law.models), 0)),

@@ -19,7 +19,7 @@ from bayesplate.diagnosis.hypotheses import (
     probabilities,
 )
 from bayesplate.diagnosis.laws import FormLaw, form_law
-from bayesplate.diagnosis.shifts import COARSE, Table, refitted, tabulate
+from bayesplate.diagnosis.shifts import COARSE, Cells, refitted, tabulate
 from bayesplate.diagnosis.signatures import Signature, signature
 from bayesplate.diagnosis.terms import Terms
 
@@ -38,8 +38,8 @@ class Candidate:
 
     name: str
     laws: tuple[FormLaw, ...]
-    fine: Table
-    coarse: Table
+    fine: Cells
+    coarse: Cells
     signature: Signature  # of the form that shows most
     # length of its visible shift at nominal size, at the constants of a board with the effect that looks like the one
     # at hand, in units of the readings' uncertainty: what the search goes by

@@ -24,7 +24,7 @@ from bayesplate.diagnosis.draws import TermDraws, draw_terms, joint_sizes_of, si
 from bayesplate.diagnosis.hypotheses import Hypothesis, probabilities
 from bayesplate.diagnosis.peaks import log_mean, log_of_terms, log_summed
 from bayesplate.diagnosis.search import Found, search
-from bayesplate.diagnosis.shifts import Table
+from bayesplate.diagnosis.shifts import Cells
 
 WIDTHS = {"halved": 0.5, "doubled": 2.0}
 """Factors of the standard deviation of the priors of all sizes."""
@@ -73,7 +73,7 @@ def _changed(found: Found, index: int, width: float, noise: float) -> Hypothesis
     return replace(one, table=replace(one.table, weights=weights), noise=replace(one.noise, sd=noise * one.noise.sd))
 
 
-def _widening(table: Table, priors: list[list[Quantity]], factor: float) -> Floats:
+def _widening(table: Cells, priors: list[list[Quantity]], factor: float) -> Floats:
     """Density of the wider prior over that of the old one at each cell: (n_cells,) array."""
     result = np.ones(table.n_cells)
     for index, of_form in enumerate(priors):

@@ -39,7 +39,7 @@ _LONGEST_STEP = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class Cells:
     """Cells of one effect, or of two together."""
 
     weights: Floats  # (n_cells,) array: prior probability, summing to 1
@@ -51,23 +51,23 @@ class Table:
     z: Floats  # (n_cells, n_parameters) array: standard coordinates of the first effect's parameters
     z_slopes: Floats  # (n_cells, n_parameters) array: their change over one standard deviation of the cell
     # of two effects together: the tables of both, the cells of the second running fastest
-    parts: tuple[Table, ...] = ()
+    parts: tuple[Cells, ...] = ()
 
     @property
     def n_cells(self) -> int:
         return int(self.weights.size)
 
-    def some(self, cells: slice | Rows) -> Table:
+    def some(self, cells: slice | Rows) -> Cells:
         """Some of the cells, with the weights that they have among all."""
         return replace(self, **{key: getattr(self, key)[cells] for key in _PER_CELL})
 
-    def of(self, rows: Rows) -> Table:
+    def of(self, rows: Rows) -> Cells:
         """The same cells for some of the modes, by their indices."""
         if np.array_equal(rows, np.arange(self.shift.shape[1])):
             return self
         return replace(self, shift=self.shift[:, rows], slopes=self.slopes[:, rows])
 
-    def member(self, which: int, cells: Rows | None = None) -> tuple[Table, Rows]:
+    def member(self, which: int, cells: Rows | None = None) -> tuple[Cells, Rows]:
         """The table of one of its effects, and which cell there each cell of this one has; by default of all."""
         cells = np.arange(self.n_cells) if cells is None else cells
         return (self.parts[which], np.divmod(cells, self.parts[1].n_cells)[which]) if self.parts else (self, cells)
@@ -81,9 +81,9 @@ class Table:
 _PER_CELL = ("weights", "shift", "slopes", "moved", "moved_slopes", "form", "z", "z_slopes")
 
 
-def nothing(n_modes: int, n_constants: int = 3) -> Table:
+def nothing(n_modes: int, n_constants: int = 3) -> Cells:
     """No effect: one cell without shift."""
-    return Table(
+    return Cells(
         weights=np.ones(1),
         shift=np.zeros((1, n_modes)),
         slopes=np.zeros((1, n_modes, 0)),
@@ -95,7 +95,7 @@ def nothing(n_modes: int, n_constants: int = 3) -> Table:
     )
 
 
-def tabulate(baseline: Baseline, laws: Sequence[FormLaw], cells: tuple[int, int, int] = FINE) -> Table:
+def tabulate(baseline: Baseline, laws: Sequence[FormLaw], cells: tuple[int, int, int] = FINE) -> Cells:
     """Tabulate an effect over all its forms, equally probable; without cells where no size of it leaves a plate."""
     n_tangents = max(len(law.form.free) for law in laws)
     parts = [_of_form(baseline, i, law, cells, n_tangents) for i, law in enumerate(laws)]
@@ -103,7 +103,7 @@ def tabulate(baseline: Baseline, laws: Sequence[FormLaw], cells: tuple[int, int,
     return replace(parts[0], **joined | {"weights": joined["weights"] / len(laws)})
 
 
-def together(one: Table, other: Table) -> Table:
+def together(one: Cells, other: Cells) -> Cells:
     """Two effects at once: their shifts and refits add."""
 
     def added(first: Floats, second: Floats) -> Floats:
@@ -114,7 +114,7 @@ def together(one: Table, other: Table) -> Table:
         parts = (np.repeat(first, len(second), axis=0), np.tile(second, (len(first), 1, 1)))
         return np.concatenate(parts, axis=2)
 
-    return Table(
+    return Cells(
         weights=np.outer(one.weights, other.weights).ravel(),
         shift=added(one.shift, other.shift),
         slopes=joined(one.slopes, other.slopes),
@@ -135,7 +135,7 @@ def joint_law(baseline: Baseline, one: Form, other: Form) -> FormLaw:
     return form_law(baseline, both).placed(baseline)
 
 
-def joint_table(baseline: Baseline, added: Table, laws: JointLaws) -> Table:
+def joint_table(baseline: Baseline, added: Cells, laws: JointLaws) -> Cells:
     """Two effects at once: exactly where there are laws of both, elsewhere as in `added`, and with its cells in its
     order."""
     (one, first), (other, second) = added.member(0), added.member(1)
@@ -198,7 +198,7 @@ def _finite(*values: Floats) -> NDArray[np.bool_]:
     return np.all([np.isfinite(one).reshape(len(one), -1).all(axis=1) for one in values], axis=0)
 
 
-def _of_form(baseline: Baseline, index: int, law: FormLaw, cells: tuple[int, int, int], n_tangents: int) -> Table:
+def _of_form(baseline: Baseline, index: int, law: FormLaw, cells: tuple[int, int, int], n_tangents: int) -> Cells:
     free = law.form.free
     axes = [_axis(one.prior, cells_along(len(free), cells)) for one in free]
     points = list(product(*(points for points, _ in axes)))
@@ -209,7 +209,7 @@ def _of_form(baseline: Baseline, index: int, law: FormLaw, cells: tuple[int, int
     good = _finite(shift, slopes, log_weights)
     weights = np.exp(np.where(good, log_weights, -np.inf))
     none = n_tangents - len(free)
-    return Table(
+    return Cells(
         weights=weights / max(weights.sum(), np.finfo(float).tiny),
         shift=shift,
         slopes=np.pad(slopes, ((0, 0), (0, 0), (0, none))),

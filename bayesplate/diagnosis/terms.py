@@ -19,7 +19,7 @@ import numpy as np
 from bayesplate.board.board import Board
 from bayesplate.board.quantity import Floats
 from bayesplate.diagnosis.baseline import Baseline, Rows
-from bayesplate.diagnosis.shifts import Table
+from bayesplate.diagnosis.shifts import Cells
 
 _MOST_NUMBERS = 200_000
 """Held at once of any one kind: larger arrays cost more to fetch and to give back than to fill."""
@@ -32,7 +32,7 @@ _LEAST = 1e-12
 class Terms:
     """Normal terms of a table: one per level of noise and cell, cells running fastest."""
 
-    table: Table  # of the modes that the readings are taken for
+    table: Cells  # of the modes that the readings are taken for
     baseline: Baseline
     noise: NoiseGrid
 

@@ -52,7 +52,7 @@ class AtHand:
 
 
 @dataclass(frozen=True, eq=False)
-class Explanation:
+class Belief:
     """One thing that may be the case, as equally probable normal terms of u."""
 
     members: tuple[str, ...]  # effects that are present; empty for none
@@ -97,7 +97,7 @@ class Beliefs:
     """What is believed now of one board, or of several together."""
 
     boards: tuple[KnownBoard, ...]
-    explanations: tuple[Explanation, ...]  # the most probable first
+    explanations: tuple[Belief, ...]  # the most probable first
     shared: tuple[str, ...] = ()  # names of what the boards share
     # what is believed: "readings", "prior" (readings, if there are any, were left aside) or "campaign"
     basis: str = "readings"
@@ -180,7 +180,7 @@ def prior_beliefs(board: Board, prior: PriorCard, rng: np.random.Generator, note
     return Beliefs((known,), (one,), basis="prior", notes=(*notes, *board.notes))
 
 
-def prior_explanation(board: Board, prior: PriorCard, rng: np.random.Generator) -> Explanation:
+def prior_explanation(board: Board, prior: PriorCard, rng: np.random.Generator) -> Belief:
     """What the prior says of a board, normal in the logarithms of its constants: no effect is thought of."""
     values, n, n_u = prior_medians(board, prior), board.symmetry.n, Parameters(board).fitted_columns.size
     middle, gradient = log_moduli(board, np.log(board.symmetry.free_of(values)))
@@ -194,7 +194,7 @@ def prior_explanation(board: Board, prior: PriorCard, rng: np.random.Generator) 
     design = np.vstack([to_stated, np.eye(n_u)[n:]])
     spread = np.r_[[prior.constants[names[i]].log_sd for i in order], np.ones(n_u - n)]
     root = np.linalg.solve(design, np.diag(spread))
-    return Explanation(
+    return Belief(
         members=(),
         words=NOTHING_LACKS,
         probability=1.0,

@@ -28,8 +28,8 @@ from bayesplate.planning.beliefs import (
     N_TERMS,
     NOTHING_LACKS,
     AtHand,
+    Belief,
     Beliefs,
-    Explanation,
     FormTerms,
     KnownBoard,
     Rows,
@@ -71,13 +71,13 @@ def is_unexplained(found: Found) -> bool:
     return not ranked or found.p_value(ranked[0].index) < PASSES
 
 
-def explanations_of(found: Found, left: Sequence[Answer], rng: np.random.Generator) -> tuple[Explanation, ...]:
+def explanations_of(found: Found, left: Sequence[Answer], rng: np.random.Generator) -> tuple[Belief, ...]:
     """Answers of a search, that of no effect with index 0, as explanations whose probabilities sum to one."""
     total = sum(one.support for one in left)
     return tuple(_explanation(found, one, one.support / total, rng) for one in left)
 
 
-def _explanation(found: Found, answer: Answer, probability: float, rng: np.random.Generator) -> Explanation:
+def _explanation(found: Found, answer: Answer, probability: float, rng: np.random.Generator) -> Belief:
     """An answer of a search as terms: cells and levels of noise drawn by what they weigh now."""
     base, hypothesis = found.ground.baseline, found.ground.hypotheses[answer.index]
     terms = hypothesis.terms
@@ -103,7 +103,7 @@ def _explanation(found: Found, answer: Answer, probability: float, rng: np.rando
     slopes = design @ np.linalg.inv(turn)
     shift = own.middle + table.shift[cells] - np.einsum("tru,tu->tr", slopes, start)
     middle, gradient = log_moduli(base.board, base.log_rigidities)
-    return Explanation(
+    return Belief(
         members=hypothesis.members,
         words=answer_words(found, answer) if answer.members else NOTHING_LACKS,
         probability=probability,

@@ -16,7 +16,7 @@ import numpy as np
 from bayesplate.board.material import MODULI
 from bayesplate.board.quantity import Floats
 from bayesplate.diagnosis.terms import log_sum, normalised
-from bayesplate.planning.beliefs import Beliefs, Explanation, entropy
+from bayesplate.planning.beliefs import Belief, Beliefs, entropy
 from bayesplate.planning.plan import Gain
 
 REFERENCES = (
@@ -144,7 +144,7 @@ class _Update:
     information: Floats
 
     @classmethod
-    def of(cls, one: Explanation, readings: Readings, k: int, free: Sequence[int]) -> _Update:
+    def of(cls, one: Belief, readings: Readings, k: int, free: Sequence[int]) -> _Update:
         slopes, variance = readings.slopes[k], readings.variance[k]
         expected = readings.shift[k] + np.einsum("tnu,tu->tn", slopes, one.mean)
         along = slopes @ one.covariance

@@ -10,7 +10,7 @@ import numpy as np
 from bayesplate.board.quantity import Floats
 from bayesplate.board.sessions import shared_share, unknown_discrepancies
 from bayesplate.frequencies.reading_errors import ReadingErrors
-from bayesplate.planning.beliefs import Beliefs, Explanation, FormTerms, KnownBoard, levels
+from bayesplate.planning.beliefs import Belief, Beliefs, FormTerms, KnownBoard, levels
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.laws import BareLaw, SolvedStation
 from bayesplate.planning.stations import Station
@@ -102,7 +102,7 @@ def given_first(
     return Readings.of(every)
 
 
-def _expected(one: Explanation, known: KnownBoard, law: BareLaw) -> tuple[Floats, Floats]:
+def _expected(one: Belief, known: KnownBoard, law: BareLaw) -> tuple[Floats, Floats]:
     """What is expected of the modes where u is zero, then of what a known mass adds; and the slopes of both.
 
     Arrays of (n_terms, (1 + n_spots) n_modes) and (.., n_u). Not a number where an explanation takes a reading for no
@@ -132,7 +132,7 @@ _TOO_FAR = 0.4
 """A shift of ln f beyond which a mode has lost its name."""
 
 
-def add_effects(one: Explanation, known: KnownBoard, law: BareLaw, shift: Floats, slopes: Floats) -> None:
+def add_effects(one: Belief, known: KnownBoard, law: BareLaw, shift: Floats, slopes: Floats) -> None:
     """Add what the effects of an explanation do to what is expected of the modes of a station, in place.
 
     To the shift where u is zero, (n_terms, (1 + n_spots) n_modes), of the modes, then of what a known mass at each spot

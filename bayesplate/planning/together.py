@@ -17,7 +17,7 @@ from bayesplate.campaign.scatter import expected_width
 from bayesplate.campaign.shared import Shared
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.reading_errors import ReadingErrors
-from bayesplate.planning.beliefs import NOTHING_LACKS, Beliefs, Explanation, KnownBoard, laws_of, log_moduli
+from bayesplate.planning.beliefs import NOTHING_LACKS, Belief, Beliefs, KnownBoard, laws_of, log_moduli
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.laws import BareLaw, bare_law
 from bayesplate.planning.stations import new_stations
@@ -78,7 +78,7 @@ def _joined(every: Sequence[_Linear], shared: Sequence[str]) -> Beliefs:
         wide = np.zeros((len(gradient.T), n_u))
         wide[:, columns] = one.known.columns
         known.append(replace(one.known, columns=wide, first_setup=int(setups[i])))
-    explanation = Explanation(
+    explanation = Belief(
         members=(),
         words=NOTHING_LACKS,
         probability=1.0,

@@ -15,7 +15,7 @@ from bayesplate.board.attached import DeclaredFluid
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.commands.problem import Problem
-from bayesplate.diagnosis.baseline import Baseline, Spectrum
+from bayesplate.diagnosis.baseline import Baseline, PossibleModes
 from bayesplate.diagnosis.known import known_fit, stated_effects
 from bayesplate.diagnosis.known_words import stated_sentence
 from bayesplate.diagnosis.stated import _states_differently, judge_stated, scores_given, stated_claims
@@ -155,7 +155,9 @@ def test_scores_are_those_of_a_bayesian_who_averages_over_the_noise(weighed):
     n = sum(len(setup.readings) for setup in board.setups)
     slopes, errors = rng.uniform(0.0, 0.5, (n, 3)), 0.004 * rng.normal(size=n)
     log_readings = log_measured(board)
-    every = Spectrum(log_readings - errors, slopes, np.zeros((n, 0)), (), np.zeros(0), (None,), lambda x: x @ slopes.T)
+    every = PossibleModes(
+        log_readings - errors, slopes, np.zeros((n, 0)), (), np.zeros(0), (None,), lambda x: x @ slopes.T
+    )
     fit = Baseline(board, {}, np.zeros(3), log_readings, every, np.arange(n), ())
     found = scores_given(fit, [[2], [5]])
     noise = board.setups[0].noise
