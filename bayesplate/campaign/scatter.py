@@ -46,12 +46,11 @@ class Scatter:
 
     @property
     def prior(self) -> Quantity:
-        """Of the standard deviation of the logarithm; its standard coordinate is what is sampled."""
+        """The prior of the standard deviation of the logarithm; its standard coordinate is what is sampled."""
         return Quantity.from_mean(0.0, self.of.scatter, "normal", lower=0.0)
 
     @property
     def unit(self) -> str:
-        """Of a logarithm."""
         return "1"
 
     def width(self, u: Floats) -> Floats:
@@ -60,7 +59,7 @@ class Scatter:
 
 
 def scatters_of(shared: Sequence[Shared]) -> tuple[Scatter, ...]:
-    """Those of the numbers that differ between boards, in their order."""
+    """Scatters of the numbers that differ between boards, in their order."""
     return tuple(Scatter(one) for one in shared if one.scatter)
 
 

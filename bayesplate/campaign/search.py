@@ -62,11 +62,11 @@ class BoardSearch:
     ground: Ground  # with the labels of each hypothesis
 
     def hypothesis(self, effects: tuple[str, ...]) -> Hypothesis | None:
-        """The one of these effects alone; None where the board cannot have them."""
+        """The hypothesis of these effects alone; None where the board cannot have them."""
         return next((one for one in self.ground.hypotheses if one.members == effects and one.swap is None), None)
 
     def log_evidence(self, effects: tuple[str, ...]) -> float:
-        """Of an effect of whatever size on this board, or of none."""
+        """ln of the evidence of an effect of whatever size on this board, or of none."""
         values = self.cells(effects)
         return float(log_sum(np.array([log_prior + log_likelihood for log_prior, log_likelihood in values.values()])))
 

@@ -136,7 +136,6 @@ def _own(member: Member, rng: np.random.Generator) -> Mapping[str, np.ndarray]:
 
 
 def population_summary(population: Population, prior: str, seed: int) -> PopulationSummary:
-    """What a summary says of a population."""
     rng = np.random.default_rng([seed, _LINE, 1])
     next_board = population.next_board(rng)
     return PopulationSummary(

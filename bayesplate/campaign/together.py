@@ -66,7 +66,6 @@ class Together:
 
     @property
     def coordinates(self) -> tuple[Shared | Scatter, ...]:
-        """What is learned: the shared numbers, then their scatters."""
         return (*self.shared, *scatters_of(self.shared))
 
     @cached_property
@@ -124,7 +123,7 @@ class Together:
         return moments(self._of_a_board, self.weights(without))
 
     def taught_draws(self, rng: np.random.Generator, n: int, without: Collection[int] = ()) -> Floats:
-        """Draws of what `taught` gives the moments of: (n, n_shared) array."""
+        """Draws of a board's own numbers as `taught`: (n, n_shared) array."""
         return self._of_a_board[rng.choice(len(self.points), size=n, p=self.weights(without))]
 
     def under_all(self, board: int) -> tuple[Floats, Floats]:

@@ -89,7 +89,6 @@ class Baseline:
 
     @property
     def n_modes(self) -> int:
-        """Number of readings."""
         return int(self.log_readings.size)
 
     @cached_property
@@ -129,7 +128,6 @@ class Baseline:
 
     @cached_property
     def places(self) -> tuple[Place, ...]:
-        """Places of the modes."""
         flat = [place for part in self.every.places for place in part]
         return tuple(flat[row] for row in self.rows)
 

@@ -37,7 +37,6 @@ class TermDraws:
         return len(self.log_rigidities)
 
     def at(self, picked: Rows) -> TermDraws:
-        """Some of the draws."""
         return TermDraws(*(getattr(self, one.name)[picked] for one in fields(self)))
 
 
@@ -115,7 +114,7 @@ def standard_sizes_of(found: Found, index: int, drawn: TermDraws, which: int) ->
 def sizes_of(
     found: Found, index: int, drawn: TermDraws, which: int
 ) -> Iterator[tuple[int, FormLaw, Rows, dict[str, Floats]]]:
-    """The same in SI units, by the name of the parameter, within the bounds of their priors."""
+    """Sizes of one effect at each draw in SI units, by parameter, within the bounds of their priors."""
     for i, law, rows, z in standard_sizes_of(found, index, drawn, which):
         values = {}
         for free, column in zip(law.form.free, z.T, strict=True):
@@ -125,7 +124,7 @@ def sizes_of(
 
 
 def joint_sizes_of(found: Found, index: int, drawn: TermDraws) -> Iterator[tuple[FormLaw, Rows, dict[str, Floats]]]:
-    """The same of both effects of a pair at once, of those of its draws for which there is a law of both."""
+    """Sizes of both effects of a pair at once, at those draws for which there is a law of both."""
     laws = found.ground.hypotheses[index].joint
     if not laws:
         return

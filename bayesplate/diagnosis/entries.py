@@ -180,7 +180,7 @@ def _without_need(found: Found, verdict: Verdict) -> Told | None:
 
 
 def _misfit(found: Found, index: int) -> Told | None:
-    """Too large a misfit with the candidate alone."""
+    """ "does not fit" where the misfit is too large with the candidate alone."""
     p_value = found.p_value(index)
     if p_value >= PASSES:
         return None
@@ -188,7 +188,7 @@ def _misfit(found: Found, index: int) -> Told | None:
 
 
 def _less_probable(found: Found, ranked: Sequence[Answer], name: str | None, index: int) -> Told:
-    """Its best answer beside the best of all."""
+    """ "less probable", with the support of its best answer beside that of the best of all."""
     best = ranked[0]
     own = max((one.support for one in ranked if one.index == index or name in one.members), default=0.0)
     mine, others = f"{own:.3f}", f"{best.support:.3f}"

@@ -164,7 +164,7 @@ def left_out_rms_cents(summary: Summary, carrying: Sequence[CarryingMode]) -> fl
 
 
 def _log_score(case: Case, side: Side) -> float | None:
-    """None where too few modes are left, or none that others foretell."""
+    """The log score of a model; None where too few modes are left, or none that others foretell."""
     if case.folded is None or not case.folded.counted.any():
         return None
     return log_score(case.found.ground, side.index, case.found.residual, case.folded.carried)
@@ -192,7 +192,7 @@ def _log_odds(found: Found) -> float | None:
 
 
 def _histogram(values: Floats) -> Histogram | None:
-    """None where there is nothing to count: without hypotheses no set has odds."""
+    """Values of simulated sets by number; None where they have none, for there are no hypotheses."""
     if not np.isfinite(values).all():
         return None
     counts, edges = np.histogram(values, bins=_N_BINS)

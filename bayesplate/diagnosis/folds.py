@@ -126,7 +126,7 @@ def carrying(found: Found, index: int) -> tuple[CarryingMode, ...]:
 
 
 def _under(found: Found, index: int) -> tuple[CarryingMode, ...]:
-    """The same under one hypothesis, at its most probable sizes: their priors count as one more observation each."""
+    """Carrying modes under one hypothesis, at its most probable sizes: each prior counts as one more observation."""
     terms, whole = found.ground.hypotheses[index].terms, found.ground.hypotheses[index].table
     baseline, board = terms.baseline, terms.baseline.board
     cell = int(np.argmax(found.cells(index)))

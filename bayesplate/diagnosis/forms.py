@@ -22,7 +22,6 @@ class Form:
 
     @property
     def title(self) -> str:
-        """Effect and detail."""
         return f"{self.effect} ({self.detail})" if self.detail else self.effect
 
 

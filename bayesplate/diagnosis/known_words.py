@@ -91,7 +91,7 @@ def known_table(known: Sequence[KnownModel]) -> Table | None:
 
 
 def known_titles(known: Sequence[KnownModel]) -> list[str]:
-    """Which model each is; the first is the board as it stands."""
+    """A title of each model; the first is the board as it stands."""
     return [AS_IT_STANDS, *map(model_words, known[1:])]
 
 
@@ -121,7 +121,7 @@ def known_sentence(known: Sequence[KnownModel]) -> str:
 
 
 def _of_some(known: Sequence[KnownModel]) -> list[str]:
-    """That left-out errors are not of all readings, where it is so."""
+    """A sentence where left-out errors are not of all readings."""
     n, n_all = known[0].n_left_out, known[0].n_readings
     if n in (0, n_all):
         return []
@@ -138,17 +138,16 @@ class _Errors:
         self.name = "left-out error" if self._is_left_out else "error in the fit"
 
     def of(self, one: KnownModel) -> float:
-        """Rms, cents."""
         left_out = one.leave_one_out_rms_cents if self._is_left_out else None
         return one.in_sample_rms_cents if left_out is None else left_out
 
     def shown(self, *models: KnownModel) -> list[str]:
-        """The same of some models in as many digits as the smallest of them needs."""
+        """Errors of some models, cents, with the same decimals."""
         return cents_alike(*map(self.of, models))
 
 
 def _clause(one: KnownModel, as_it_stands: KnownModel, errors: _Errors) -> tuple[str, bool]:
-    """What an effect does to {error}, and whether that rises; a stated one from the model without it."""
+    """What an effect does to {error}, in words, and whether that rises; a stated one from the model without it."""
     ends = (one, as_it_stands) if one.without else (as_it_stands, one)
     old, new = errors.shown(*ends)
     who = f"{effect_name(one.without[0])}, as the card states it," if one.without else effect_names(one.effects)

@@ -98,7 +98,7 @@ class FormLaw:
         return self.every_log_frequency(baseline, log_rigidities, values)[:, baseline.rows]
 
     def every_log_frequency(self, baseline: Baseline, log_rigidities: Floats, values: Mapping[str, Floats]) -> Floats:
-        """The same of all modes that the baseline's readings may be: (n, n_every) array."""
+        """ln f (Hz) of all modes that the baseline's readings may be, at the same values: (n, n_every) array."""
         there = _with_rigidities(baseline, _inputs(baseline, self.form) | dict(values), np.exp(log_rigidities).T)
         parts = [model.every_log_frequency(there, "exact") for model in self.models]
         return np.concatenate(parts, axis=1) + baseline.every.discrepancy

@@ -100,7 +100,7 @@ class Terms:
         return np.asarray(log_sum(log_masses) - self.baseline.half_log_det), np.asarray(mean)
 
     def _left_out(self, residuals: Floats) -> tuple[Floats, Floats]:
-        """The same with the weight of these cells, the change of volume not counted."""
+        """The same of these cells alone: ln of their weight in place of the evidence, no change of volume counted."""
         log_densities, inside = self._densities(residuals)
         white, along = self._whitening, self._tangents[0] @ self._whitening[:, None]
         seen = np.swapaxes(white, 1, 2) @ (white @ residuals.T)

@@ -60,7 +60,7 @@ class Verdict:
 
     @property
     def fitted_again(self) -> tuple[Answer, ...]:
-        """What it stands for, or what comes nearest."""
+        """Answers to fit again: those that the verdict stands for, or the nearest one."""
         return self.stands_for if self.nearest is None else (self.nearest,)
 
 
@@ -169,7 +169,7 @@ def answer_words(found: Found, answer: Answer) -> str:
 
 
 def alternatives_words(found: Found, told: Sequence[Answer]) -> str:
-    """Answers of which one is the case, in words; two effects that are one answer stay together."""
+    """Alternative answers in words; the two effects of a pair stay together."""
     words = [answer_words(found, one) for one in told]
     return ", or ".join(words) if any(len(one.members) > 1 for one in told) else joined(words, "or")
 

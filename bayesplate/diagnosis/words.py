@@ -127,7 +127,6 @@ class ConditionWords:
     digits: int = 2
 
     def shown(self, value: float | None) -> Value:
-        """A number of it as people read it."""
         return number(value, self.digits)
 
 
@@ -281,7 +280,7 @@ def warnings(diagnosis: Diagnosis) -> list[str]:
 
 
 def remarks(diagnosis: Diagnosis) -> list[str]:
-    """What else there is to know: the reason of the verdict, notes of the run."""
+    """The reason of the verdict, and notes of the run."""
     return [f"The reason: {diagnosis.reason}.", *diagnosis.notes]
 
 

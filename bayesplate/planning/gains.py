@@ -120,7 +120,7 @@ class _Mean:
 
     @classmethod
     def of_strata(cls, values: Sequence[Floats], weights: Floats) -> _Mean:
-        """Of one (n_draws, n) array a stratum; a single draw has no error."""
+        """From one (n_draws, n) array per stratum; a single draw has no error."""
         mean = sum(p * one.mean(axis=0) for p, one in zip(weights, values, strict=True))
         many = ((p, one) for p, one in zip(weights, values, strict=True) if len(one) > 1)
         variance = sum(p**2 * one.var(axis=0, ddof=1) / len(one) for p, one in many)

@@ -71,7 +71,6 @@ class Planner:
     costs: Costs = Costs()
 
     def gain(self, readings: Readings, minutes: float = 1.0, n_draws: int = N_DRAWS) -> Gain:
-        """What readings are expected to give."""
         rng = stream(self.seed, "gains of further readings")
         return expected_gain(self.beliefs, readings, rng, self.goal, minutes, n_draws)
 
@@ -171,7 +170,7 @@ class Planner:
             yield self._proposal("size", its, "", told, minutes, readings, about)
 
     def _of_looks(self) -> Iterator[Proposal]:
-        """Effects that are looked at without a frequency."""
+        """Proposals to look at an effect without reading a frequency."""
         for effect, look in LOOKS.items():
             readings, name = look_readings(self.beliefs, effect), self.beliefs.boards[0].board.name
             if readings is not None:

@@ -128,7 +128,7 @@ def _has_unweighed(board: Board) -> bool:
 
 
 def _of_taper(board: Board) -> float:
-    """Of a taper from readings at the grid of places: a regression on the place."""
+    """Standard deviation of a taper from readings at the grid of places, by a regression on the place."""
     at_place = np.hypot(_CALLIPER / board.inputs["thickness"].mean, _UNEVEN)
     leverage = len(GRID[1]) * sum((s - 0.5) ** 2 for s in GRID[0])
     return float(at_place / np.sqrt(leverage))

@@ -64,7 +64,7 @@ class Station:
         return tuple((s, t) for s in along for t in across)
 
     def places(self, board: Board) -> tuple[tuple[float, float], ...]:
-        """The same on the whole board, m."""
+        """The spots on the whole board, m."""
         return places_on(board, self.setup, self.spots)
 
     def system(self, board: Board) -> System:

@@ -98,7 +98,7 @@ def first_line(
 
 
 def _of_doubt(gain: Gain, explanations: Sequence[ExplanationEntry], entropy: float) -> str:
-    """What becomes of the doubt between explanations."""
+    """How far the doubt between explanations would fall, in words; empty where it is not clear that it would."""
     drop, error = gain.explanations, gain.explanations_error
     if drop is None or error is None or drop < max(WORTH, _CLEAR * error):
         return ""
@@ -114,7 +114,7 @@ def _names(explanations: Sequence[ExplanationEntry]) -> str:
 
 
 def _of_intervals(shrunk: Mapping[str, float]) -> str:
-    """What becomes of the intervals that shrink at all."""
+    """How far intervals would shrink, in words."""
     if not shrunk:
         return ""
     noun, verb = ("interval", "it is") if len(shrunk) == 1 else ("intervals", "they are")

@@ -113,7 +113,7 @@ def _linear(board: Board, prior: PriorCard, shared: Sequence[Shared]) -> _Linear
 def _judged(
     board: Board, prior: PriorCard, shared: Sequence[Shared], values: Values, noise: Floats, laws: tuple[BareLaw, ...]
 ) -> _Linear:
-    """What the readings of a board's laws say."""
+    """A board with the precision that the readings of its laws give."""
     columns = _columns(board, prior, shared, values, noise)
     n, n_own = board.symmetry.n, columns.shape[1] - len(shared)
     precision = np.diag(np.r_[np.zeros(n), np.ones(n_own - n), np.zeros(len(shared))])

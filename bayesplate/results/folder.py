@@ -111,7 +111,7 @@ class OutputFolder:
             _remove_empty(path.parent, self.path)
 
     def _put_back(self) -> None:
-        """Move them back from where a run left nothing in their place."""
+        """Move the earlier results back from where a run left nothing in their place."""
         if not self.earlier.is_dir() or any(path.exists() for path in self._results()):
             return
         for kept in [path for path in self.earlier.rglob("*") if path.is_file()]:

@@ -103,12 +103,10 @@ class Labelled(Protocol):
     """A row of a mode of a setup."""
 
     @property
-    def setup(self) -> str:
-        """Name of the setup."""
+    def setup(self) -> str: ...
 
     @property
-    def label(self) -> str:
-        """Label of the mode."""
+    def label(self) -> str: ...
 
 
 def foretold(rows: Iterable[Row], carrying: Iterable[CarryingMode]) -> list[Row]:

@@ -116,13 +116,12 @@ def _proposed(setup: str, hertz: float, found: Sequence[tuple[str | None, float]
 
 
 def _label(way: Way, setup: str, hertz: float) -> str | None:
-    """Of a peak in one way to label them; None where it is no mode."""
+    """Label of a peak in one way to label them; None where it is no mode."""
     readings = (one for each in way.board.setups if each.name == setup for one in each.readings)
     return next((str(one.label) for one in readings if one.frequency.mean == hertz), None)
 
 
 def sheet_report(sheet: Sheet) -> SheetReport:
-    """A sheet without its shapes."""
     mixtures = tuple(MixtureRow(one.name, one.modulus, dict(one.weights)) for one in sheet.combined)
     rows = tuple(_row(mode) for mode in sheet.modes)
     return SheetReport(sheet.setup, dict(sheet.edges), sheet.theory, rows, mixtures)

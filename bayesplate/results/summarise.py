@@ -131,14 +131,12 @@ def summarise(
 
 
 def model_header(problem: PosedProblem) -> ModelHeader:
-    """What is fitted."""
     posterior = problem.posterior
     theory, effects = posterior.models[0].system.theory, tuple(problem.board.effects)
     return ModelHeader(theory, posterior.law, effects, posterior.robust, problem.prior.name, problem.board.isotropic)
 
 
 def sampler_health(chains: Chains, convergence: Convergence) -> SamplerHealth:
-    """How the sampler fared."""
     n_ensembles, n_steps, n_walkers, _ = chains.draws.shape
     return SamplerHealth(
         ensembles=n_ensembles,
