@@ -1,22 +1,26 @@
-"""summary.json of a campaign as types: what its boards share, and every board's own summary."""
+"""A campaign in summary.json, posterior.nc and its check: what its boards share, and every board's own."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from bayesplate.board.material import MODULI
-from bayesplate.campaign.agreement import LeftOut, refusing
 from bayesplate.campaign.boards import Member
+from bayesplate.campaign.claim import LeftOut, refusing
 from bayesplate.campaign.common import CommonResidual
 from bayesplate.campaign.learning import ASTRAY, Learnt
 from bayesplate.campaign.population import Population
 from bayesplate.campaign.scatter import scatters_of
 from bayesplate.campaign.together import FEWEST_POINTS, values_of
 from bayesplate.effects.words import joined
+from bayesplate.posterior.inference import MOST_DRAWS_A_CHAIN
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
+from bayesplate.posterior.thinning import thin_walker_major
+from bayesplate.results.archive import DRAWN, sample_stats, tree_of
 from bayesplate.results.checking import CheckReport
 from bayesplate.results.contract import Elastic, Spread
 from bayesplate.results.summary import SamplerHealth, Summary
@@ -216,3 +220,30 @@ class CampaignCheck:
     def __repr__(self) -> str:
         told = ", ".join(f"{name} ({one.expected_sd:.2f} of its prior's sd)" for name, one in self.shared.items())
         return f"<CampaignCheck of {self.name}: {len(self.boards)} boards; {told or 'nothing shared'}>"
+
+
+def archive_name(name: str) -> str:
+    """The name of a shared number as a variable: "transverse_shear.G_xz over E_x", because netCDF keeps the slash."""
+    return name.replace(" / ", " over ")
+
+
+def shared_tree(learnt: Learnt, attributes: Mapping[str, str]) -> Any:
+    """Draws of the shared numbers and scatters, SI, each board's log likelihood of them, the sampler's health:
+    DataTree."""
+    chains, convergence, together = learnt.chains, learnt.convergence, learnt.together
+    thinned = [
+        thin_walker_major(each, chains.burn_in, convergence.tau_max, n_draws_max=MOST_DRAWS_A_CHAIN)
+        for each in (chains.draws, chains.log_prob)
+    ]
+    z, log_posterior = thinned
+    likelihood = together.log_likelihoods(z.reshape(-1, z.shape[-1])).T.reshape(*z.shape[:2], -1)
+    values = values_of(together.coordinates, z)
+    return tree_of(
+        {
+            "posterior": {archive_name(name): (DRAWN, np.asarray(each)) for name, each in values.items()},
+            "log_likelihood": {"board": ((*DRAWN, "name"), likelihood)},
+            "sample_stats": sample_stats(log_posterior, convergence),
+        },
+        {"name": together.names, "parameter": [archive_name(one.name) for one in together.coordinates]},
+        attributes,
+    )

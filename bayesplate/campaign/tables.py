@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from bayesplate.board.parameter import unit_of_people
-from bayesplate.campaign.agreement import LeftOut
-from bayesplate.campaign.claim import TaughtBoard
+from bayesplate.campaign.claim import LeftOut, TaughtBoard
 from bayesplate.campaign.common import CommonResidual
 from bayesplate.campaign.diagnosis import CampaignDiagnosis, words_of
 from bayesplate.campaign.summary import CampaignCheck, CampaignSummary, PopulationSummary, SharedNumber

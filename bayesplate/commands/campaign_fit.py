@@ -14,9 +14,8 @@ import numpy as np
 
 from bayesplate.board.board import Board
 from bayesplate.board.prior import PriorCard
-from bayesplate.campaign.agreement import left_out
-from bayesplate.campaign.archive import shared_tree
 from bayesplate.campaign.boards import Member
+from bayesplate.campaign.claim import left_out
 from bayesplate.campaign.common import common_residuals
 from bayesplate.campaign.diagnosis import CampaignDiagnosis
 from bayesplate.campaign.learning import Learnt, learn
@@ -28,6 +27,7 @@ from bayesplate.campaign.summary import (
     learning_warnings,
     population_summary,
     shared_numbers,
+    shared_tree,
 )
 from bayesplate.commands.campaign import Campaign
 from bayesplate.commands.fitting import FIT, FitResult, Run, Stages, not_converged

@@ -9,7 +9,7 @@ import pytest
 from linear_boards import exactly_together, linear_boards, log_evidence
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.campaign.agreement import left_out, p_value, refusing
+from bayesplate.campaign.claim import left_out, p_value, refusing
 from bayesplate.campaign.pulls import Pull
 
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from linear_boards import exactly_together, linear_boards
 
-from bayesplate.campaign.agreement import left_out
-from bayesplate.campaign.claim import LEAST_GAIN, TaughtBoard, judge
+from bayesplate.campaign.claim import LEAST_GAIN, TaughtBoard, judge, left_out
 
 N_BOARDS = 8
 

@@ -12,7 +12,7 @@ from scipy.stats import norm
 
 from bayesplate.board.quantity import Quantity
 from bayesplate.campaign import scatter, together
-from bayesplate.campaign.agreement import left_out, p_value
+from bayesplate.campaign.claim import left_out, p_value
 from bayesplate.campaign.pulls import Pull
 from bayesplate.campaign.scatter import ScatteredLikelihood
 from bayesplate.campaign.shared import Shared

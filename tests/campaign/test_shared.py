@@ -10,9 +10,8 @@ from made_campaigns import MASS
 from scipy.linalg import block_diag
 
 from bayesplate.campaign import learning
-from bayesplate.campaign.agreement import left_out
 from bayesplate.campaign.boards import Member, _joint
-from bayesplate.campaign.claim import judge, rms_cents, taught_boards
+from bayesplate.campaign.claim import judge, left_out, rms_cents, taught_boards
 from bayesplate.campaign.learning import learn
 from bayesplate.campaign.likelihood import moments
 from bayesplate.commands.campaign_diagnose import _without_shared

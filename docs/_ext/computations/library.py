@@ -14,7 +14,7 @@ from bayesplate import errors
 from bayesplate.board.setup import CLAMPED_NOISE, DEFAULT_NOISE
 from bayesplate.board.shelf import card_names
 from bayesplate.campaign import evidence, likelihood, population, scatter
-from bayesplate.campaign.agreement import p_value
+from bayesplate.campaign.claim import p_value
 from bayesplate.campaign.search import OF_TWO
 from bayesplate.campaign.search import PRIOR as WAYS_BEFORE
 from bayesplate.commands.prepare import prepare
