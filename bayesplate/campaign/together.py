@@ -44,11 +44,7 @@ class Together:
 
     @classmethod
     def of(
-        cls,
-        shared: Sequence[Shared],
-        names: Sequence[str],
-        likelihoods: Sequence[Likelihood],
-        pulls: Sequence[Pull],
+        cls, shared: Sequence[Shared], names: Sequence[str], likelihoods: Sequence[Likelihood], pulls: Sequence[Pull]
     ) -> Together:
         """Boards together, their points around all that they, or all but one of them, find likely."""
         weaker = [one.scattered(expected_width(shared)) for one in pulls]

@@ -80,10 +80,7 @@ def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Ne
 
 
 def named_in_part(
-    found: Found,
-    verdict: Verdict,
-    folded: Nested | None,
-    others: Iterable[tuple[str, Found]] | None = None,
+    found: Found, verdict: Verdict, folded: Nested | None, others: Iterable[tuple[str, Found]] | None = None
 ) -> tuple[str, ...]:
     """Effects that explain readings in part though something else remains; none where that cannot be said.
 

@@ -11,13 +11,7 @@ import numpy as np
 from bayesplate.board.quantity import Floats
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.forms import Form, forms
-from bayesplate.diagnosis.hypotheses import (
-    Hypothesis,
-    hypotheses,
-    log_evidences,
-    odds_against_none,
-    probabilities,
-)
+from bayesplate.diagnosis.hypotheses import Hypothesis, hypotheses, log_evidences, odds_against_none, probabilities
 from bayesplate.diagnosis.laws import FormLaw, form_law
 from bayesplate.diagnosis.shifts import COARSE, Cells, refitted, tabulate
 from bayesplate.diagnosis.signatures import Signature, signature

@@ -24,15 +24,7 @@ from bayesplate.results.contract import Spread
 from bayesplate.results.fit_tables import write_tables
 from bayesplate.results.folder import BEFORE_AFTER, KNOWN_EFFECTS
 from bayesplate.results.tables import Cell, Row, Table, by_constant, constants_table, notebook
-from bayesplate.results.words import (
-    GPA,
-    Value,
-    decimals,
-    interval,
-    is_isotropic,
-    number,
-    plus_minus,
-)
+from bayesplate.results.words import GPA, Value, decimals, interval, is_isotropic, number, plus_minus
 
 _WORTH_A_ROW = 0.01
 _NARROW = ("effect", "shift", "visible", "size (90 %)", "fate")

@@ -36,12 +36,7 @@ class StationReadings:
     with_mass: Mapping[int, Readings]
 
 
-def station_readings(
-    beliefs: Beliefs,
-    known: KnownBoard,
-    law: BareLaw,
-    rng: np.random.Generator,
-) -> StationReadings:
+def station_readings(beliefs: Beliefs, known: KnownBoard, law: BareLaw, rng: np.random.Generator) -> StationReadings:
     """What each explanation expects of everything that could be read in a station of a board."""
     station, board = law.station, known.board
     n, n_old = len(station.setup.readings), station.n_old

@@ -154,7 +154,5 @@ class Joint:
         apart = logs - mean[:, None]
         covariance = (apart[:, None] * apart[None]).sum(axis=2) / (logs.shape[1] - 1)
         return cls(
-            JOINT,
-            tuple(float(one) for one in mean),
-            tuple(tuple(float(one) for one in row) for row in covariance),
+            JOINT, tuple(float(one) for one in mean), tuple(tuple(float(one) for one in row) for row in covariance)
         )

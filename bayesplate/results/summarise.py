@@ -42,12 +42,7 @@ HIGH_EXACT_ERROR = 0.5
 
 
 def unconverged_summary(
-    problem: PosedProblem,
-    chains: Chains,
-    convergence: Convergence,
-    seed: int,
-    versions: Mapping[str, str],
-    sha256: str,
+    problem: PosedProblem, chains: Chains, convergence: Convergence, seed: int, versions: Mapping[str, str], sha256: str
 ) -> Unconverged:
     """The summary of a run that failed the gate."""
     return Unconverged(
@@ -64,12 +59,7 @@ def unconverged_summary(
 
 
 def summarise(
-    inference: Inference,
-    draws: Draws,
-    assessment: Assessment,
-    seed: int,
-    versions: Mapping[str, str],
-    card_sha256: str,
+    inference: Inference, draws: Draws, assessment: Assessment, seed: int, versions: Mapping[str, str], card_sha256: str
 ) -> Summary:
     """The summary of a converged fit."""
     problem = inference.problem

@@ -15,11 +15,7 @@ MISSING = "–"
 CONSTANTS = {"E_x": "along the grain", "E_y": "across the grain", "G_xy": "shear"}
 _ANY = "in any direction"
 CONSTANTS_OF_ISOTROPIC = {"E_x": _ANY, "E_y": _ANY, "G_xy": "shear"}
-STIFFNESS = {
-    "E_x": "stiffness along the grain",
-    "E_y": "stiffness across the grain",
-    "G_xy": "shear stiffness",
-}
+STIFFNESS = {"E_x": "stiffness along the grain", "E_y": "stiffness across the grain", "G_xy": "shear stiffness"}
 """What each modulus is, to be read without its symbol."""
 STIFFNESS_OF_ISOTROPIC = {"E_x": f"stiffness {_ANY}", "E_y": f"stiffness {_ANY}", "G_xy": "shear stiffness"}
 
