@@ -8,7 +8,7 @@ from pathlib import Path
 
 from bayesplate.board.parameter import unit_of_people
 from bayesplate.diagnosis.known_words import known_table
-from bayesplate.diagnosis.result import Amplitude, CandidateEntry, Diagnosis, Finalist
+from bayesplate.diagnosis.result import Amplitude, Diagnosis, EffectEntry, Finalist
 from bayesplate.diagnosis.words import (
     CONDITIONS,
     MERITS,
@@ -17,7 +17,6 @@ from bayesplate.diagnosis.words import (
     names_of,
     verdict_sentences,
     warnings,
-    worth_showing,
 )
 from bayesplate.effects.words import effect_name
 from bayesplate.results.contract import Spread
@@ -27,17 +26,9 @@ from bayesplate.results.tables import Cell, Row, Table, by_constant, constants_t
 from bayesplate.results.words import GPA, Value, decimals, interval, is_isotropic, number, plus_minus
 
 _WORTH_A_ROW = 0.01
+_UNLIKELY = 0.01
+"""Probability below which an exchange of two labels is not worth showing: any two neighbours are a candidate."""
 _NARROW = ("effect", "shift", "visible", "size (90 %)", "fate")
-_WIDE = (
-    "effect",
-    "shift",
-    "visible",
-    "E_x / E_y / G_xy off by, %",
-    "inclusion probability",
-    "size (90 %)",
-    "looks like",
-    "rejected because",
-)
 
 
 def every_table(diagnosis: Diagnosis) -> tuple[Table, ...]:
@@ -150,31 +141,29 @@ def sizes_table(diagnosis: Diagnosis) -> Table | None:
 def candidates_table(diagnosis: Diagnosis, *, narrow: bool = False) -> Table | None:
     """Candidates, the most probable first, and why each was rejected; a narrow one lacks bias and look-alikes. None of
     none."""
-    shown = sorted(worth_showing(diagnosis), key=lambda one: -one.inclusion_probability)
+    likely = (
+        one for one in diagnosis.candidates if isinstance(one, EffectEntry) or one.inclusion_probability >= _UNLIKELY
+    )
+    shown = sorted(likely, key=lambda one: -one.inclusion_probability)
     if not shown:
         return None
-    columns = _NARROW if narrow else _WIDE
-    rows = []
-    for name, one in zip(names_of(shown), shown, strict=True):
-        cells = _cells(name, one)
-        rows.append(tuple(cells[column] for column in columns))
+    every: list[dict[str, Cell]] = [
+        {
+            "effect": name,
+            "shift": number(one.raw_rms_cents, 1),
+            "visible": number(one.visible_rms_cents, 1),
+            "E_x / E_y / G_xy off by, %": _bias(one.bias_percent),
+            "inclusion probability": number(one.inclusion_probability, 3),
+            "size (90 %)": _size(one.amplitude),
+            "looks like": ", ".join(map(effect_name, one.look_alikes)) or None,
+            "rejected because": one.rejected_because or None,
+            "fate": one.fate,
+        }
+        for name, one in zip(names_of(shown), shown, strict=True)
+    ]
+    columns = _NARROW if narrow else tuple(column for column in every[0] if column != "fate")
     title = "Candidates at their usual size: shift of the modes, rms cents, and what of it shows"
-    return Table(title, columns, tuple(rows))
-
-
-def _cells(name: str, one: CandidateEntry) -> Mapping[str, Cell]:
-    """Every cell that a row of a candidate may have, by its column."""
-    return {
-        "effect": name,
-        "shift": number(one.raw_rms_cents, 1),
-        "visible": number(one.visible_rms_cents, 1),
-        "E_x / E_y / G_xy off by, %": _bias(one.bias_percent),
-        "inclusion probability": number(one.inclusion_probability, 3),
-        "size (90 %)": _size(one.amplitude),
-        "looks like": ", ".join(effect_name(other) for other in one.look_alikes) or None,
-        "rejected because": one.rejected_because or None,
-        "fate": one.fate,
-    }
+    return Table(title, columns, tuple(tuple(cells[column] for column in columns) for cells in every))
 
 
 def _summing(shares: Sequence[float]) -> list[str]:

@@ -19,8 +19,6 @@ from bayesplate.results.words import Value, cents_alike, number, percent
 
 TOO_FEW = "the readings are too few to choose anew without each of them"
 NONE_LEFT = "hardly a mode is left that does not carry a constant or a size alone"
-_UNLIKELY = 0.01
-"""Probability below which an exchange of two labels is not worth showing: any two neighbours are a candidate."""
 
 
 @dataclass(frozen=True)
@@ -168,15 +166,6 @@ def _change(diagnosis: Diagnosis) -> tuple[str, bool]:
     if old == new:
         return f"{name} stayed at {new} cents", False
     return f"{name} {'fell' if after < before else 'rose'} from {old} to {new} cents", after < before
-
-
-def worth_showing(diagnosis: Diagnosis) -> tuple[CandidateEntry, ...]:
-    """Every effect, and of the exchanged labels those that are not out of the question."""
-    return tuple(
-        one
-        for one in diagnosis.candidates
-        if not isinstance(one, ExchangeEntry) or one.inclusion_probability >= _UNLIKELY
-    )
 
 
 def names_of(candidates: Sequence[CandidateEntry]) -> list[str]:
