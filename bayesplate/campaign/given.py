@@ -58,7 +58,7 @@ class GivenShared:
         return found
 
     def theta(self, own: Floats, z: Floats) -> Floats:
-        """All columns of the board, (n_draws, n_dim), from its own, (n_draws, n_own), and the shared z, (n_draws,
+        """All columns of the board, (n_draws, n_dim), from its own, (n_draws, n_own), and shared z, (n_draws,
         n_shared)."""
         theta = np.zeros((len(own), self._parameters.n_dim))
         theta[:, self.own_columns] = own

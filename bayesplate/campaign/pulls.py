@@ -34,8 +34,7 @@ class Pull:
         return cls(told, (directions * (gained > 0.0)) @ directions.T @ lean)
 
     def scattered(self, width: Floats) -> Pull:
-        """What it says of the middle about which boards' own numbers scatter: by these standard deviations, zero of
-        none."""
+        """What it says of the middle about which boards' own numbers scatter, with these standard deviations."""
         weaker = np.linalg.inv(np.eye(width.size) + self.precision * width**2)
         return Pull(np.asarray(weaker @ self.precision), np.asarray(weaker @ self.lean))
 

@@ -228,8 +228,7 @@ def archive_name(name: str) -> str:
 
 
 def shared_tree(learnt: Learnt, attributes: Mapping[str, str]) -> Any:
-    """Draws of the shared numbers and scatters, SI, each board's log likelihood of them, the sampler's health:
-    DataTree."""
+    """Draws of shared numbers and scatters, SI, each board's log likelihood of them, the sampler's health: DataTree."""
     chains, convergence, together = learnt.chains, learnt.convergence, learnt.together
     thinned = [
         thin_walker_major(each, chains.burn_in, convergence.tau_max, n_draws_max=MOST_DRAWS_A_CHAIN)

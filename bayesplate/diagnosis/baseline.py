@@ -187,8 +187,8 @@ class Baseline:
         return 0.0 if peaks is None or at not in peaks.readings else peaks.log_density_alone(at)
 
     def refitted_to(self, shift: Floats) -> tuple[Floats, Floats]:
-        """What the constants, fitted again by weights, leave of an (n_modes,) shift, never more than it, and the step
-        in ln D."""
+        """What constants, fitted again by weights, leave of an (n_modes,) shift, never more than it; their step in ln
+        D."""
         if not np.isfinite(shift).all():
             return np.full(shift.size, np.nan), np.full(self.log_rigidities.size, np.nan)
         predict = _of_rows(self.every.predict, self.rows)

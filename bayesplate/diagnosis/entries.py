@@ -25,8 +25,7 @@ _LIKELY = 0.1
 def effect_entry(
     found: Found, verdict: Verdict, ranked: Sequence[Answer], one: Candidate, doubled: float
 ) -> EffectEntry:
-    """What there is to say of a candidate effect; `doubled` is its inclusion probability with every prior twice as
-    wide."""
+    """All of a candidate effect; `doubled` is its inclusion probability with every prior twice as wide."""
     ground = found.ground
     index = next(i for i, other in enumerate(ground.hypotheses) if other.members == (one.name,))
     gained = float(found.log_evidence[index] - found.log_evidence[0])

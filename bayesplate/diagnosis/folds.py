@@ -47,8 +47,7 @@ class Nested:
 
     @property
     def counted(self) -> NDArray[np.bool_]:
-        """Which errors count, (n_sets, n_modes): of readings that are a mode before and after, and that others
-        foretell."""
+        """Which errors count, (n_sets, n_modes): of readings that are a mode before and after and not carried."""
         counted = np.isfinite(self.before) & np.isfinite(self.after)
         counted[:, list(self.carried)] = False
         return counted
@@ -100,8 +99,7 @@ def log_score(ground: Ground, index: int, residual: Floats, carried: Collection[
 
 
 def log_score_gains(ground: Ground, residual: Floats, chosen: Rows, carried: Collection[int] = ()) -> Floats:
-    """What the choice of each reading's fold adds to the log density of the readings left out: one per mode that
-    counts."""
+    """What each fold's choice adds to the log density of the readings left out: one per mode that counts."""
     scores = {int(index): _log_scores(ground, int(index), residual) for index in {0, *chosen}}
     gains = [scores[int(chosen[mode[0]])][i] - scores[0][i] for i, mode in enumerate(ground.baseline.same_modes)]
     return np.array(gains)[_foretold(ground, carried)]

@@ -33,8 +33,7 @@ _MOST_WAYS, _WORTH = 6, 5.0
 
 
 def with_own_labels(ground: Ground) -> Ground:
-    """The hypotheses about a board, each with the labels that readings likely have if it holds; unchanged if all are
-    sure."""
+    """The hypotheses about a board, each with the labels that readings likely have if it holds."""
     baseline = ground.baseline
     if not baseline.every.is_open:
         return ground

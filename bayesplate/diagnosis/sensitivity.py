@@ -95,8 +95,7 @@ def _inside(prior: Quantity, factor: float) -> float:
 
 @lru_cache(maxsize=2)  # the verdict and the averages ask for the same
 def under_exact_law(found: Found) -> Found | None:
-    """The same search, every evidence corrected to the exact law; None where no draw of any hypothesis is a plate by
-    it."""
+    """The same search, every evidence corrected to the exact law; None where no draw is a plate by it."""
     rng = np.random.default_rng(0)
     corrections = np.full(found.probability.size, _correction(found, 0, rng))
     worth = found.probability > _WORTH * found.probability.max()

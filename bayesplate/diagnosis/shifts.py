@@ -136,8 +136,7 @@ def joint_law(baseline: Baseline, one: Form, other: Form) -> FormLaw:
 
 
 def joint_table(baseline: Baseline, added: Cells, laws: JointLaws) -> Cells:
-    """Two effects at once: exactly where there are laws of both, elsewhere as in `added`, and with its cells in its
-    order."""
+    """Two effects at once: exactly where there are laws of both, elsewhere as in `added`, whose cells it has."""
     (one, first), (other, second) = added.member(0), added.member(1)
     found = {key: getattr(added, key).copy() for key in ("shift", "moved", "slopes", "moved_slopes")}
     for (i, j), law in laws.items():

@@ -50,8 +50,7 @@ class StatedClaim:
 def judge_stated(
     effects: Sequence[str], predicts: str, before: Floats, after: Floats, gains: Floats
 ) -> StatedClaim | None:
-    """Judge effects that the card states by errors of prediction, ln f, and each mode's gain in log density; None of
-    too few."""
+    """Judge stated effects by errors of prediction, ln f, and each mode's gain in log density; None of too few."""
     if gains.size < _FEWEST:
         return None
     old, new = (rms(cents(errors)) or 0.0 for errors in (before, after))

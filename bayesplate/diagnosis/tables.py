@@ -139,8 +139,7 @@ def sizes_table(diagnosis: Diagnosis) -> Table | None:
 
 
 def candidates_table(diagnosis: Diagnosis, *, narrow: bool = False) -> Table | None:
-    """Candidates, the most probable first, and why each was rejected; a narrow one lacks bias and look-alikes. None of
-    none."""
+    """Candidates, the most probable first, and why each was rejected; narrow for a terminal. None if there are none."""
     likely = (
         one for one in diagnosis.candidates if isinstance(one, EffectEntry) or one.inclusion_probability >= _UNLIKELY
     )

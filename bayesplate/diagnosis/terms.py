@@ -181,8 +181,7 @@ def noise_grid(board: Board, *, few: bool = False, reach: Sequence[float] = ()) 
 
 
 def reach_of(board: Board, setup_index: Rows, residual: Floats) -> tuple[float, ...]:
-    """How far up the levels of each setup's noise have to go for its residual (ln f; NaN: no mode): standard
-    coordinates."""
+    """How far up each setup's noise levels have to go for its residual (ln f; NaN: no mode), standard coordinates."""
     found = []
     for i, setup in enumerate(board.setups):
         own = residual[(setup_index == i) & np.isfinite(residual)]

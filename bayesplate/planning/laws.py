@@ -115,8 +115,7 @@ class BareLaw:
 
 
 def bare_law(board: Board, station: Station, values: Values, drawn: Sequence[Values] = ()) -> BareLaw:
-    """Solve a station at an estimate; the slopes at plates drawn instead, where they have its modes. KeyError if it
-    lacks one."""
+    """Solve a station at an estimate, its slopes at the plates drawn instead that have its modes; KeyError without."""
     slopes, inputs, offset = _linear(board, station, values)
     found = SolvedStation.of(station, board, values)
     solved, n = found.bare_and_added, board.symmetry.n
