@@ -93,7 +93,7 @@ class FormLaw:
     models: tuple[SetupModel, ...]  # with the exact law
 
     def log_frequencies(self, baseline: Baseline, log_rigidities: Floats, values: Mapping[str, Floats]) -> Floats:
-        """ln f (Hz) of labelled modes, (n, n_modes), at (n, n_constants) ln D and (n,) values of free parameters, SI."""
+        """ln f (Hz) of labelled modes, (n, n_modes), at (n, n_constants) ln D and (n,) free parameters, SI."""
         return self.every_log_frequency(baseline, log_rigidities, values)[:, baseline.rows]
 
     def every_log_frequency(self, baseline: Baseline, log_rigidities: Floats, values: Mapping[str, Floats]) -> Floats:
