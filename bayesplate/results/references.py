@@ -11,12 +11,13 @@ from bayesplate.frequencies.system import system_of
 
 PAPER = (
     "M. Ducceschi, S. Duran, H. Tahvanainen, L. Ausiello: A method to estimate the rectangular orthotropic plate "
-    "elastic constants using least-squares and Chladni patterns. [the frequency model, least squares, the percentile method]"
+    "elastic constants using least-squares and Chladni patterns. [the frequency model, least squares, the percentile "
+    "method]"
 )
 ELEMENT = (
     "F. K. Bogner, R. L. Fox, L. A. Schmit: The generation of inter-element-compatible stiffness and mass matrices "
-    "by the use of interpolation formulas. Proc. Conf. Matrix Methods in Structural Mechanics, Wright-Patterson AFB, 397-443 "
-    "(1965). [the plate's finite elements]"
+    "by the use of interpolation formulas. Proc. Conf. Matrix Methods in Structural Mechanics, Wright-Patterson AFB, "
+    "397-443 (1965). [the plate's finite elements]"
 )
 THIN = "Kirchhoff's thin orthotropic plate, as in eq. (1) to (4) of Ducceschi et al. [the plate theory]"
 COMPUTATION = (
