@@ -118,8 +118,7 @@ def sizes_of(
     for i, law, rows, z in standard_sizes_of(found, index, drawn, which):
         values = {}
         for free, column in zip(law.form.free, z.T, strict=True):
-            low, high = (float(free.prior.standard(bound)) for bound in (free.prior.lower, free.prior.upper))
-            values[free.name] = np.asarray(free.prior.value(np.clip(column, low, high)))
+            values[free.name] = np.asarray(free.prior.value(np.clip(column, *free.prior.standard_bounds)))
         yield i, law, rows, values
 
 

@@ -89,7 +89,7 @@ def _inside(prior: Quantity, factor: float) -> float:
     """Share of a normal distribution of that standard deviation within the prior's bounds."""
     from scipy.special import ndtr
 
-    low, high = (float(prior.standard(bound)) / factor for bound in (prior.lower, prior.upper))
+    low, high = (bound / factor for bound in prior.standard_bounds)
     return float(ndtr(high) - ndtr(low))
 
 
@@ -208,5 +208,4 @@ def _input(baseline: Baseline, name: str, z: Floats) -> Floats:
     if name not in uncertain:
         return np.full(len(z), float(baseline.values[name]))
     quantity = baseline.board.inputs[name]
-    low, high = (float(quantity.standard(bound)) for bound in (quantity.lower, quantity.upper))
-    return np.array(quantity.value(np.clip(z[:, uncertain.index(name)], low, high)))
+    return np.array(quantity.value(np.clip(z[:, uncertain.index(name)], *quantity.standard_bounds)))

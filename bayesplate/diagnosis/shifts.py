@@ -228,7 +228,7 @@ def cells_along(n_parameters: int, cells: tuple[int, int, int]) -> int:
 
 def _axis(prior: Quantity, n: int) -> tuple[Floats, float]:
     """Middles of n equal cells between the prior's bounds or three standard deviations, and their width."""
-    low = max(float(prior.standard(prior.lower)), -_REACH) if np.isfinite(prior.lower) else -_REACH
-    high = min(float(prior.standard(prior.upper)), _REACH) if np.isfinite(prior.upper) else _REACH
+    low, high = prior.standard_bounds
+    low, high = max(low, -_REACH), min(high, _REACH)
     width = (high - low) / n
     return np.asarray(low + width * (np.arange(n) + 0.5)), width

@@ -61,7 +61,7 @@ def at_limit(found: Found, index: int) -> str:
 
 def _median_within(prior: Quantity, z: Floats) -> float:
     """Median of the draws that lie within the bounds of a prior; the bound next to them where none does."""
-    low, high = float(prior.standard(prior.lower)), float(prior.standard(prior.upper))
+    low, high = prior.standard_bounds
     inside = z[(low <= z) & (z <= high)]
     return float(np.median(inside) if inside.size else np.clip(np.median(z), low, high))
 
@@ -70,7 +70,7 @@ def _is_extreme(prior: Quantity, z: float) -> bool:
     """Whether hardly any of a prior lies between a size and a bound; a zero that means no effect is no bound."""
     from scipy.special import ndtr
 
-    low, high = float(prior.standard(prior.lower)), float(prior.standard(prior.upper))
+    low, high = prior.standard_bounds
     whole = ndtr(high) - ndtr(low)
     starts_at_nothing = prior.lower == 0.0 and prior.mean == 0.0
     near_top = np.isfinite(high) and (ndtr(high) - ndtr(z)) / whole < AT_LIMIT
