@@ -25,6 +25,7 @@ from bayesplate.diagnosis.hypotheses import Hypothesis, probabilities
 from bayesplate.diagnosis.peaks import log_mean, log_of_terms, log_summed
 from bayesplate.diagnosis.search import Found, search
 from bayesplate.diagnosis.shifts import Cells
+from bayesplate.diagnosis.terms import normalised
 
 WIDTHS = {"halved": 0.5, "doubled": 2.0}
 """Factors of the standard deviation of the priors of all sizes."""
@@ -113,8 +114,7 @@ def draw_exact(found: Found, index: int, rng: np.random.Generator, n_draws: int)
     log_weights = log_weights_of(found, index, drawn)
     if not np.isfinite(log_weights.max()):  # no draw is a plate by the exact law: the linear terms are all there is
         return drawn.at(np.arange(0, drawn.n_draws, _OVERSAMPLED))  # which stand in the order of their noise
-    shares = np.exp(log_weights - log_weights.max())
-    return drawn.at(rng.choice(drawn.n_draws, size=n_draws, p=shares / shares.sum()))
+    return drawn.at(rng.choice(drawn.n_draws, size=n_draws, p=normalised(log_weights)))
 
 
 def log_weights_of(found: Found, index: int, drawn: TermDraws) -> Floats:

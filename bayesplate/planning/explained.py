@@ -36,6 +36,7 @@ from bayesplate.planning.beliefs import (
     laws_of,
     log_moduli,
 )
+from bayesplate.posterior.statistics import resampled
 
 UNEXPLAINED = (
     "no effect that is tried explains the readings, so that nothing is said of telling effects apart: what is planned "
@@ -82,10 +83,8 @@ def _explanation(found: Found, answer: Answer, probability: float, rng: np.rando
     base, hypothesis = found.ground.baseline, found.ground.hypotheses[answer.index]
     terms = hypothesis.terms
     seen = hypothesis.seen(base, found.residual[None, :])
-    # systematic: drawn with the least scatter
-    places = (np.arange(N_TERMS) + rng.random()) / N_TERMS
-    shares = np.cumsum(normalised(terms.log_densities(seen)[:, 0]))
-    levels, cells = np.divmod(np.minimum(np.searchsorted(shares, places), shares.size - 1), terms.table.n_cells)
+    picked = resampled(normalised(terms.log_densities(seen)[:, 0]), N_TERMS, rng)
+    levels, cells = np.divmod(picked, terms.table.n_cells)
     noise = terms.noise.sd[levels]
     table, own = terms.table, terms.baseline
     sides = np.concatenate([own.slopes, own.input_slopes], axis=1)
