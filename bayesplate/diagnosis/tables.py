@@ -18,7 +18,7 @@ from bayesplate.diagnosis.words import (
     verdict_sentences,
     warnings,
 )
-from bayesplate.effects.words import effect_name
+from bayesplate.effects.words import effect_name, effect_names
 from bayesplate.results.contract import Spread
 from bayesplate.results.fit_tables import write_tables
 from bayesplate.results.folder import BEFORE_AFTER, KNOWN_EFFECTS
@@ -129,7 +129,7 @@ def sizes_table(diagnosis: Diagnosis) -> Table | None:
     rows: list[Row] = []
     are_several = len(diagnosis.finalists) > 1
     for one in diagnosis.finalists:
-        explanation = (" and ".join(map(effect_name, one.effects)),) if are_several else ()
+        explanation = (effect_names(one.effects),) if are_several else ()
         for owner, effect, parameter, spread, factor, unit in _every_size(one):
             where, after = "" if owner == "board" else f", {owner}", f" {unit}" * bool(unit)
             range_ = None if spread.sd == 0.0 else interval(spread, factor, after)

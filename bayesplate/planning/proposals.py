@@ -28,6 +28,8 @@ _TRIED, _JOINED = 128, 192
 """Simulated readings by which modes, and sequences, are compared."""
 _LONGEST = 3
 """Proposals in a sequence."""
+_ENDING = ("edges", "again")
+"""What takes the board from the place where it was measured, so that nothing goes on there."""
 
 
 @dataclass(frozen=True)
@@ -54,11 +56,6 @@ class Proposal:
     read: StationReadings | None = None  # everything that could be read in its station; None where no frequency is read
     rows: tuple[int, ...] = ()  # which of the station's modes are read
     spot: int = 0  # of its station, where a known mass stands
-
-    @property
-    def ends_session(self) -> bool:
-        """Whether the board leaves the place where it was measured, so that nothing goes on there."""
-        return self.entry.what in ("edges", "again")
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +192,7 @@ class Planner:
             ]
             best = max(range(len(left)), key=lambda i: gains[i].score)
             chosen.append(left[best])
-            steps = tuple(sorted(chosen, key=lambda one: one.ends_session))
+            steps = tuple(sorted(chosen, key=lambda one: one.entry.what in _ENDING))
             told = tuple(one.entry.sentence for one in steps)
             made.append((steps, SequenceEntry(told, minutes[best], gains[best])))
         return tuple(made)
