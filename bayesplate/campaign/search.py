@@ -76,6 +76,7 @@ class BoardSearch:
         if one is None:
             return {}
         by_cell = one.log_by_cell(self.ground.baseline, self.ground.baseline.residual)
+        by_cell = by_cell - one.own.half_log_det + one.log_labels
         with np.errstate(divide="ignore"):
             log_prior = np.log(one.table.weights)
         possible = np.flatnonzero(np.isfinite(log_prior))

@@ -94,7 +94,8 @@ def _best_fit(found: Found, index: int) -> float:
     """Log density at the best size, noise averaged: what the evidence would be without the width of the prior."""
     hypothesis = found.ground.hypotheses[index]
     weights, by_cell = hypothesis.table.weights, hypothesis.log_by_cell(found.ground.baseline, found.residual)
-    return float((by_cell[weights > 0] - np.log(weights[weights > 0])).max())
+    best = float((by_cell[weights > 0] - np.log(weights[weights > 0])).max())
+    return best - hypothesis.own.half_log_det + hypothesis.log_labels
 
 
 def _amplitude(found: Found, index: int, one: Candidate) -> Amplitude | None:

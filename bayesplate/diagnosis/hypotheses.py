@@ -73,10 +73,9 @@ class Hypothesis:
         return replace(self, own=baseline.labelled(rows))
 
     def log_by_cell(self, baseline: Baseline, residual: Floats) -> Floats:
-        """ln of prior times likelihood of each cell of its table, noise averaged: (n_cells,) array."""
+        """ln of prior times density of each cell of its table, noise averaged, without volume: (n_cells,) array."""
         log_densities = self.terms.log_densities(self.seen(baseline, residual[None, :]))[:, 0]
-        by_cell = log_sum(log_densities.reshape(-1, self.table.n_cells))
-        return np.asarray(by_cell - self.own.half_log_det + self.log_labels)
+        return log_sum(log_densities.reshape(-1, self.table.n_cells))
 
     def cells(self, baseline: Baseline, residual: Floats) -> Floats:
         """Posterior probability of each cell of its table: (n_cells,) array from an (n_modes,) residual."""
