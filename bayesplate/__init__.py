@@ -44,7 +44,7 @@ _HOMES = {
     "BayesplateError": "bayesplate.errors",
     "Board": "bayesplate.board.board",
     "Campaign": "bayesplate.commands.campaign",
-    "CampaignCheck": "bayesplate.campaign.checking",
+    "CampaignCheck": "bayesplate.campaign.summary",
     "CampaignDiagnoseResult": "bayesplate.commands.campaign_diagnose",
     "CampaignDiagnosis": "bayesplate.campaign.diagnosis",
     "CampaignFitResult": "bayesplate.commands.campaign_fit",
@@ -102,8 +102,8 @@ if TYPE_CHECKING:
     from bayesplate.board.reading import Peak as Peak
     from bayesplate.board.reading import Reading as Reading
     from bayesplate.board.setup import Setup as Setup
-    from bayesplate.campaign.checking import CampaignCheck as CampaignCheck
     from bayesplate.campaign.diagnosis import CampaignDiagnosis as CampaignDiagnosis
+    from bayesplate.campaign.summary import CampaignCheck as CampaignCheck
     from bayesplate.campaign.summary import CampaignSummary as CampaignSummary
     from bayesplate.commands.batch import BatchResult as BatchResult
     from bayesplate.commands.batch import batch as batch

@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from bayesplate.diagnosis.candidates import Amplitude, EffectEntry, ExchangeEntry
 from bayesplate.diagnosis.claim import Condition
 from bayesplate.diagnosis.known_words import KnownModel
 from bayesplate.diagnosis.result import (
+    Amplitude,
     Diagnosis,
+    EffectEntry,
     ElasticShift,
     Errors,
+    ExchangeEntry,
     Explanation,
     Finalist,
     Histogram,

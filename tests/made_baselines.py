@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayesplate.board.board import Board
-from bayesplate.diagnosis.baseline import Baseline, Spectrum, symmetry_of
+from bayesplate.diagnosis.baseline import Baseline, PossibleModes, symmetry_of
 from bayesplate.estimates.least_squares import Estimate, log_measured
 from bayesplate.estimates.refit import Predict
 from bayesplate.posterior.parameters import Parameters
@@ -30,7 +30,7 @@ def baseline_at(board: Board, estimate: Estimate, predict: Predict | None = None
         values=estimate.values,
         log_rigidities=log_rigidities,
         log_readings=log_measured(board),
-        every=Spectrum(
+        every=PossibleModes(
             log_frequency=log_frequency,
             slopes=slopes,
             input_slopes=np.zeros((log_frequency.size, 0)),

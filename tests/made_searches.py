@@ -13,15 +13,15 @@ from bayesplate.board.parameter import BOARD, Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Reading
 from bayesplate.board.setup import Setup
-from bayesplate.diagnosis.baseline import Baseline, Spectrum
+from bayesplate.diagnosis.baseline import Baseline, PossibleModes
 from bayesplate.diagnosis.forms import Form
 from bayesplate.diagnosis.hypotheses import Hypothesis, Swap
 from bayesplate.diagnosis.laws import FormLaw
-from bayesplate.diagnosis.noise_grid import NoiseGrid
 from bayesplate.diagnosis.null_control import NullControl
 from bayesplate.diagnosis.search import Candidate, Found, Ground
-from bayesplate.diagnosis.shifts import Table, nothing
+from bayesplate.diagnosis.shifts import Cells, nothing
 from bayesplate.diagnosis.signatures import signature
+from bayesplate.diagnosis.terms import NoiseGrid
 from bayesplate.diagnosis.verdict import Verdict, decide
 from bayesplate.frequencies.laws import cents
 from bayesplate.labels import Label
@@ -65,7 +65,7 @@ def baseline(
         | {name: np.asarray(q.mean) for name, q in inputs.items()},
         log_rigidities=LOG_RIGIDITIES,
         log_readings=log_frequency,
-        every=Spectrum(
+        every=PossibleModes(
             log_frequency=log_frequency,
             slopes=slopes,
             input_slopes=0.01 * rng.standard_normal((n_modes, n_inputs)),
@@ -103,10 +103,10 @@ def table(
     n_tangents: int = 1,
     *,
     size: float = 0.01,
-) -> Table:
+) -> Cells:
     """Cells with random shifts and tangents."""
     weights = rng.dirichlet(np.full(n_cells, 3.0))
-    return Table(
+    return Cells(
         weights=weights,
         shift=size * rng.standard_normal((n_cells, n_modes)),
         slopes=0.5 * size * rng.standard_normal((n_cells, n_modes, n_tangents)),
@@ -175,14 +175,14 @@ class MadeLaw(FormLaw):
         return baseline.every.predict(log_rigidities) + np.outer(size, self.direction)
 
 
-def _along(base: Baseline, direction: np.ndarray, prior: Quantity, n: int) -> Table:
+def _along(base: Baseline, direction: np.ndarray, prior: Quantity, n: int) -> Cells:
     low, high = (float(np.clip(prior.standard(bound), -3.0, 3.0)) for bound in (prior.lower, prior.upper))
     width = (high - low) / n
     z = low + width * (np.arange(n) + 0.5)
     weights = np.exp(prior.log_prior(z))
     moved = -np.outer(prior.value(z), base.absorbing @ direction)
     slope = prior.value(z + 0.25 * width) - prior.value(z - 0.25 * width)
-    return Table(
+    return Cells(
         weights=weights / weights.sum(),
         shift=np.outer(prior.value(z), direction) + moved @ base.slopes.T,
         slopes=(slope[:, None] * (direction - base.slopes @ (base.absorbing @ direction)))[:, :, None],

@@ -8,7 +8,7 @@ pulls       what a board says, as a normal likelihood
 together    the boards' likelihoods multiplied, all of them or all but one
 boards      each board's draws, by itself and where the others are
 learning    from boards alone to what they teach together
-agreement   whether a board wants what the others teach
+claim       whether a board wants what the others teach, and whether a shared effect may be claimed
 common      what is left over on all boards alike, mode by mode
 population  the distribution that the boards' constants come from
 """

@@ -22,26 +22,15 @@ FEWEST = 2
 
 @dataclass(frozen=True)
 class CommonResidual:
-    """Residuals of one mode, measured over predicted, cents.
+    """Residuals of one mode, measured over predicted, cents."""
 
-    Attributes
-    ----------
-    mean_cents, error_cents : float
-        Their mean, each weighted by its board's noise, and its standard error: of the noise, or of the scatter between
-        the boards where that is larger.
-    degrees_of_freedom : int
-        Of that error: those of the boards, and where it is of the noise those of the residuals that tell it.
-    scatter_cents : float
-        Standard deviation between the boards.
-    boards : dict of float
-        Each board's own.
-    """
-
-    mean_cents: float
+    mean_cents: float  # mean of the residuals, each weighted by its board's noise
+    # standard error of the mean: of the noise, or of the scatter between the boards where that is larger
     error_cents: float
+    # of that error: those of the boards, and where it is of the noise those of the residuals that tell it
     degrees_of_freedom: int
-    scatter_cents: float
-    boards: Mapping[str, float]
+    scatter_cents: float  # standard deviation between the boards
+    boards: Mapping[str, float]  # each board's own
 
     @property
     def p_value(self) -> float:
@@ -54,20 +43,9 @@ class CommonResidual:
 def common_residuals(summaries: Mapping[str, Summary], boards: Mapping[str, Board]) -> dict[str, CommonResidual]:
     """Every mode that several boards have, in the order in which boards name them first.
 
-    A mode is the same where the setups have one name and are held alike, whatever label the laboratory begins at.
-
-    Parameters
-    ----------
-    summaries : dict of Summary
-        By board.
-    boards : dict of Board
-        The same boards.
-
-    Returns
-    -------
-    dict of CommonResidual
-        By label, as the first board held so counts; by setup and label where the boards' setups have different names,
-        and by the letters of the edges where one name stands for several ways to hold a board.
+    A mode is the same where the setups have one name and are held alike, whatever label the laboratory begins at. The
+    key is the label as the first board held so counts; with the setup where the boards' setups have different names,
+    and with the letters of the edges where one name stands for several ways to hold a board.
     """
     ways = _ways(summaries, boards)
     spare = {board: max(len(summary.modes) - boards[board].symmetry.n, 0) for board, summary in summaries.items()}

@@ -10,30 +10,20 @@ import numpy as np
 from bayesplate.campaign.claim import SharedClaim, TaughtBoard
 from bayesplate.campaign.common import CommonResidual, clear_of_zero
 from bayesplate.campaign.search import Explanation
+from bayesplate.diagnosis.claim import IMPROBABLE
+from bayesplate.diagnosis.verdict import CLEARLY
 from bayesplate.effects.words import effect_name, effect_names, joined
 
 FORMAT = 1
-CLEARLY = 3.0
-"""How many times more probable a shared effect must be than the next explanation to be named."""
-IMPROBABLE = 0.05
-"""What the probability of no effect has to stay below."""
 _MOST_LISTED = 12
 
 
 @dataclass(frozen=True)
 class PooledErrors:
-    """Errors over all boards.
+    """Errors over all boards."""
 
-    Attributes
-    ----------
-    in_sample_rms_cents : float
-        Of all labelled modes, each board's constants fitted.
-    left_out_boards_rms_cents : float
-        The same, the shared effect learned from the other boards.
-    """
-
-    in_sample_rms_cents: float
-    left_out_boards_rms_cents: float
+    in_sample_rms_cents: float  # of all labelled modes, each board's constants fitted
+    left_out_boards_rms_cents: float  # the same, the shared effect learned from the other boards
 
 
 @dataclass(frozen=True)
@@ -98,17 +88,10 @@ class CampaignDiagnosis:
 
 
 def named(found: Sequence[Explanation]) -> tuple[str, tuple[str, ...], str]:
-    """What a search over a campaign allows to say: a verdict, effects, and the reason.
+    """What a search over a campaign, its most probable explanation first, allows to say: a verdict, effects, the
+    reason.
 
-    Parameters
-    ----------
-    found : sequence of Explanation
-        The most probable first.
-
-    Returns
-    -------
-    effects : tuple of str
-        Shared ones; in a group those of any alternative, the most probable first.
+    In a group the effects are the shared ones of any alternative, the most probable first.
     """
     none = next(one.probability for one in found if one.way == "none")
     if none >= IMPROBABLE:
@@ -123,7 +106,8 @@ def named(found: Sequence[Explanation]) -> tuple[str, tuple[str, ...], str]:
     if len(near) == 1:
         rest = found[1]
         times = best.probability / max(rest.probability, 1e-300)
-        return "named", shared, f"{words_of(best)} is {_times(times)} times as probable as {words_of(rest)}"
+        shown = f"{times:.0f}" if times < 1000.0 else "more than 1000"
+        return "named", shared, f"{words_of(best)} is {shown} times as probable as {words_of(rest)}"
     told = joined([words_of(one) for one in near], "or")
     return "indistinguishable group", shared, f"{told} may be as probable"
 
@@ -140,10 +124,6 @@ def words_of(one: Explanation) -> str:
         "own": f"{effect} of another size on each board",
         "one board": f"{effect} on board {one.board} alone",
     }[one.way]
-
-
-def _times(ratio: float) -> str:
-    return f"{ratio:.0f}" if ratio < 1000.0 else "more than 1000"
 
 
 def claim_sentence(diagnosis: CampaignDiagnosis) -> str:

@@ -14,36 +14,26 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.diagnosis.terms import log_sum
 from bayesplate.posterior.mixture import Mixture
 
-Floats = NDArray[np.float64]
-
 N_POINTS = 1024
+"""At which the density is looked at, among the draws and as many beside them."""
 _MOST_PASSES = 200
 _SETTLED = 1e-8
 
 
-def bridge_sampling(
-    log_density: Callable[[Floats], Floats], draws: Floats, rng: np.random.Generator, n_points: int = N_POINTS
-) -> float:
-    """ln of the integral of a density that is not normalised.
+def bridge_sampling(log_density: Callable[[Floats], Floats], draws: Floats, rng: np.random.Generator) -> float:
+    """ln of the integral of a density that is not normalised, from draws of it in random order.
 
-    Parameters
-    ----------
-    log_density : callable
-        From (n, n_dim) points to (n,) logarithms; -inf where it is zero.
-    draws : (n_draws, n_dim) array
-        From that density, in random order.
-    n_points : int
-        At which the density is looked at, among the draws and beside them.
+    `log_density` takes (n, n_dim) points, -inf where it is zero.
     """
     half = len(draws) // 2
     mixture = Mixture.fitted(draws[:half])
-    there = draws[half:][:n_points]
-    beside = mixture.points(n_points, rng)
+    there = draws[half:][:N_POINTS]
+    beside = mixture.points(N_POINTS, rng)
     at_draws = log_density(there) - mixture.log_density(there)
     at_points = log_density(beside) - mixture.log_density(beside)
     at_points = np.where(np.isfinite(at_points), at_points, -np.inf)

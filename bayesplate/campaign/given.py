@@ -8,24 +8,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.campaign.shared import Shared
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.target import Posterior
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class GivenShared:
-    """A board's posterior as a density of what is its own, given the shared parameters.
+    """A board's posterior as a density of what is its own, given the shared parameters."""
 
-    Attributes
-    ----------
-    posterior : Posterior
-        Of the board by itself, under its law or a surrogate of it.
-    """
-
-    posterior: Posterior
+    posterior: Posterior  # of the board by itself, under its law or a surrogate of it
     shared: tuple[Shared, ...]
 
     @property
@@ -65,13 +58,8 @@ class GivenShared:
         return found
 
     def theta(self, own: Floats, z: Floats) -> Floats:
-        """All columns of the board: (n_draws, n_dim) array.
-
-        Parameters
-        ----------
-        own : (n_draws, n_own) array
-        z : (n_draws, n_shared) array
-        """
+        """All columns of the board, (n_draws, n_dim), from its own, (n_draws, n_own), and shared z, (n_draws,
+        n_shared)."""
         theta = np.zeros((len(own), self._parameters.n_dim))
         theta[:, self.own_columns] = own
         values = self._parameters.values(theta)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.campaign.boards import N_SOLVED, Member, Sample
 from bayesplate.campaign.likelihood import LogDensity, moments
 from bayesplate.campaign.together import Together, walk
@@ -17,8 +18,6 @@ from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings
 
-Floats = NDArray[np.float64]
-
 ASTRAY = 0.3
 """Standard deviations of the shared parameters by which a board's draws may be off their likelihood."""
 _ROUNDS = 3
@@ -26,43 +25,33 @@ _ROUNDS = 3
 
 @dataclass(frozen=True, eq=False)
 class Learnt:
-    """What the boards of a campaign teach.
-
-    Attributes
-    ----------
-    samples : tuple of Sample
-        Of each board, where what all boards teach is among them.
-    chains : Chains
-        Of the standard coordinates of what is learned: `Together.coordinates`.
-    """
+    """What the boards of a campaign teach."""
 
     members: tuple[Member, ...]
-    samples: tuple[Sample, ...]
+    samples: tuple[Sample, ...]  # of each board, where what all boards teach is among them
     together: Together
-    chains: Chains
+    chains: Chains  # of the standard coordinates of what is learned: `Together.coordinates`
     convergence: Convergence
 
-    @property
+    @cached_property
     def astray(self) -> Floats:
-        """How far each board's draws are off the likelihood that they gave: see `_astray`; (n_boards,) array."""
-        return np.array([_astray(self.together, i, one) for i, one in enumerate(self.samples)])
+        """How far each board's draws under what all teach are off what all teach: (n_boards,) array.
+
+        The two are the same but for the polynomial that stands for the board's likelihood: the largest difference of a
+        mean, in standard deviations, less two of its standard errors.
+        """
+        found = np.empty(len(self.samples))
+        for i, drawn in enumerate(self.samples):
+            mean, covariance = self.together.under_all(i)
+            weights = drawn.weights_under(self.together.log_taught((i,)))
+            off = np.abs(moments(drawn.z, weights)[0] - mean) / np.sqrt(np.diagonal(covariance))
+            found[i] = off.max() - 2.0 * drawn.effective(weights) ** -0.5
+        return found
 
     def board(self, index: int, rng: np.random.Generator, seed: int) -> tuple[Inference, Draws, float]:
-        """A board's posterior under what all boards teach of the shared parameters.
+        """A board's posterior under what all boards teach, and how many independent draws it rests on.
 
         Its draws, weighted by what the other boards say of theirs; where too few are left, it is walked anew.
-
-        Parameters
-        ----------
-        index : int
-            Of the board.
-        seed : int
-            Of the predictive draws.
-
-        Returns
-        -------
-        effective : float
-            How many independent draws the result rests on.
         """
         together, member = self.together, self.members[index]
         log_reference = together.log_taught((index,))
@@ -90,11 +79,6 @@ def learn(
     A likelihood is first found from a board's own draws, then from the same draws weighted to be halfway to where all
     boards together are: there it matters, and a polynomial of low order follows it the better. A board that has too few
     draws there is walked anew; one that still has too few keeps the likelihood that its own draws gave.
-
-    Returns
-    -------
-    Learnt
-        Its convergence is that of the shared parameters.
     """
     samples = [member.alone for member in members]
     found = [one.likelihood(drawn, one.log_prior) for one, drawn in zip(members, samples, strict=True)]
@@ -127,16 +111,3 @@ def _halfway(member: Member, together: Together, board: int) -> LogDensity:
     """ln of a density between the prior and what all boards but one teach of the shared parameters."""
     log_taught = together.log_taught((board,))
     return lambda z: 0.5 * (member.log_prior(z) + log_taught(z))
-
-
-def _astray(together: Together, board: int, drawn: Sample) -> float:
-    """How far the draws of a board under what all teach are off what all teach.
-
-    The two are the same but for the polynomial that stands for the board's likelihood: the largest difference of a
-    mean, in standard deviations, less two of its standard errors.
-    """
-    mean, covariance = together.under_all(board)
-    weights = drawn.weights_under(together.log_taught((board,)))
-    own, _ = moments(drawn.z, weights)
-    off = np.abs(own - mean) / np.sqrt(np.diagonal(covariance))
-    return float(off.max() - 2.0 * drawn.effective(weights) ** -0.5)

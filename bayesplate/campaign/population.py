@@ -17,12 +17,12 @@ A. Gelman, Prior distributions for variance parameters in hierarchical models, B
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.material import MODULI
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.quantity import Quantity
@@ -32,8 +32,6 @@ from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Chains, SamplerSettings, sample
 
-Floats = NDArray[np.float64]
-
 _STEADY = 1e-3
 """Standard deviation of ln E below which a population has none for all practical purposes."""
 _CONSTANTS = len(MODULI)
@@ -41,30 +39,20 @@ _CONSTANTS = len(MODULI)
 
 @dataclass(frozen=True, eq=False)
 class BoardConstants:
-    """What one board says of its constants: a normal likelihood of ln E_x, ln E_y, ln G_xy (Pa), given what is shared.
-
-    Attributes
-    ----------
-    mean : (3,) array
-    covariance : (3, 3) array
-        Where the shared numbers are known.
-    slopes : (3, n_shared) array
-        What the mean does with the standard coordinates of the shared numbers that all boards have the same.
-    """
+    """A board's normal likelihood of ln E_x, ln E_y, ln G_xy (Pa), given what is shared."""
 
     name: str
-    mean: Floats
-    covariance: Floats
+    mean: Floats  # (3,) array
+    covariance: Floats  # (3, 3) array, where the shared numbers are known
+    # (3, n_shared) array: what the mean does with the standard coordinates of the shared numbers that all boards have
+    # the same
     slopes: Floats = field(default_factory=lambda: np.zeros((_CONSTANTS, 0)))
 
     @classmethod
     def of(cls, inference: Inference, draws: Draws, shared: Floats | None = None) -> BoardConstants:
         """From the posterior of a board, the prior of its constants divided out.
 
-        Parameters
-        ----------
-        shared : (n_draws, n_shared) array, optional
-            Standard coordinates of the shared numbers at the draws.
+        `shared` are standard coordinates of the shared numbers at the draws, (n_draws, n_shared).
         """
         name = inference.problem.board.name
         logs = np.column_stack([np.log(draws.moduli[name]).ravel() for name in MODULI])
@@ -80,20 +68,14 @@ class BoardConstants:
 
 @dataclass(frozen=True, eq=False)
 class Population:
-    """What the boards say of the distribution of their constants.
-
-    Attributes
-    ----------
-    chains : Chains
-        Of mean of ln E_x, ln E_y, ln G_xy, then ln of their standard deviations, then how far the shared numbers are
-        off their mean.
-    common : (n_shared, n_shared) array
-        Covariance of the standard coordinates of the shared numbers, from all boards.
-    """
+    """What the boards say of the distribution of their constants."""
 
     boards: tuple[BoardConstants, ...]
+    # of mean of ln E_x, ln E_y, ln G_xy, then ln of their standard deviations, then how far the shared numbers are off
+    # their mean
     chains: Chains
     convergence: Convergence
+    # (n_shared, n_shared) array: covariance of the standard coordinates of the shared numbers, from all boards
     common: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
@@ -128,19 +110,15 @@ def find_population(
 ) -> Population:
     """Sample mean and standard deviation of the constants of all boards of such a kind.
 
-    Parameters
-    ----------
-    prior : PriorCard
-        Of E_x, E_y, G_xy. Its medians and factors are believed of the mean; the standard deviation of ln E is
-        half-normal on the scale of the factor.
-    common : (n_shared, n_shared) array, optional
-        Covariance of the standard coordinates of what all boards share, which is off by the same on all of them: the
-        mean of many boards does not average it out.
+    The prior's medians and factors are believed of the mean; the standard deviation of ln E is half-normal on the scale
+    of the factor. `common` is the covariance of the standard coordinates of what all boards share, which is off by the
+    same on all of them: the mean of many boards does not average it out.
     """
     common = np.zeros((0, 0)) if common is None else common
     away = np.array([one.slopes @ np.linalg.cholesky(common) for one in boards])
     n_shared = len(common)
-    middle, width = _believed(prior)
+    middle = np.array([np.log(prior.constants[name].median) for name in MODULI])
+    width = np.array([prior.constants[name].log_sd for name in MODULI])
     seen = np.array([one.mean for one in boards])
     covariances = np.array([one.covariance for one in boards])
     own = np.diagonal(covariances, axis1=1, axis2=2).mean(axis=0)
@@ -172,13 +150,7 @@ def find_population(
 
 
 def require_moduli(prior: PriorCard, place: str) -> None:
-    """A population is one of E_x, E_y, G_xy: rigidities go with each board's thickness.
-
-    Raises
-    ------
-    InputError
-        If the prior card states D_x, D_y, D_s, or E alone.
-    """
+    """InputError where a prior card states rigidities, which go with each board's thickness, or E alone."""
     wanted = "a prior card of E_x, E_y, G_xy"
     if prior.is_of_isotropic:
         raise InputError(Fault(place, wanted, f"{prior.name}, which states E alone"))
@@ -186,7 +158,7 @@ def require_moduli(prior: PriorCard, place: str) -> None:
         raise InputError(Fault(place, wanted, f"{prior.name}, one of D_x, D_y, D_s, which go with the thickness"))
 
 
-def prior_of(population: Population, name: str, source: str, rng: np.random.Generator, title: str = "") -> PriorCard:
+def prior_of(population: Population, name: str, source: str, rng: np.random.Generator) -> PriorCard:
     """What the boards teach of the next one, as a prior card.
 
     Each constant is log-normal with the mean and standard deviation of the prediction's logarithm.
@@ -196,13 +168,7 @@ def prior_of(population: Population, name: str, source: str, rng: np.random.Gene
         key: Quantity.from_median(float(np.exp(values.mean())), float(np.exp(values.std())))
         for key, values in zip(MODULI, predicted.T, strict=True)
     }
-    return PriorCard.from_quantities(name, constants, source=source, title=title)
-
-
-def _believed(prior: PriorCard) -> tuple[Floats, Floats]:
-    constants: Mapping[str, Quantity] = prior.constants
-    middle = np.array([np.log(constants[name].median) for name in MODULI])
-    return middle, np.array([constants[name].log_sd for name in MODULI])
+    return PriorCard.from_quantities(name, constants, source=source)
 
 
 def _diagonal(values: Floats) -> Floats:

@@ -6,42 +6,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.quantity import Quantity
 from bayesplate.campaign.likelihood import moments
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Pull:
-    """What a board's likelihood of the shared parameters amounts to as a normal one: exp(h'z - z'Pz / 2).
+    """What a board's likelihood of the shared parameters amounts to as a normal one: exp(h'z - z'Pz / 2)."""
 
-    Attributes
-    ----------
-    precision : (n_shared, n_shared) array
-        P, positive semi-definite.
-    lean : (n_shared,) array
-        h = P times where it is highest.
-    """
-
-    precision: Floats
-    lean: Floats
+    precision: Floats  # (n_shared, n_shared) array: P, positive semi-definite
+    lean: Floats  # (n_shared,) array: h = P times where it is highest
 
     @classmethod
     def of_draws(cls, z: Floats, weights: Floats, priors: Sequence[Quantity] = ()) -> Pull:
-        """From draws of the board's own posterior.
+        """From draws of the board's own posterior under these priors of z, by default standard normal; weights sum to
+        1.
 
         A posterior that is wider than the prior in a direction says nothing there.
-
-        Parameters
-        ----------
-        z : (n, n_shared) array
-        weights : (n,) array
-            They sum to 1.
-        priors : sequence of Quantity
-            Under which they are the posterior's; by default z is standard normal before.
         """
         mean, covariance = moments(z, weights)
         before = np.array([moments_before(one) for one in priors] or [(0.0, 1.0)] * mean.size)
@@ -52,13 +35,7 @@ class Pull:
         return cls(told, (directions * (gained > 0.0)) @ directions.T @ lean)
 
     def scattered(self, width: Floats) -> Pull:
-        """What it says of the middle about which the boards' own numbers scatter.
-
-        Parameters
-        ----------
-        width : (n_shared,) array
-            Standard deviation of the scatter, zero where there is none.
-        """
+        """What it says of the middle about which boards' own numbers scatter, with these standard deviations."""
         weaker = np.linalg.inv(np.eye(width.size) + self.precision * width**2)
         return Pull(np.asarray(weaker @ self.precision), np.asarray(weaker @ self.lean))
 

@@ -21,15 +21,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial.hermite_e import hermegauss
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.quantity import Quantity
 from bayesplate.campaign.likelihood import Likelihood
 from bayesplate.campaign.pulls import Pull
 from bayesplate.campaign.shared import Shared
 from bayesplate.diagnosis.terms import log_sum
-
-Floats = NDArray[np.float64]
 
 _NODES = {1: 9, 2: 7, 3: 5}
 """Along each direction, by the number of directions."""
@@ -38,13 +36,7 @@ _ROWS_AT_ONCE = 4096
 
 @dataclass(frozen=True)
 class Scatter:
-    """How much a shared number differs between boards: the standard deviation of its logarithm, half-normal before.
-
-    Attributes
-    ----------
-    of : Shared
-        The number.
-    """
+    """How much a shared number differs between boards: the standard deviation of its logarithm, half-normal before."""
 
     of: Shared
 
@@ -55,12 +47,11 @@ class Scatter:
 
     @property
     def prior(self) -> Quantity:
-        """Of the standard deviation of the logarithm; its standard coordinate is what is sampled."""
+        """The prior of the standard deviation of the logarithm; its standard coordinate is what is sampled."""
         return Quantity.from_mean(0.0, self.of.scatter, "normal", lower=0.0)
 
     @property
     def unit(self) -> str:
-        """Of a logarithm."""
         return "1"
 
     def width(self, u: Floats) -> Floats:
@@ -69,17 +60,14 @@ class Scatter:
 
 
 def scatters_of(shared: Sequence[Shared]) -> tuple[Scatter, ...]:
-    """Those of the numbers that differ between boards, in their order."""
+    """Scatters of the numbers that differ between boards, in their order."""
     return tuple(Scatter(one) for one in shared if one.scatter)
 
 
 def widths(shared: Sequence[Shared], hyper: Floats) -> Floats:
     """How much each number scatters, in its standard coordinate: (n, n_shared) array, zero where it does not.
 
-    Parameters
-    ----------
-    hyper : (n, n_shared + n_scatters) array
-        Standard coordinates of the numbers, then of their scatters.
+    `hyper` are standard coordinates of the numbers, then of their scatters: (n, n_shared + n_scatters) array.
     """
     found = np.zeros((len(hyper), len(shared)))
     columns = [i for i, one in enumerate(shared) if one.scatter]
@@ -96,19 +84,11 @@ def expected_width(shared: Sequence[Shared]) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class ScatteredLikelihood:
-    """ln of the probability of a board's readings as a function of the numbers' middle and of their scatter.
-
-    Attributes
-    ----------
-    own : SharedLikelihood
-        The board's, of its own numbers.
-    pull : Pull
-        The normal one that it amounts to.
-    """
+    """ln of the probability of a board's readings as a function of the numbers' middle and of their scatter."""
 
     shared: tuple[Shared, ...]
-    own: Likelihood
-    pull: Pull
+    own: Likelihood  # the board's, of its own numbers
+    pull: Pull  # the normal one that it amounts to
 
     def at(self, hyper: Floats) -> Floats:
         """ln L at standard coordinates of numbers and scatters: (n,) array from (n, n_shared + n_scatters)."""

@@ -16,19 +16,18 @@ they share one, and have another at a size of its own each: that one is summed o
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.diagnosis.baseline import Baseline
-from bayesplate.diagnosis.hypotheses import Hypothesis, hypotheses
+from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.peaks import with_own_labels
 from bayesplate.diagnosis.search import LEAST_TRACE, Ground, prepare_search
-from bayesplate.diagnosis.terms import log_sum
+from bayesplate.diagnosis.terms import log_sum, normalised
 
-Floats = NDArray[np.float64]
 Way = Literal["none", "shared", "own", "one board", "shared and own"]
 Cell = tuple[float, ...]
 
@@ -44,45 +43,30 @@ _DIGITS = 9
 
 @dataclass(frozen=True)
 class Explanation:
-    """One thing that the boards may have.
+    """One thing that the boards may have."""
 
-    Attributes
-    ----------
-    way : "none", "shared", "own", "one board" or "shared and own"
-        No effect; one size for all boards; a size of its own for each; one board alone; the first effect of one size
-        for all and the second of a size of its own for each.
-    effects : tuple of str
-        Empty for none; two where both are shared or the second is each board's own.
-    board : str
-        The one board; otherwise empty.
-    """
-
+    # no effect; one size for all boards; a size of its own for each; one board alone; the first effect of one size for
+    # all and the second of a size of its own for each
     way: Way
-    effects: tuple[str, ...]
-    board: str
+    effects: tuple[str, ...]  # empty for none; two where both are shared or the second is each board's own
+    board: str  # the one board; otherwise empty
     log_evidence: float
     probability: float
 
 
 @dataclass(frozen=True, eq=False)
 class BoardSearch:
-    """A board's tables, asked for what the boards may have in common.
-
-    Attributes
-    ----------
-    ground : Ground
-        With the labels of each hypothesis.
-    """
+    """A board's tables, asked for what the boards may have in common."""
 
     name: str
-    ground: Ground
+    ground: Ground  # with the labels of each hypothesis
 
     def hypothesis(self, effects: tuple[str, ...]) -> Hypothesis | None:
-        """The one of these effects alone; None where the board cannot have them."""
+        """The hypothesis of these effects alone; None where the board cannot have them."""
         return next((one for one in self.ground.hypotheses if one.members == effects and one.swap is None), None)
 
     def log_evidence(self, effects: tuple[str, ...]) -> float:
-        """Of an effect of whatever size on this board, or of none."""
+        """ln of the evidence of an effect of whatever size on this board, or of none."""
         values = self.cells(effects)
         return float(log_sum(np.array([log_prior + log_likelihood for log_prior, log_likelihood in values.values()])))
 
@@ -91,14 +75,12 @@ class BoardSearch:
         one = self.hypothesis(effects)
         if one is None:
             return {}
-        terms = one.terms
-        seen = one.seen(self.ground.baseline, self.ground.baseline.residual[None, :])
-        n_cells = one.table.n_cells
-        by_cell = log_sum(terms.log_densities(seen)[:, 0].reshape(-1, n_cells)) - one.own.half_log_det + one.log_labels
+        by_cell = one.log_by_cell(self.ground.baseline, self.ground.baseline.residual)
+        by_cell = by_cell - one.own.half_log_det + one.log_labels
         with np.errstate(divide="ignore"):
             log_prior = np.log(one.table.weights)
         possible = np.flatnonzero(np.isfinite(log_prior))
-        keys = [tuple(float(part) for part in key) for key in self._keys(one)[possible]]
+        keys = [tuple(float(part) for part in key) for key in _keys(one)[possible]]
         return {
             key: (float(log_prior[i]), float(by_cell[i] - log_prior[i])) for key, i in zip(keys, possible, strict=True)
         }
@@ -108,38 +90,29 @@ class BoardSearch:
         one = self.hypothesis((shared, own)) or self.hypothesis((own, shared))
         if one is None:
             return {}
-        first = 1 + self.ground.candidates[one.members[0]].coarse.z.shape[1]
+        first = 1 + one.table.parts[0].z.shape[1]
         kept = slice(None, first) if one.members[0] == shared else slice(first, None)
         by_cell: dict[Cell, list[tuple[float, float]]] = {}
         for key, value in self.cells(one.members).items():
             by_cell.setdefault(key[kept], []).append(value)
         return {key: _summed(np.array(values)) for key, values in by_cell.items()}
 
-    def _keys(self, one: Hypothesis) -> Floats:
-        """What a cell is on any board: form and standard coordinates of each of its effects, (n_cells, n) array."""
-        tables = [self.ground.candidates[name].coarse for name in one.members] if len(one.members) > 1 else [one.table]
-        keys = np.zeros((1, 0))
-        for table in tables:
-            own = np.column_stack([table.form, np.round(table.z, _DIGITS)])
-            keys = np.column_stack([np.repeat(keys, len(own), axis=0), np.tile(own, (len(keys), 1))])
-        return keys
+
+def _keys(one: Hypothesis) -> Floats:
+    """What a cell is on any board: form and standard coordinates of each of its effects, (n_cells, n) array."""
+    keys = np.zeros((1, 0))
+    for table in one.table.parts or (one.table,):
+        own = np.column_stack([table.form, np.round(table.z, _DIGITS)])
+        keys = np.column_stack([np.repeat(keys, len(own), axis=0), np.tile(own, (len(keys), 1))])
+    return keys
 
 
 def search_board(
     name: str, baseline: Baseline, effects: Sequence[str], tell: Callable[[float], None] | None = None
 ) -> BoardSearch:
-    """Tabulate effects on a board, and every pair of them: what one board would not show several may.
-
-    Parameters
-    ----------
-    tell : callable, optional
-        Told which share of the effects is done.
-    """
+    """Tabulate effects on a board, and every pair of them: what one board would not show several may."""
     ground = prepare_search(baseline, tried=effects, tell=tell)
-    fine = {effect: one.fine for effect, one in ground.candidates.items()}
-    coarse = {effect: one.coarse for effect, one in ground.candidates.items()}
-    every = hypotheses(baseline, fine, coarse, paired=effects)
-    return BoardSearch(name, with_own_labels(replace(ground, hypotheses=every)))
+    return BoardSearch(name, with_own_labels(ground.with_hypotheses(effects)))
 
 
 def shown(boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
@@ -156,13 +129,7 @@ def shown(boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...]]) -> 
 
 
 def explanations(boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...]]) -> tuple[Explanation, ...]:
-    """Everything that the boards may have, the most probable first.
-
-    Parameters
-    ----------
-    effects : sequence of tuple of str
-        Those of `shareable`: single ones, and pairs.
-    """
+    """Everything that the boards may have of single effects and pairs, the most probable first."""
     none = np.array([one.log_evidence(()) for one in boards])
     shared = {each: log_evidence_shared(boards, each) for each in effects}
     single = [each for each in effects if len(each) == 1]
@@ -172,7 +139,10 @@ def explanations(boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...
     found: list[tuple[Way, tuple[str, ...], str, float, float]] = [
         ("none", (), "", float(none.sum()), PRIOR["none"]),
         *(("shared", pair, "", shared[pair], of_two / len(pairs)) for pair in pairs),
-        *(("shared and own", each, "", log_evidence_beside(boards, *each), mixed / len(beside)) for each in beside),
+        *(
+            ("shared and own", each, "", _over_common([one.cells_beside(*each) for one in boards]), mixed / len(beside))
+            for each in beside
+        ),
     ]
     for effect in single:
         alone = np.array([one.log_evidence(effect) for one in boards])
@@ -184,9 +154,7 @@ def explanations(boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...
             ("one board", effect, one.name, float(none.sum() - none[i] + alone[i]), each)
             for i, one in enumerate(boards)
         ]
-    joint = np.array([log_evidence + np.log(prior) for *_, log_evidence, prior in found])
-    probability = np.exp(joint - joint.max())
-    probability /= probability.sum()
+    probability = normalised(np.array([log_evidence + np.log(prior) for *_, log_evidence, prior in found]))
     order = np.argsort(-probability, kind="stable")
     return tuple(Explanation(*found[int(i)][:4], float(probability[int(i)])) for i in order)
 
@@ -196,11 +164,6 @@ def log_evidence_shared(boards: Sequence[BoardSearch], effects: tuple[str, ...])
     return _over_common([one.cells(effects) for one in boards])
 
 
-def log_evidence_beside(boards: Sequence[BoardSearch], shared: str, own: str) -> float:
-    """ln of the evidence of one size for all boards of an effect, and of a size of its own for each of another."""
-    return _over_common([one.cells_beside(shared, own) for one in boards])
-
-
 def _summed(values: Floats) -> tuple[float, float]:
     """ln of prior probability and likelihood of several cells together, from those of each: (n_cells, 2) array."""
     log_prior = float(log_sum(values[:, 0]))
@@ -208,6 +171,7 @@ def _summed(values: Floats) -> tuple[float, float]:
 
 
 def _over_common(by_board: Sequence[Mapping[Cell, tuple[float, float]]]) -> float:
+    """ln of the evidence of cells that all boards have alike; -inf where there is none."""
     common = set.intersection(*(set(cells) for cells in by_board))
     if not common:
         return -np.inf

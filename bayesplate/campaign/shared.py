@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.campaign import CampaignCard, SharedSection
 from bayesplate.board.material import MODULI, moduli
@@ -17,39 +17,22 @@ from bayesplate.effects import EFFECTS
 from bayesplate.effects.base import Ratio
 from bayesplate.errors import Fault, InputError
 
-Floats = NDArray[np.float64]
-
 MOST_PARAMETERS = 3
 """Nodes over more would grow as a power of their number."""
 
 
 @dataclass(frozen=True)
 class Shared:
-    """One number that all boards of a campaign have in common, or about which their own scatter.
+    """One number that all boards of a campaign have in common, or about which their own scatter."""
 
-    Attributes
-    ----------
-    effect, key : str
-        The parameter of the boards that it sets.
-    prior : Quantity
-        Of the number itself; its standard coordinate is what is sampled.
-    unit : str
-        SI; "1" for a ratio.
-    source : str
-        Where the prior comes from; empty if a card states it.
-    to : str
-        The modulus that it is a ratio to; empty for a value.
-    scatter : float
-        Scale of the half-normal prior of how much the boards' own differ from it, as the standard deviation of the
-        logarithm; 0 where all boards have the same.
-    """
-
-    effect: str
+    effect: str  # with the key: the parameter of the boards that it sets
     key: str
-    prior: Quantity
-    unit: str
-    source: str = ""
-    to: str = ""
+    prior: Quantity  # of the number itself; its standard coordinate is what is sampled
+    unit: str  # SI; "1" for a ratio
+    source: str = ""  # where the prior comes from; empty if a card states it
+    to: str = ""  # the modulus that it is a ratio to; empty for a value
+    # scale of the half-normal prior of how much the boards' own differ from it, as the standard deviation of the
+    # logarithm; 0 where all boards have the same
     scatter: float = 0.0
 
     @property
@@ -77,22 +60,10 @@ def modulus(name: str, values: Values) -> Floats:
 
 
 def shared_by(card: CampaignCard, boards: Sequence[Board]) -> tuple[Shared, ...]:
-    """What the boards of a campaign share.
+    """What the boards of a campaign, its effects declared, share: in the order of the card and of each effect's
+    parameters.
 
-    Parameters
-    ----------
-    boards : sequence of Board
-        With the shared effects declared.
-
-    Returns
-    -------
-    tuple of Shared
-        In the order of the card and of each effect's parameters.
-
-    Raises
-    ------
-    InputError
-        With everything that cannot be shared, board by board.
+    InputError with everything that cannot be shared, board by board.
     """
     file = card.path.name
     found: list[Shared] = []

@@ -1,22 +1,27 @@
-"""summary.json of a campaign as types: what its boards share, and every board's own summary."""
+"""A campaign in summary.json, posterior.nc and its check: what its boards share, and every board's own."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from bayesplate.board.material import MODULI
-from bayesplate.campaign.agreement import left_out, refusing
 from bayesplate.campaign.boards import Member
+from bayesplate.campaign.claim import LeftOut, refusing
 from bayesplate.campaign.common import CommonResidual
 from bayesplate.campaign.learning import ASTRAY, Learnt
 from bayesplate.campaign.population import Population
 from bayesplate.campaign.scatter import scatters_of
 from bayesplate.campaign.together import FEWEST_POINTS, values_of
 from bayesplate.effects.words import joined
+from bayesplate.posterior.inference import MOST_DRAWS_A_CHAIN
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
+from bayesplate.posterior.thinning import thin_walker_major
+from bayesplate.results.archive import DRAWN, sample_stats, tree_of
+from bayesplate.results.checking import CheckReport
 from bayesplate.results.contract import Elastic, Spread
 from bayesplate.results.summary import SamplerHealth, Summary
 
@@ -27,75 +32,47 @@ _N_DRAWS = 4000
 
 @dataclass(frozen=True)
 class SharedNumber:
-    """A number that all boards have in common, or about which their own scatter.
+    """A number that all boards have in common, or about which their own scatter."""
 
-    Attributes
-    ----------
-    all_boards : Spread, SI
-        Under what all boards teach; where their own scatter, the median of such boards.
-    scatter : Spread or None
-        Standard deviation of the logarithm of the boards' own; None where all have the same.
-    own : dict of Spread
-        By board: from that board alone.
-    others : dict of Spread
-        By board: what all boards but that one say of its own.
-    prior_source : str
-        Where the prior comes from; empty if the boards' cards state it.
-    """
-
-    all_boards: Spread
-    scatter: Spread | None
-    own: Mapping[str, Spread]
-    others: Mapping[str, Spread]
-    prior_source: str
-
-
-@dataclass(frozen=True)
-class LeftOutBoard:
-    """A board when the others teach it what is shared.
-
-    Attributes
-    ----------
-    log_score : float
-        ln of the probability of its readings then.
-    p_value : float
-        Of the board against the others: small where it does not want what they teach.
-    refuses : bool
-        Whether it does not, as many boards as were asked being allowed for.
-    """
-
-    log_score: float
-    p_value: float
-    refuses: bool
+    all_boards: Spread  # SI, under what all boards teach; where their own scatter, the median of such boards
+    scatter: Spread | None  # standard deviation of the logarithm of the boards' own; None where all have the same
+    own: Mapping[str, Spread]  # by board: from that board alone
+    others: Mapping[str, Spread]  # by board: what all boards but that one say of its own
+    prior_source: str  # where the prior comes from; empty if the boards' cards state it
 
 
 @dataclass(frozen=True)
 class PopulationSummary:
-    """The distribution of the boards' constants.
+    """The distribution of the boards' constants."""
 
-    Attributes
-    ----------
-    prior : str
-        Name of the prior card.
-    mean : Elastic of Spread, Pa
-        Median of the population.
-    sd_percent : Elastic of Spread
-        Standard deviation of ln E in the population, per cent.
-    next_board : Elastic of Spread, Pa
-        A board that was not measured yet.
-    boards : dict of Elastic of Spread, Pa
-        Each board's constants under the population.
-    """
+    prior: str  # name of the prior card
+    mean: Elastic[Spread]  # Pa, median of the population
+    sd_percent: Elastic[Spread]  # standard deviation of ln E in the population, per cent
+    next_board: Elastic[Spread]  # Pa, of a board that was not measured yet
+    boards: Mapping[str, Elastic[Spread]]  # Pa, each board's constants under the population
 
-    prior: str
-    mean: Elastic[Spread]
-    sd_percent: Elastic[Spread]
-    next_board: Elastic[Spread]
-    boards: Mapping[str, Elastic[Spread]]
+
+@dataclass(frozen=True)
+class CampaignRun:
+    """What was run, and whether all of it converged."""
+
+    format: int
+    name: str
+    seed: int
+    versions: Mapping[str, str]
+    card_sha256: str
+    converged: bool
+
+
+@dataclass(frozen=True)
+class UnconvergedCampaign(CampaignRun):
+    """The summary of a campaign of which something failed the convergence gate: no constants."""
+
+    warnings: tuple[str, ...]
 
 
 @dataclass(frozen=True, repr=False)
-class CampaignSummary:
+class CampaignSummary(CampaignRun):
     """The summary of a converged fit of a campaign.
 
     Attributes
@@ -109,7 +86,7 @@ class CampaignSummary:
     converged : bool
     shared : dict of SharedNumber
         By name: "attached_mass.mass", "transverse_shear.G_xz / E_x".
-    left_out_boards : dict of LeftOutBoard
+    left_out_boards : dict of LeftOut
         Empty where nothing is shared.
     common_residual : dict of CommonResidual
         By label.
@@ -121,14 +98,8 @@ class CampaignSummary:
     warnings : tuple of str
     """
 
-    format: int
-    name: str
-    seed: int
-    versions: Mapping[str, str]
-    card_sha256: str
-    converged: bool
     shared: Mapping[str, SharedNumber]
-    left_out_boards: Mapping[str, LeftOutBoard]
+    left_out_boards: Mapping[str, LeftOut]
     common_residual: Mapping[str, CommonResidual]
     population: PopulationSummary | None
     boards: Mapping[str, Summary]
@@ -138,19 +109,6 @@ class CampaignSummary:
     def __repr__(self) -> str:
         shared = ", ".join(self.shared) or "nothing shared"
         return f"<CampaignSummary of {self.name}: {len(self.boards)} boards; {shared}>"
-
-
-@dataclass(frozen=True)
-class UnconvergedCampaign:
-    """The summary of a campaign of which something failed the convergence gate: no constants."""
-
-    format: int
-    name: str
-    seed: int
-    versions: Mapping[str, str]
-    card_sha256: str
-    converged: bool
-    warnings: tuple[str, ...]
 
 
 def shared_numbers(learnt: Learnt, seed: int) -> dict[str, SharedNumber]:
@@ -181,16 +139,7 @@ def _own(member: Member, rng: np.random.Generator) -> Mapping[str, np.ndarray]:
     return values_of(member.shared, member.alone.z[picked])
 
 
-def left_out_boards(learnt: Learnt) -> dict[str, LeftOutBoard]:
-    """Every board against the others."""
-    refused = refusing(learnt.together)
-    return {
-        one.name: LeftOutBoard(one.log_score, one.p_value, one.name in refused) for one in left_out(learnt.together)
-    }
-
-
 def population_summary(population: Population, prior: str, seed: int) -> PopulationSummary:
-    """What a summary says of a population."""
     rng = np.random.default_rng([seed, _LINE, 1])
     next_board = population.next_board(rng)
     return PopulationSummary(
@@ -209,13 +158,7 @@ def _by_constant(values: np.ndarray, unit: str) -> Elastic[Spread]:
 
 
 def learning_warnings(learnt: Learnt, effective: Mapping[str, float]) -> tuple[str, ...]:
-    """What a reader of the shared numbers must know, a sentence each.
-
-    Parameters
-    ----------
-    effective : dict of float
-        By board: draws of equal weight that its posterior under all boards rests on.
-    """
+    """What a reader of the shared numbers must know; `effective` draws are what each board's posterior rests on."""
     told = []
     refused = refusing(learnt.together)
     if refused:
@@ -240,3 +183,66 @@ def learning_warnings(learnt: Learnt, effective: Mapping[str, float]) -> tuple[s
     if poor:
         told.append(f"few draws of {joined(poor)} stand for what all boards teach: their own intervals are rough")
     return tuple(told)
+
+
+@dataclass(frozen=True)
+class CheckedShared:
+    """A number that the boards would share."""
+
+    unit: str  # SI; "1" for a ratio
+    # prior_q05, prior_q50, prior_q95: quantiles of its prior
+    prior_q05: float
+    prior_q50: float
+    prior_q95: float
+    expected_sd: float  # in standard deviations of its prior, from all boards together
+    boards: Mapping[str, float]  # the same from each board alone
+
+
+@dataclass(frozen=True, repr=False)
+class CampaignCheck:
+    """What a fit of a campaign would do.
+
+    Attributes
+    ----------
+    name, title : str
+    shared : dict of CheckedShared
+    population : str or None
+        Name of the prior of the population.
+    boards : dict of CheckReport
+    """
+
+    name: str
+    title: str
+    shared: Mapping[str, CheckedShared]
+    population: str | None
+    boards: Mapping[str, CheckReport]
+
+    def __repr__(self) -> str:
+        told = ", ".join(f"{name} ({one.expected_sd:.2f} of its prior's sd)" for name, one in self.shared.items())
+        return f"<CampaignCheck of {self.name}: {len(self.boards)} boards; {told or 'nothing shared'}>"
+
+
+def archive_name(name: str) -> str:
+    """The name of a shared number as a variable: "transverse_shear.G_xz over E_x", because netCDF keeps the slash."""
+    return name.replace(" / ", " over ")
+
+
+def shared_tree(learnt: Learnt, attributes: Mapping[str, str]) -> Any:
+    """Draws of shared numbers and scatters, SI, each board's log likelihood of them, the sampler's health: DataTree."""
+    chains, convergence, together = learnt.chains, learnt.convergence, learnt.together
+    thinned = [
+        thin_walker_major(each, chains.burn_in, convergence.tau_max, n_draws_max=MOST_DRAWS_A_CHAIN)
+        for each in (chains.draws, chains.log_prob)
+    ]
+    z, log_posterior = thinned
+    likelihood = together.log_likelihoods(z.reshape(-1, z.shape[-1])).T.reshape(*z.shape[:2], -1)
+    values = values_of(together.coordinates, z)
+    return tree_of(
+        {
+            "posterior": {archive_name(name): (DRAWN, np.asarray(each)) for name, each in values.items()},
+            "log_likelihood": {"board": ((*DRAWN, "name"), likelihood)},
+            "sample_stats": sample_stats(log_posterior, convergence),
+        },
+        {"name": together.names, "parameter": [archive_name(one.name) for one in together.coordinates]},
+        attributes,
+    )

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from bayesplate.board.parameter import unit_of_people
-from bayesplate.campaign.checking import CampaignCheck
+from bayesplate.campaign.claim import LeftOut, TaughtBoard
 from bayesplate.campaign.common import CommonResidual
 from bayesplate.campaign.diagnosis import CampaignDiagnosis, words_of
-from bayesplate.campaign.summary import CampaignSummary, PopulationSummary, SharedNumber
+from bayesplate.campaign.summary import CampaignCheck, CampaignSummary, PopulationSummary, SharedNumber
 from bayesplate.results.tables import Row, Table, by_constant
 from bayesplate.results.words import GPA, interval, number, percent, plus_minus
 
@@ -75,13 +75,17 @@ def searched_tables(diagnosis: CampaignDiagnosis) -> tuple[Table, ...]:
                 number(one.log_score_gain, 1, signed=True),
                 number(one.before_rms_cents, 1),
                 number(one.after_rms_cents, 1),
-                f"{one.p_value:.2g}" + (" refuses" if one.refuses else ""),
+                _p_value(one),
             )
             for board, one in diagnosis.left_out_boards.items()
         )
         title = "Boards left out, the others teaching: gain in log score, error in cents"
         tables.append(Table(title, ("board", "gain", "before", "after", "p-value"), rows))
     return tuple(tables)
+
+
+def _p_value(one: LeftOut | TaughtBoard) -> str:
+    return f"{one.p_value:.2g}" + (" refuses" if one.refuses else "")
 
 
 def shared_name(name: str, one: SharedNumber) -> str:
@@ -110,8 +114,7 @@ def taught_table(summary: CampaignSummary, name: str) -> Table:
     for board, own in one.own.items():
         left = summary.left_out_boards[board]
         others = plus_minus(one.others[board], factor)
-        p_value = f"{left.p_value:.2g}" + (" refuses" if left.refuses else "")
-        rows.append((board, plus_minus(own, factor), others, p_value))
+        rows.append((board, plus_minus(own, factor), others, _p_value(left)))
     return Table(
         f"{shared_name(name, one)}: each board alone, and what the others teach it",
         ("board", "alone", "from the others", "p-value of the board"),

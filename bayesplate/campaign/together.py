@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.campaign.likelihood import Likelihood, LogDensity, moments, spread_points
 from bayesplate.campaign.pulls import Pull, moments_before, normal_posterior
 from bayesplate.campaign.scatter import Scatter, ScatteredLikelihood, expected_width, scatters_of, widths
@@ -18,8 +18,6 @@ from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.mixture import Mixture
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
 from bayesplate.posterior.statistics import effective_draws
-
-Floats = NDArray[np.float64]
 
 _LINE = 21
 FEWEST_POINTS = 500
@@ -35,36 +33,18 @@ _N_FITTED = 4096
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """Boards that are independent given the shared parameters: the numbers, then the scatters of those that have one.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Of the boards.
-    likelihoods : tuple of Likelihood
-        One per board, of its own numbers.
-    pulls : tuple of Pull
-        What each board says by itself, as a normal likelihood of its own numbers.
-    points : (n_points, n_coordinates) array
-        Standard coordinates at which densities are summed.
-    log_spread : (n_points,) array
-        ln of the density of these points.
-    """
+    """Boards that are independent given the shared numbers and the scatters of those that have one."""
 
     shared: tuple[Shared, ...]
-    names: tuple[str, ...]
-    likelihoods: tuple[Likelihood, ...]
-    pulls: tuple[Pull, ...]
-    points: Floats
-    log_spread: Floats
+    names: tuple[str, ...]  # of the boards
+    likelihoods: tuple[Likelihood, ...]  # one per board, of its own numbers
+    pulls: tuple[Pull, ...]  # what each board says by itself, as a normal likelihood of its own numbers
+    points: Floats  # (n_points, n_coordinates) array: standard coordinates at which densities are summed
+    log_spread: Floats  # (n_points,) array: ln of the density of these points
 
     @classmethod
     def of(
-        cls,
-        shared: Sequence[Shared],
-        names: Sequence[str],
-        likelihoods: Sequence[Likelihood],
-        pulls: Sequence[Pull],
+        cls, shared: Sequence[Shared], names: Sequence[str], likelihoods: Sequence[Likelihood], pulls: Sequence[Pull]
     ) -> Together:
         """Boards together, their points around all that they, or all but one of them, find likely."""
         weaker = [one.scattered(expected_width(shared)) for one in pulls]
@@ -82,7 +62,6 @@ class Together:
 
     @property
     def coordinates(self) -> tuple[Shared | Scatter, ...]:
-        """What is learned: the shared numbers, then their scatters."""
         return (*self.shared, *scatters_of(self.shared))
 
     @cached_property
@@ -140,7 +119,7 @@ class Together:
         return moments(self._of_a_board, self.weights(without))
 
     def taught_draws(self, rng: np.random.Generator, n: int, without: Collection[int] = ()) -> Floats:
-        """Draws of what `taught` gives the moments of: (n, n_shared) array."""
+        """Draws of a board's own numbers as `taught`: (n, n_shared) array."""
         return self._of_a_board[rng.choice(len(self.points), size=n, p=self.weights(without))]
 
     def under_all(self, board: int) -> tuple[Floats, Floats]:
@@ -156,7 +135,8 @@ class Together:
         """
         if len(self.coordinates) == len(self.shared):
             return lambda z: self.log_density(z, without)
-        draws, bounds = self.taught_draws(np.random.default_rng(_LINE), _N_FITTED, without), self._lower_bounds
+        draws = self.taught_draws(np.random.default_rng(_LINE), _N_FITTED, without)
+        bounds = np.array([one.prior.standard_bounds[0] for one in self.shared])  # minus infinity where there is none
         for i in np.flatnonzero(np.isfinite(bounds)):  # their mirror image beside them, or the density would fall off
             mirrored = draws.copy()
             mirrored[:, i] = 2.0 * bounds[i] - mirrored[:, i]
@@ -170,11 +150,6 @@ class Together:
             return np.where(inside, mixture.log_density(z), -np.inf)
 
         return log_density
-
-    @property
-    def _lower_bounds(self) -> Floats:
-        """Of the standard coordinates of the numbers: (n_shared,) array, minus infinity where there is none."""
-        return np.array([one.prior.standard_bounds[0] for one in self.shared])
 
     @cached_property
     def _at_points(self) -> tuple[Floats, Floats]:
@@ -202,13 +177,7 @@ class Together:
 def walk(
     together: Together, settings: SamplerSettings, progress: Callable[[Progress], None] | None = None
 ) -> tuple[Chains, Convergence]:
-    """Sample the shared parameters from all boards.
-
-    Returns
-    -------
-    chains : Chains
-        Of standard coordinates: the shared numbers, then their scatters.
-    """
+    """Sample the shared numbers, then their scatters, in standard coordinates, from all boards."""
     names = [one.name for one in together.coordinates]
     return sample(together.log_density, *together.moments(), settings, names=names, progress=progress)
 

@@ -15,7 +15,6 @@ from bayesplate.campaign.claim import SharedClaim, TaughtBoard, judge, taught_bo
 from bayesplate.campaign.common import common_residuals
 from bayesplate.campaign.diagnosis import (
     FORMAT,
-    IMPROBABLE,
     CampaignDiagnosis,
     PooledErrors,
     named,
@@ -38,6 +37,7 @@ from bayesplate.commands.campaign_fit import (
 from bayesplate.commands.fitting import FIT, FitResult, Run, Stages
 from bayesplate.commands.shown import Shown, show_campaign_diagnosis
 from bayesplate.diagnosis.baseline import baseline_of
+from bayesplate.diagnosis.claim import IMPROBABLE
 from bayesplate.diagnosis.forms import forms
 from bayesplate.effects import EFFECTS
 from bayesplate.errors import InputError

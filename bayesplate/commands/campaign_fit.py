@@ -14,8 +14,8 @@ import numpy as np
 
 from bayesplate.board.board import Board
 from bayesplate.board.prior import PriorCard
-from bayesplate.campaign.archive import shared_tree
 from bayesplate.campaign.boards import Member
+from bayesplate.campaign.claim import left_out
 from bayesplate.campaign.common import common_residuals
 from bayesplate.campaign.diagnosis import CampaignDiagnosis
 from bayesplate.campaign.learning import Learnt, learn
@@ -25,9 +25,9 @@ from bayesplate.campaign.summary import (
     CampaignSummary,
     UnconvergedCampaign,
     learning_warnings,
-    left_out_boards,
     population_summary,
     shared_numbers,
+    shared_tree,
 )
 from bayesplate.commands.campaign import Campaign
 from bayesplate.commands.fitting import FIT, FitResult, Run, Stages, not_converged
@@ -265,7 +265,7 @@ def _summary(
         card_sha256=campaign.card.sha256,
         converged=True,
         shared={} if learnt is None else shared_numbers(learnt, seed),
-        left_out_boards={} if learnt is None else left_out_boards(learnt),
+        left_out_boards={} if learnt is None else left_out(learnt.together),
         common_residual=common_residuals(summaries, boards_of(boards)),
         population=None if population is None or prior is None else population_summary(population, prior.name, seed),
         boards=summaries,

@@ -9,11 +9,11 @@ from typing import Annotated
 import numpy as np
 
 from bayesplate.board.material import MODULI, moduli
-from bayesplate.campaign.checking import CampaignCheck, CheckedShared
 from bayesplate.campaign.given import GivenShared
 from bayesplate.campaign.pulls import Pull, moments_before
 from bayesplate.campaign.scatter import expected_width
 from bayesplate.campaign.shared import Shared
+from bayesplate.campaign.summary import CampaignCheck, CheckedShared
 from bayesplate.commands.arguments import checked
 from bayesplate.commands.campaign import Campaign, by_kind
 from bayesplate.commands.options import CARD, Effects, SetupFile

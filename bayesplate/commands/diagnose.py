@@ -35,12 +35,12 @@ from bayesplate.diagnosis.result import Diagnosis, diagnosis_json
 from bayesplate.diagnosis.search import Found
 from bayesplate.diagnosis.sizes import refit_board
 from bayesplate.diagnosis.stated import stated_claims
-from bayesplate.diagnosis.told import relabelled_sentence
 from bayesplate.diagnosis.verdict import Answer, Verdict, answer_words, decide
+from bayesplate.diagnosis.words import relabelled_sentence
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
 from bayesplate.estimates.leave_one_out import carrying_modes, indices_of, united
 from bayesplate.files import write_text
-from bayesplate.planning.drawn_up import first_of
+from bayesplate.planning.bench import first_of
 from bayesplate.planning.explained import believed, survivors
 from bayesplate.planning.proposals import BELIEFS, Planner
 from bayesplate.report.plots import DiagnosePlots

@@ -27,15 +27,13 @@ from bayesplate.diagnosis.verdict import WITHIN
 from bayesplate.effects import effect_faults
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.files import make_folder, require_new, write_text
-from bayesplate.planning.beliefs import Beliefs
-from bayesplate.planning.bench import Bench
-from bayesplate.planning.drawn_up import drawn_up
+from bayesplate.planning.beliefs import Beliefs, prior_beliefs
+from bayesplate.planning.bench import Bench, drawn_up
 from bayesplate.planning.explained import asked, believed, surviving
 from bayesplate.planning.gains import EXPLANATIONS
 from bayesplate.planning.plan import Plan
 from bayesplate.planning.proposals import BELIEFS, Costs, Planner
 from bayesplate.planning.together import beliefs_together
-from bayesplate.planning.unmeasured import prior_beliefs
 from bayesplate.report.plots import PlanPlots
 from bayesplate.results.contract import json_text
 from bayesplate.results.folder import DIAGNOSIS

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bayesplate.campaign.checking import CampaignCheck
 from bayesplate.campaign.diagnosis import CampaignDiagnosis, claim_sentence
-from bayesplate.campaign.summary import CampaignSummary
+from bayesplate.campaign.summary import CampaignCheck, CampaignSummary
 from bayesplate.campaign.tables import campaign_check_tables, campaign_tables, diagnosis_tables
 from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.diagnosis.tables import every_table
-from bayesplate.diagnosis.told import alike_sentence, carrying_words, known_sentences, verdict_sentence, warnings
+from bayesplate.diagnosis.words import alike_sentence, carrying_words, known_sentences, verdict_sentence, warnings
 from bayesplate.effects.words import effect_names
 from bayesplate.estimates.leave_one_out import carrying_sentence
 from bayesplate.grading.boards import BatchSummary

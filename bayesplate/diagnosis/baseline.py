@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.sessions import same_modes, under_prior_scales
 from bayesplate.estimates.least_squares import log_measured, reading_scales
@@ -31,43 +32,25 @@ from bayesplate.plate.naming import Place
 from bayesplate.posterior.laplace import every_predictor
 from bayesplate.posterior.posing import PosedProblem
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
-class Spectrum:
+class PossibleModes:
     """All modes that the readings of a board may be, linear in constants and inputs around the estimate.
 
     One setup after the other: the labelled modes first, then those of peaks.
-
-    Attributes
-    ----------
-    log_frequency : (n_every,) array
-        ln f (Hz) at the estimate.
-    slopes : (n_every, n_constants) array
-        d ln f / d ln D.
-    input_slopes : (n_every, n_inputs) array
-        d ln f / d z.
-    places : tuple of tuple of Place
-        One tuple per setup.
-    inputs : (n_inputs,) array
-        z at the estimate.
-    peaks : tuple of PeakLikelihood or None
-        For each setup what its peaks say of its modes; None where all labels are certain.
-    predict : callable
-        ln f (Hz) of all of them as a function of x, without an effect.
-    discrepancy : (n_every,) array or 0
-        ln f of the board less that of its plate, at the estimate: `bayesplate.board.sessions`.
     """
 
-    log_frequency: Floats
-    slopes: Floats
-    input_slopes: Floats
-    places: tuple[tuple[Place, ...], ...]
-    inputs: Floats
+    log_frequency: Floats  # (n_every,) array: ln f (Hz) at the estimate
+    slopes: Floats  # (n_every, n_constants) array: d ln f / d ln D
+    input_slopes: Floats  # (n_every, n_inputs) array: d ln f / d z
+    places: tuple[tuple[Place, ...], ...]  # one tuple per setup
+    inputs: Floats  # (n_inputs,) array: z at the estimate
+    # for each setup what its peaks say of its modes; None where all labels are certain
     peaks: tuple[PeakLikelihood | None, ...]
-    predict: Predict
+    predict: Predict  # ln f (Hz) of all of them as a function of x, without an effect
+    # (n_every,) array or 0: ln f of the board less that of its plate, at the estimate (`board.sessions`)
     discrepancy: Floats | float = 0.0
 
     @cached_property
@@ -88,45 +71,24 @@ class Spectrum:
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """A fit without the effect that is looked for, and the modes that its readings are taken for.
-
-    Attributes
-    ----------
-    values : dict of float
-        Rigidities and inputs at the estimate, SI.
-    log_rigidities : (n_constants,) array
-        x_hat.
-    log_readings : (n_modes,) array
-        ln measured (Hz).
-    every : Spectrum
-        All modes that the readings may be.
-    rows : (n_modes,) array of int
-        Which of them each reading is; -1: none, and then what the arrays below say of the reading means nothing.
-    symmetry : tuple of (bool, bool)
-        Whether each setup's two halves are alike along x and along y.
-    """
+    """A fit without the effect that is looked for, and the modes that its readings are taken for."""
 
     board: Board
-    values: Mapping[str, Floats]
-    log_rigidities: Floats
-    log_readings: Floats
-    every: Spectrum
+    values: Mapping[str, Floats]  # rigidities and inputs at the estimate, SI
+    log_rigidities: Floats  # (n_constants,) array: x_hat
+    log_readings: Floats  # (n_modes,) array: ln measured (Hz)
+    every: PossibleModes  # all modes that the readings may be
+    # (n_modes,) array of int: which of them each reading is; -1: none, and then what the arrays below say of the
+    # reading means nothing
     rows: Rows
-    symmetry: tuple[tuple[bool, bool], ...]
+    symmetry: tuple[tuple[bool, bool], ...]  # whether each setup's two halves are alike along x and along y
 
     def labelled(self, rows: Rows) -> Baseline:
-        """The same readings taken for other modes: itself where they are the same ones.
-
-        Parameters
-        ----------
-        rows : (n_modes,) array of int
-            Of `every`; -1: none.
-        """
+        """The same readings taken for other modes, rows of `every` (-1: none); itself where they are the same."""
         return self if np.array_equal(rows, self.rows) else replace(self, rows=rows)
 
     @property
     def n_modes(self) -> int:
-        """Number of readings."""
         return int(self.log_readings.size)
 
     @cached_property
@@ -166,7 +128,6 @@ class Baseline:
 
     @cached_property
     def places(self) -> tuple[Place, ...]:
-        """Places of the modes."""
         flat = [place for part in self.every.places for place in part]
         return tuple(flat[row] for row in self.rows)
 
@@ -226,19 +187,8 @@ class Baseline:
         return 0.0 if peaks is None or at not in peaks.readings else peaks.log_density_alone(at)
 
     def refitted_to(self, shift: Floats) -> tuple[Floats, Floats]:
-        """The constants fitted again, by weighted least squares, to frequencies that have shifted.
-
-        Parameters
-        ----------
-        shift : (n_modes,) array
-
-        Returns
-        -------
-        visible : (n_modes,) array
-            What they leave of the shift: weighted by the readings' uncertainties it is never the larger one.
-        step : (n_constants,) array
-            Change of ln D.
-        """
+        """What constants, fitted again by weights, leave of an (n_modes,) shift, never more than it; their step in ln
+        D."""
         if not np.isfinite(shift).all():
             return np.full(shift.size, np.nan), np.full(self.log_rigidities.size, np.nan)
         predict = _of_rows(self.every.predict, self.rows)
@@ -260,7 +210,7 @@ def baseline_of(problem: PosedProblem) -> Baseline:
     values = parameters.values_at(problem.centre)
     input_slopes, inputs = under_prior_scales(board, values, slopes[:, n:], at[n:])
     discrepancies = [np.broadcast_to(one.discrepancies(values)[0], len(one.every_place)) for one in models]
-    every = Spectrum(
+    every = PossibleModes(
         log_frequency=predict(at[None, :])[0],
         slopes=slopes[:, :n],
         input_slopes=input_slopes,

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.diagnosis.folds import Nested, carrying, log_score_gains, nested
 from bayesplate.diagnosis.null_control import NullControl
 from bayesplate.diagnosis.search import PASSES, Found
@@ -17,7 +17,6 @@ from bayesplate.diagnosis.sizes import at_limit
 from bayesplate.diagnosis.verdict import Verdict, answers, stands_out, turned
 from bayesplate.estimates.leave_one_out import indices_of
 
-Floats = NDArray[np.float64]
 ConditionName = Literal[
     "chance selection", "log score", "probability of none", "probability of another", "prior predictive"
 ]
@@ -36,21 +35,15 @@ FALLS_TO = 2.0 / 3.0
 
 @dataclass(frozen=True)
 class Condition:
-    """One condition of the claim.
+    """One condition of the claim."""
 
-    Attributes
-    ----------
-    name : str
-        "chance selection": nested left-out error after over before, to be below that of 95 % of null simulations made
-        to choose. "log score": nested gain, to exceed two standard errors. "probability of none": the largest over the
-        widths of the sizes' priors, to be below 0.05. "probability of another": that something else is lacking than
-        what the verdict tells, the largest over the same widths, to be below 0.05. "prior predictive": p-value with
-        the effect, at least 0.05.
-    value, limit : float or None
-        None where too few readings leave nothing to judge by.
-    """
-
+    # "chance selection": nested left-out error after over before, to be below that of 95 % of null simulations made to
+    # choose. "log score": nested gain, to exceed two standard errors. "probability of none": the largest over the
+    # widths of the sizes' priors, to be below 0.05. "probability of another": that something else is lacking than what
+    # the verdict tells, the largest over the same widths, to be below 0.05. "prior predictive": p-value with the
+    # effect, at least 0.05.
     name: ConditionName
+    # value, limit: None where too few readings leave nothing to judge by
     value: float | None
     limit: float | None
     is_met: bool
@@ -58,15 +51,9 @@ class Condition:
 
 @dataclass(frozen=True)
 class Claim:
-    """Whether it may be said that the error is reduced.
+    """Whether it may be said that the error is reduced."""
 
-    Attributes
-    ----------
-    conditions : tuple of Condition
-        Empty if nothing was added to the model.
-    """
-
-    conditions: tuple[Condition, ...] = ()
+    conditions: tuple[Condition, ...] = ()  # empty if nothing was added to the model
 
     @property
     def holds(self) -> bool:
@@ -75,51 +62,31 @@ class Claim:
 
 
 def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Nested | None) -> Claim:
-    """Judge the five conditions.
-
-    Parameters
-    ----------
-    folded : Nested or None
-        Of the board's own readings; it and the control without those whose modes alone carry something.
-    """
+    """Judge the five conditions; `folded` and the control do not count readings whose modes alone carry something."""
     if not verdict.index:
         return Claim()
     searches = [found, *(varied(found, width=factor) for factor in WIDTHS.values())]
-    told = {one.index for one in verdict.stands_for}
+    told, p_value = {one.index for one in verdict.stands_for}, found.p_value(verdict.index)
+    others = [sum(each.support for each in answers(one) if each.index not in told) for one in searches]
     return Claim(
         (
             _beyond_chance(folded, control),
             _better_score(found, folded),
             _below("probability of none", [one.none for one in searches]),
-            _below("probability of another", [_another(one, told) for one in searches]),
-            _passes(found.p_value(verdict.index)),
+            _below("probability of another", others),
+            Condition("prior predictive", p_value, PASSES, p_value >= PASSES),
         )
     )
 
 
 def named_in_part(
-    found: Found,
-    verdict: Verdict,
-    folded: Nested | None,
-    others: Iterable[tuple[str, Found]] | None = None,
+    found: Found, verdict: Verdict, folded: Nested | None, others: Iterable[tuple[str, Found]] | None = None
 ) -> tuple[str, ...]:
     """Effects that explain readings in part though something else remains; none where that cannot be said.
 
-    The verdict stays what it is, nothing is claimed, and the constants are not to be trusted.
-
-    Parameters
-    ----------
-    folded : Nested or None
-        Of the board's own readings.
-    others : iterable of (str, Found), optional
-        The searches that a name has to survive, as of `bayesplate.diagnosis.verdict.decide`.
-
-    Returns
-    -------
-    tuple of str
-        The members of what comes nearest, if it fails the gate and not the limits of its sizes, no effect is less
-        probable than `SURELY`, the name survives every other assumption, and the nested left-out error falls to
-        `FALLS_TO` or further.
+    The members of what comes nearest, if it fails the gate and not the limits of its sizes, no effect is less probable
+    than `SURELY`, the name survives every other assumption, and the nested left-out error falls to `FALLS_TO` or
+    further. The verdict stays what it is, nothing is claimed, and the constants are not to be trusted.
     """
     nearest = verdict.nearest
     if nearest is None or found.none >= SURELY:
@@ -167,14 +134,5 @@ def _better_score(found: Found, folded: Nested | None) -> Condition:
 
 
 def _below(name: ConditionName, probabilities: Sequence[float]) -> Condition:
-    largest = max(probabilities)
+    largest = float(max(probabilities))
     return Condition(name, largest, IMPROBABLE, largest < IMPROBABLE)
-
-
-def _another(found: Found, told: Container[int]) -> float:
-    """Probability of all effects but those of the hypotheses that are told."""
-    return float(sum(one.support for one in answers(found) if one.index not in told))
-
-
-def _passes(p_value: float) -> Condition:
-    return Condition("prior predictive", p_value, PASSES, p_value >= PASSES)

@@ -6,57 +6,37 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesplate.diagnosis.baseline import Baseline
+from bayesplate.arrays import Floats
+from bayesplate.diagnosis.baseline import Baseline, Rows
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.laws import FormLaw
 from bayesplate.diagnosis.search import Found
 from bayesplate.diagnosis.terms import normalised
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.intp]
 OfForms = Iterator[tuple[int, FormLaw, Rows, Floats]]
 """Form by form: its index, its law, the draws that it has, and their sizes."""
 
 
 @dataclass(frozen=True, eq=False)
 class TermDraws:
-    """Draws under one hypothesis, linear in the residual about each cell.
+    """Draws under one hypothesis, linear in the residual about each cell."""
 
-    Attributes
-    ----------
-    log_rigidities : (n_draws, n_constants) array
-        ln D_x, ln D_y, ln D_s.
-    inputs : (n_draws, n_inputs) array
-        Standard coordinates of the board's uncertain inputs.
-    cells : (n_draws,) array of int
-        Of the hypothesis' table.
-    within : (n_draws, n_tangents) array
-        Place within the cell, standard deviations.
-    predicted : (n_draws, n_every) array
-        ln f (Hz) of all modes as the terms have it, with the inputs at the middle of their priors where they are zero.
-    variance : (n_draws, n_modes) array
-        Of each reading, relative; infinite where it is no mode.
-    noise : (n_draws, n_setups) array
-        Relative.
-    """
-
-    log_rigidities: Floats
-    inputs: Floats
-    cells: Rows
-    within: Floats
+    log_rigidities: Floats  # (n_draws, n_constants) array: ln D_x, ln D_y, ln D_s
+    inputs: Floats  # (n_draws, n_inputs) array: standard coordinates of the board's uncertain inputs
+    cells: Rows  # (n_draws,) array of int: of the hypothesis' table
+    within: Floats  # (n_draws, n_tangents) array: place within the cell, standard deviations
+    # (n_draws, n_every) array: ln f (Hz) of all modes as the terms have it, with the inputs at the middle of their
+    # priors where they are zero
     predicted: Floats
-    variance: Floats
-    noise: Floats
+    variance: Floats  # (n_draws, n_modes) array: of each reading, relative; infinite where it is no mode
+    noise: Floats  # (n_draws, n_setups) array: relative
 
     @property
     def n_draws(self) -> int:
-        """How many."""
         return len(self.log_rigidities)
 
     def at(self, picked: Rows) -> TermDraws:
-        """Some of the draws."""
         return TermDraws(*(getattr(self, one.name)[picked] for one in fields(self)))
 
 
@@ -134,17 +114,16 @@ def standard_sizes_of(found: Found, index: int, drawn: TermDraws, which: int) ->
 def sizes_of(
     found: Found, index: int, drawn: TermDraws, which: int
 ) -> Iterator[tuple[int, FormLaw, Rows, dict[str, Floats]]]:
-    """The same in SI units, by the name of the parameter, within the bounds of their priors."""
+    """Sizes of one effect at each draw in SI units, by parameter, within the bounds of their priors."""
     for i, law, rows, z in standard_sizes_of(found, index, drawn, which):
         values = {}
         for free, column in zip(law.form.free, z.T, strict=True):
-            low, high = (float(free.prior.standard(bound)) for bound in (free.prior.lower, free.prior.upper))
-            values[free.name] = np.asarray(free.prior.value(np.clip(column, low, high)))
+            values[free.name] = np.asarray(free.prior.value(np.clip(column, *free.prior.standard_bounds)))
         yield i, law, rows, values
 
 
 def joint_sizes_of(found: Found, index: int, drawn: TermDraws) -> Iterator[tuple[FormLaw, Rows, dict[str, Floats]]]:
-    """The same of both effects of a pair at once, of those of its draws for which there is a law of both."""
+    """Sizes of both effects of a pair at once, at those draws for which there is a law of both."""
     laws = found.ground.hypotheses[index].joint
     if not laws:
         return

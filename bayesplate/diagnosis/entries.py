@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesplate.diagnosis.candidates import Amplitude, EffectEntry, ExchangeEntry, Fate
+from bayesplate.diagnosis.result import Amplitude, EffectEntry, ExchangeEntry, Fate
 from bayesplate.diagnosis.search import PASSES, Candidate, Found
 from bayesplate.diagnosis.signatures import look_alikes
 from bayesplate.diagnosis.sizes import likely_form, size_posterior
@@ -16,7 +15,6 @@ from bayesplate.effects import EFFECTS, effects_of
 from bayesplate.posterior.slips import times
 from bayesplate.results.contract import finite
 
-Floats = NDArray[np.float64]
 Told = tuple[Fate, str | None]
 """What became of a candidate, and the reason; None for what was not rejected."""
 
@@ -27,15 +25,7 @@ _LIKELY = 0.1
 def effect_entry(
     found: Found, verdict: Verdict, ranked: Sequence[Answer], one: Candidate, doubled: float
 ) -> EffectEntry:
-    """What there is to say of a candidate effect.
-
-    Parameters
-    ----------
-    ranked : sequence of Answer
-        Best first.
-    doubled : float
-        Its inclusion probability with the width of every amplitude prior doubled.
-    """
+    """All of a candidate effect; `doubled` is its inclusion probability with every prior twice as wide."""
     ground = found.ground
     index = next(i for i, other in enumerate(ground.hypotheses) if other.members == (one.name,))
     gained = float(found.log_evidence[index] - found.log_evidence[0])
@@ -103,12 +93,9 @@ def _where(one: Candidate) -> str:
 def _best_fit(found: Found, index: int) -> float:
     """Log density at the best size, noise averaged: what the evidence would be without the width of the prior."""
     hypothesis = found.ground.hypotheses[index]
-    log_density = hypothesis.terms.log_densities(found.seen(index))[:, 0]
-    by_cell = log_density.reshape(hypothesis.noise.weights.size, -1)
-    top = by_cell.max(axis=0)
-    with np.errstate(divide="ignore"):
-        summed = top + np.log(np.exp(by_cell - top).sum(axis=0)) - np.log(hypothesis.table.weights)
-    return float(summed[hypothesis.table.weights > 0].max()) - hypothesis.own.half_log_det + hypothesis.log_labels
+    weights, by_cell = hypothesis.table.weights, hypothesis.log_by_cell(found.ground.baseline, found.residual)
+    best = float((by_cell[weights > 0] - np.log(weights[weights > 0])).max())
+    return best - hypothesis.own.half_log_det + hypothesis.log_labels
 
 
 def _amplitude(found: Found, index: int, one: Candidate) -> Amplitude | None:
@@ -158,15 +145,7 @@ def _fixed(one: Candidate) -> Amplitude | None:
 
 
 def fate_of(found: Found, verdict: Verdict, ranked: Sequence[Answer], name: str, index: int) -> Told:
-    """What became of a candidate effect.
-
-    Parameters
-    ----------
-    ranked : sequence of Answer
-        Best first.
-    index : int
-        Of the hypothesis that it acts alone.
-    """
+    """What became of a candidate effect; `index` is that of the hypothesis that it acts alone."""
     if name in verdict.effects:
         return "in the verdict", None
     if (
@@ -201,7 +180,7 @@ def _without_need(found: Found, verdict: Verdict) -> Told | None:
 
 
 def _misfit(found: Found, index: int) -> Told | None:
-    """Too large a misfit with the candidate alone."""
+    """ "does not fit" where the misfit is too large with the candidate alone."""
     p_value = found.p_value(index)
     if p_value >= PASSES:
         return None
@@ -209,7 +188,7 @@ def _misfit(found: Found, index: int) -> Told | None:
 
 
 def _less_probable(found: Found, ranked: Sequence[Answer], name: str | None, index: int) -> Told:
-    """Its best answer beside the best of all."""
+    """ "less probable", with the support of its best answer beside that of the best of all."""
     best = ranked[0]
     own = max((one.support for one in ranked if one.index == index or name in one.members), default=0.0)
     mine, others = f"{own:.3f}", f"{best.support:.3f}"

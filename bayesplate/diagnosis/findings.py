@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.diagnosis.claim import Claim
-from bayesplate.diagnosis.constants import draw_constants
 from bayesplate.diagnosis.entries import effect_entry, exchange_entries, p_value_of, ratio_words
 from bayesplate.diagnosis.folds import Nested, log_score
 from bayesplate.diagnosis.hypotheses import RELABELLING, are_stated
@@ -28,7 +27,7 @@ from bayesplate.diagnosis.result import (
     PValues,
 )
 from bayesplate.diagnosis.search import PASSES, Found
-from bayesplate.diagnosis.sensitivity import WIDTHS, varied
+from bayesplate.diagnosis.sensitivity import WIDTHS, draw_constants, varied
 from bayesplate.diagnosis.stated import StatedClaim
 from bayesplate.diagnosis.verdict import Answer, Verdict, alternatives_words, answer_words, answers, p_words
 from bayesplate.effects import EFFECTS
@@ -39,8 +38,6 @@ from bayesplate.posterior.draws import Draws
 from bayesplate.results.contract import Spread, finite, rms
 from bayesplate.results.modes import foretold
 from bayesplate.results.summary import Summary
-
-Floats = NDArray[np.float64]
 
 _AVERAGE_LINE = 11
 _N_AVERAGED = 8000
@@ -59,41 +56,25 @@ class Side:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """Everything that the report of a diagnosis is made of.
-
-    Attributes
-    ----------
-    before, after : Side
-        The same where nothing was added.
-    claim : Claim
-        Of the explanation that was fitted again.
-    known : sequence of KnownFit
-        The board as it stands first.
-    finalists : sequence of (Answer, Side)
-        Explanations that were fitted again, best first, or the one that comes nearest where none is enough.
-    has_slip : bool
-        Whether the fit without an effect names a reading or two that a slip explains.
-    in_part : tuple of str
-        Effects that explain the readings in part.
-    carrying : tuple of CarryingMode
-        Modes that count in no left-out error or score, before and after alike.
-    """
+    """Everything that the report of a diagnosis is made of."""
 
     found: Found
     verdict: Verdict
     control: NullControl
     folded: Nested | None
+    # before, after: the same where nothing was added
     before: Side
     after: Side
-    claim: Claim
+    claim: Claim  # of the explanation that was fitted again
     recommendation: str
-    known: Sequence[KnownFit] = ()
+    known: Sequence[KnownFit] = ()  # the board as it stands first
     stated_claims: Sequence[StatedClaim] = ()
+    # explanations that were fitted again, best first, or the one that comes nearest where none is enough
     finalists: Sequence[tuple[Answer, Side]] = ()
-    has_slip: bool = False
+    has_slip: bool = False  # whether the fit without an effect names a reading or two that a slip explains
     notes: tuple[str, ...] = ()
-    in_part: tuple[str, ...] = ()
-    carrying: tuple[CarryingMode, ...] = ()
+    in_part: tuple[str, ...] = ()  # effects that explain the readings in part
+    carrying: tuple[CarryingMode, ...] = ()  # modes that count in no left-out error or score, before and after alike
 
     @property
     def carried(self) -> tuple[int, ...]:
@@ -183,7 +164,7 @@ def left_out_rms_cents(summary: Summary, carrying: Sequence[CarryingMode]) -> fl
 
 
 def _log_score(case: Case, side: Side) -> float | None:
-    """None where too few modes are left, or none that others foretell."""
+    """The log score of a model; None where too few modes are left, or none that others foretell."""
     if case.folded is None or not case.folded.counted.any():
         return None
     return log_score(case.found.ground, side.index, case.found.residual, case.folded.carried)
@@ -211,7 +192,7 @@ def _log_odds(found: Found) -> float | None:
 
 
 def _histogram(values: Floats) -> Histogram | None:
-    """None where there is nothing to count: without hypotheses no set has odds."""
+    """Values of simulated sets by number; None where they have none, for there are no hypotheses."""
     if not np.isfinite(values).all():
         return None
     counts, edges = np.histogram(values, bins=_N_BINS)

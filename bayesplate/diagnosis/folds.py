@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
+from bayesplate.diagnosis.baseline import Rows
 from bayesplate.diagnosis.hypotheses import Hypothesis, odds_against_none, probabilities
 from bayesplate.diagnosis.search import Found, Ground
 from bayesplate.estimates.leave_one_out import CarryingMode, carrying_modes, leverages_of, united
-
-Floats = NDArray[np.float64]
 
 NEEDED = 0.1
 """Probability of no effect below which one is needed, whatever the null simulations say."""
@@ -30,23 +30,15 @@ FEWEST = 5
 
 @dataclass(frozen=True, eq=False)
 class Nested:
-    """Errors of predicting readings that were left out, for many data sets.
+    """Errors of predicting readings that were left out, for many data sets."""
 
-    Attributes
-    ----------
-    before : (n_sets, n_modes) array
-        ln measured less predicted, without any effect.
-    after : (n_sets, n_modes) array
-        With the effect that the remaining readings choose, or none; not a number where the reading is no mode then.
-    chosen : (n_sets, n_modes) array of int
-        Index of the hypothesis that the fold of each reading chose.
-    carried : tuple of int
-        Readings that count neither before nor after, for their mode alone carries a constant or a size.
-    """
-
-    before: Floats
+    before: Floats  # (n_sets, n_modes) array: ln measured less predicted, without any effect
+    # (n_sets, n_modes) array: with the effect that the remaining readings choose, or none; not a number where the
+    # reading is no mode then
     after: Floats
-    chosen: NDArray[np.intp]
+    # (n_sets, n_modes) array of int: index of the hypothesis that the fold of each reading chose
+    chosen: Rows
+    # readings that count neither before nor after, for their mode alone carries a constant or a size
     carried: tuple[int, ...] = ()
 
     def without(self, carried: Sequence[int]) -> Nested:
@@ -55,10 +47,7 @@ class Nested:
 
     @property
     def counted(self) -> NDArray[np.bool_]:
-        """Which errors count: of readings that are a mode before and after, and that others foretell.
-
-        (n_sets, n_modes) array.
-        """
+        """Which errors count, (n_sets, n_modes): of readings that are a mode before and after and not carried."""
         counted = np.isfinite(self.before) & np.isfinite(self.after)
         counted[:, list(self.carried)] = False
         return counted
@@ -72,18 +61,11 @@ class Nested:
 
 
 def nested(ground: Ground, residuals: Floats, needed_from: float = CERTAINLY_NEEDED) -> Nested | None:
-    """Leave each mode out in turn, search again without it, and predict its readings by what was chosen.
+    """Leave each mode out in turn, search again, predict its readings by what was chosen; None where readings are too
+    few.
 
-    Parameters
-    ----------
-    residuals : (n_sets, n_modes) array
-    needed_from : float
-        ln odds against no effect above which a fold adds the most probable one; `ALWAYS` makes every fold choose.
-
-    Returns
-    -------
-    Nested or None
-        None if there are too few readings.
+    Residuals are an (n_sets, n_modes) array. A fold adds the most probable effect where the ln odds against none exceed
+    `needed_from`; `ALWAYS` makes every fold choose.
     """
     if len(ground.baseline.same_modes) < FEWEST:
         return None
@@ -97,7 +79,7 @@ def nested(ground: Ground, residuals: Floats, needed_from: float = CERTAINLY_NEE
     return Nested(errors[0].T, after.T, chosen.T)
 
 
-def choices(found: Sequence[Hypothesis], evidences: Floats, needed_from: float = CERTAINLY_NEEDED) -> NDArray[np.intp]:
+def choices(found: Sequence[Hypothesis], evidences: Floats, needed_from: float = CERTAINLY_NEEDED) -> Rows:
     """The most probable effect by each evidence, or none where the odds against none are too low.
 
     From an (n_hypotheses, ...) array one of the same shape but for its first axis.
@@ -116,19 +98,8 @@ def log_score(ground: Ground, index: int, residual: Floats, carried: Collection[
     return float(_log_scores(ground, index, residual)[_foretold(ground, carried)].sum())
 
 
-def log_score_gains(
-    ground: Ground, residual: Floats, chosen: NDArray[np.intp], carried: Collection[int] = ()
-) -> Floats:
-    """What each fold's choice adds to the log density of the readings that it left out: one per mode, in their order.
-
-    Parameters
-    ----------
-    residual : (n_modes,) array
-    chosen : (n_modes,) array of int
-        Index of the hypothesis that the fold of each reading chose.
-    carried : collection of int
-        Readings whose modes are not counted.
-    """
+def log_score_gains(ground: Ground, residual: Floats, chosen: Rows, carried: Collection[int] = ()) -> Floats:
+    """What each fold's choice adds to the log density of the readings left out: one per mode that counts."""
     scores = {int(index): _log_scores(ground, int(index), residual) for index in {0, *chosen}}
     gains = [scores[int(chosen[mode[0]])][i] - scores[0][i] for i, mode in enumerate(ground.baseline.same_modes)]
     return np.array(gains)[_foretold(ground, carried)]
@@ -148,18 +119,12 @@ def _log_scores(ground: Ground, index: int, residual: Floats) -> Floats:
 
 
 def carrying(found: Found, index: int) -> tuple[CarryingMode, ...]:
-    """Modes that alone carry something without any effect or under a hypothesis: both are judged without them.
-
-    Parameters
-    ----------
-    index : int
-        Of the hypothesis; 0: without any effect.
-    """
+    """Modes that alone carry something without any effect or under a hypothesis: both are judged without them."""
     return united(*(_under(found, one) for one in dict.fromkeys((0, index))))
 
 
 def _under(found: Found, index: int) -> tuple[CarryingMode, ...]:
-    """The same under one hypothesis, at its most probable sizes: their priors count as one more observation each."""
+    """Carrying modes under one hypothesis, at its most probable sizes: each prior counts as one more observation."""
     terms, whole = found.ground.hypotheses[index].terms, found.ground.hypotheses[index].table
     baseline, board = terms.baseline, terms.baseline.board
     cell = int(np.argmax(found.cells(index)))

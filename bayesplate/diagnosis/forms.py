@@ -13,37 +13,20 @@ from bayesplate.effects.base import EffectForm
 
 @dataclass(frozen=True, eq=False)
 class Form:
-    """One way in which an effect may be present.
-
-    Attributes
-    ----------
-    detail : str
-        What tells it from the effect's other forms; empty if there are none.
-    board : Board
-        The board with the effect declared.
-    free : tuple of Parameter
-        Parameters that have an uncertainty, one per owner: two setups' masses are two.
-    """
+    """One way in which an effect may be present."""
 
     effect: str
-    detail: str
-    board: Board
-    free: tuple[Parameter, ...]
+    detail: str  # what tells it from the effect's other forms; empty if there are none
+    board: Board  # the board with the effect declared
+    free: tuple[Parameter, ...]  # parameters that have an uncertainty, one per owner: two setups' masses are two
 
     @property
     def title(self) -> str:
-        """Effect and detail."""
         return f"{self.effect} ({self.detail})" if self.detail else self.effect
 
 
 def forms(board: Board) -> dict[str, tuple[Form, ...]]:
-    """Every form of every effect that is not declared and can act in a setup of the board.
-
-    Returns
-    -------
-    dict
-        Effect name -> its forms, which share the effect's prior probability equally.
-    """
+    """Forms of each effect that is not declared and can act, by effect; they share its prior probability equally."""
     tried = {name: effect.forms(board) for name, effect in EFFECTS.items() if name not in board.effects}
     return {name: tuple(_form(board, name, one) for one in found) for name, found in tried.items() if found}
 
@@ -66,13 +49,7 @@ def with_forms(board: Board, added: Sequence[Form]) -> Board:
 
 
 def with_labels_exchanged(board: Board, first: int, second: int) -> Board:
-    """A board on which two readings of one setup have exchanged their labels.
-
-    Parameters
-    ----------
-    first, second : int
-        Indices among the readings of all setups.
-    """
+    """A board on which two readings of one setup, by their indices among all, have exchanged their labels."""
     start = 0
     setups = []
     for setup in board.setups:

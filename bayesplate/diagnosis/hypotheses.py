@@ -8,17 +8,13 @@ from functools import cached_property
 from itertools import combinations, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
-from bayesplate.diagnosis.baseline import Baseline
-from bayesplate.diagnosis.noise_grid import NoiseGrid, noise_grid, reach_of
-from bayesplate.diagnosis.shifts import JointLaws, Table, nothing, together
-from bayesplate.diagnosis.terms import Terms, log_sum, normalised
+from bayesplate.diagnosis.baseline import Baseline, Rows
+from bayesplate.diagnosis.shifts import Cells, JointLaws, nothing, together
+from bayesplate.diagnosis.terms import NoiseGrid, Terms, log_sum, noise_grid, normalised, reach_of
 from bayesplate.effects import EFFECTS
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.intp]
 
 NONE, ONE, TWO = 0.5, 0.4, 0.1
 """Prior probability that nothing, one effect, or two are behind a residual; each shared equally by those tried."""
@@ -51,32 +47,17 @@ class Swap:
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """One thing that may be the case.
+    """One thing that may be the case."""
 
-    Attributes
-    ----------
-    members : tuple of str
-        Effects that are present; empty for none.
-    table : Table
-        Of all modes that readings may be.
-    own : Baseline
-        The baseline with the labels that readings have if it is the case.
-    swap : Swap or None
-        The two labels that it exchanges.
-    log_labels : float
-        ln of the likelihood summed over all ways to take the peaks for modes, over that of the labels at hand.
-    joint : JointLaws
-        Of a pair whose table is not that of shifts that add.
-    """
-
-    members: tuple[str, ...]
+    members: tuple[str, ...]  # effects that are present; empty for none
     prior: float
-    table: Table
+    table: Cells  # of all modes that readings may be
     noise: NoiseGrid
-    own: Baseline
-    swap: Swap | None = None
+    own: Baseline  # the baseline with the labels that readings have if it is the case
+    swap: Swap | None = None  # the two labels that it exchanges
+    # ln of the likelihood summed over all ways to take the peaks for modes, over that of the labels at hand
     log_labels: float = 0.0
-    joint: JointLaws = field(default_factory=dict)
+    joint: JointLaws = field(default_factory=dict)  # of a pair whose table is not that of shifts that add
 
     @cached_property
     def terms(self) -> Terms:
@@ -91,6 +72,11 @@ class Hypothesis:
         """The same hypothesis, the readings of a baseline taken for other modes of its spectrum."""
         return replace(self, own=baseline.labelled(rows))
 
+    def log_by_cell(self, baseline: Baseline, residual: Floats) -> Floats:
+        """ln of prior times density of each cell of its table, noise averaged, without volume: (n_cells,) array."""
+        log_densities = self.terms.log_densities(self.seen(baseline, residual[None, :]))[:, 0]
+        return log_sum(log_densities.reshape(-1, self.table.n_cells))
+
     def cells(self, baseline: Baseline, residual: Floats) -> Floats:
         """Posterior probability of each cell of its table: (n_cells,) array from an (n_modes,) residual."""
         log_densities = self.terms.log_densities(self.seen(baseline, residual[None, :]))[:, 0]
@@ -98,17 +84,12 @@ class Hypothesis:
 
 
 def hypotheses(
-    baseline: Baseline, fine: Mapping[str, Table], coarse: Mapping[str, Table], paired: Sequence[str]
+    baseline: Baseline, fine: Mapping[str, Cells], coarse: Mapping[str, Cells], paired: Sequence[str]
 ) -> tuple[Hypothesis, ...]:
-    """Every hypothesis about a board: none first, then single effects, exchanged labels, and pairs.
+    """Every hypothesis about a board: none first, then single effects, exchanged labels, and pairs of those `paired`.
 
-    Parameters
-    ----------
-    fine, coarse : dict of Table
-        By effect; coarse ones are combined.
-    paired : sequence of str
-        Effects that may be one of two: those whose visible part could be seen at all. A pair costs nothing for a
-        member that cannot be seen, so that every effect would seem to come with an invisible one.
+    These could be seen: a pair costs nothing for a member that cannot, and every effect would seem to come with one.
+    Pairs combine coarse tables.
     """
     board = baseline.board
     reach = reach_of(board, baseline.setup_index, np.where(baseline.is_mode, baseline.residual, np.nan))

@@ -35,20 +35,8 @@ _WORTH = 0.05
 def full_search(
     baseline: Baseline, tried: Sequence[str] | None = None, tell: Callable[[float], None] | None = None
 ) -> tuple[Ground, Found]:
-    """The search of a diagnosis: every candidate, each hypothesis with its own labels, plausible pairs solved together.
-
-    Parameters
-    ----------
-    tried : sequence of str, optional
-        Effects to try; by default all that can act.
-    tell : callable, optional
-        Told which share of the effects is done.
-
-    Returns
-    -------
-    ground : Ground
-        With the labels of the board.
-    """
+    """The search of a diagnosis, and its ground with the labels of the board: every candidate, each hypothesis with its
+    own labels, plausible pairs solved together."""
     ground = prepare_search(baseline, tried=tried, tell=tell)
     found = search(with_own_labels(ground))
     together = with_joint_pairs(found, ground)
@@ -56,18 +44,7 @@ def full_search(
 
 
 def with_joint_pairs(found: Found, ground: Ground) -> Ground:
-    """A ground on which the pairs that a search finds plausible are solved together.
-
-    Parameters
-    ----------
-    found : Found
-        Of a search on it, with or without labels of its own under each hypothesis.
-
-    Returns
-    -------
-    Ground
-        The same one where no pair is plausible.
-    """
+    """A ground on which the pairs that a search on it finds plausible are solved together; the same where none is."""
     pairs = [i for i in _plausible(found) if not ground.hypotheses[i].joint]
     if not pairs:
         return ground

@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import RIGIDITIES, moduli
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.sessions import same_modes
-from bayesplate.diagnosis.baseline import Baseline, Spectrum, baseline_of, labelled_rows, symmetry_of
+from bayesplate.diagnosis.baseline import Baseline, PossibleModes, Rows, baseline_of, labelled_rows, symmetry_of
 from bayesplate.diagnosis.peaks import likely_labels
 from bayesplate.effects import EFFECTS, Effect
 from bayesplate.estimates.least_squares import log_measured, reading_scales
@@ -33,9 +33,7 @@ from bayesplate.posterior.laplace import exact_models
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.posing import PosedProblem
 
-Floats = NDArray[np.float64]
 Models = Sequence[SetupModel]
-Rows = NDArray[np.intp]
 
 MOST_TOGETHER = 3
 """Known effects that are computed together, at most."""
@@ -48,44 +46,20 @@ _NEAR = 0.1
 
 @dataclass(frozen=True, eq=False)
 class KnownFit:
-    """The constants fitted to a board with known effects of fixed sizes.
+    """The constants fitted to a board with known effects of fixed sizes."""
 
-    Attributes
-    ----------
-    combination : tuple of str
-        All known effects that it has.
-    effects : tuple of str
-        Those beyond what the board declares.
-    without : tuple of str
-        Known ones that the board declares and that are left out.
-    baseline : Baseline
-        The fit, all inputs fixed, with the labels that it makes likely.
-    moduli : (3,) array, Pa
-        E_x, E_y, G_xy.
-    errors : Errors
-        Of ln f of every reading, in sample and left out; not a number where the reading is no mode.
-    """
-
-    combination: tuple[str, ...]
-    effects: tuple[str, ...]
-    without: tuple[str, ...]
-    baseline: Baseline
-    moduli: Floats
-    errors: Errors
+    combination: tuple[str, ...]  # all known effects that it has
+    effects: tuple[str, ...]  # those beyond what the board declares
+    without: tuple[str, ...]  # known ones that the board declares and that are left out
+    baseline: Baseline  # the fit, all inputs fixed, with the labels that it makes likely
+    moduli: Floats  # (3,) array, Pa: E_x, E_y, G_xy
+    errors: Errors  # of ln f of every reading, in sample and left out; not a number where the reading is no mode
 
 
 def known_fits(problem: PosedProblem, tell: Callable[[float], None] | None = None) -> tuple[KnownFit, ...]:
-    """The board as it stands, and with its known effects in every combination of up to three, fewer ones first.
+    """The board as it stands, then with its known effects in every combination of up to three, fewer ones first.
 
-    Parameters
-    ----------
-    tell : callable, optional
-        Told which share of the fits is done.
-
-    Returns
-    -------
-    tuple of KnownFit
-        The board as it stands first. Of what the card states all together is among them, however much it is.
+    All that the card states together is among them, however much it is.
     """
     board = problem.board
     own = {name for name in known_effects(board) if name in board.effects}
@@ -100,15 +74,7 @@ def known_fits(problem: PosedProblem, tell: Callable[[float], None] | None = Non
 
 
 def known_fit(problem: PosedProblem, combination: Sequence[str] | None = None) -> KnownFit:
-    """Fit the constants of a board with some of its known effects and without the others.
-
-    Parameters
-    ----------
-    problem : PosedProblem
-        The board as it stands.
-    combination : sequence of str, optional
-        By default the board as it stands, with sizes that it leaves open where its own fit has them.
-    """
+    """The constants fitted to a board with some of its known effects and no others; by default as it stands."""
     own = [name for name in known_effects(problem.board) if name in problem.board.effects]
     baseline = fit_with(problem, combination)
     kept, law = baseline.used, baseline.every.predict
@@ -134,16 +100,9 @@ def known_fit(problem: PosedProblem, combination: Sequence[str] | None = None) -
 
 
 def fit_with(problem: PosedProblem, combination: Sequence[str] | None, n_first: int | None = None) -> Baseline:
-    """The fit of the constants to a board with some of its known effects, the law made anew where they move far.
+    """The constants fitted to a board with known effects (None: as it stands), the law made anew where they move far.
 
-    Parameters
-    ----------
-    problem : PosedProblem
-        The board as it stands.
-    combination : sequence of str or None
-        None: the board as it stands.
-    n_first : int, optional
-        How many of the readings, the first ones, tell the constants; by default all.
+    Only the first `n_first` of the readings tell them, by default all.
     """
     board = problem.board if combination is None else with_combination(problem.board, combination)
     inputs, fitted = _inputs_of(problem, board), _estimated(problem)
@@ -153,7 +112,8 @@ def fit_with(problem: PosedProblem, combination: Sequence[str] | None, n_first: 
         start = fitted
         law = Predictor(lambda x: _values(board, x, inputs), models, "exact", n_constants=board.symmetry.n)
         for _ in range(_MOST_LABELLINGS):
-            fitted = _refitted(board, law, rows, fitted, n_first)
+            kept = np.flatnonzero(rows[:n_first] >= 0)  # readings that are a mode
+            fitted = refit(law.of(rows[kept]), log_measured(board)[kept], reading_scales(board)[kept], fitted)
             before, rows = rows, _likely(problem, law, rows, fitted)
             if np.array_equal(rows, before):
                 break
@@ -166,7 +126,7 @@ def fit_with(problem: PosedProblem, combination: Sequence[str] | None, n_first: 
         values=_values(board, fitted, inputs),
         log_rigidities=fitted,
         log_readings=log_measured(board),
-        every=Spectrum(
+        every=PossibleModes(
             log_frequency=law(fitted[None, :])[0],
             slopes=sensitivities(law, fitted),
             input_slopes=np.zeros((sum(len(one.every_place) for one in law.models), 0)),
@@ -178,12 +138,6 @@ def fit_with(problem: PosedProblem, combination: Sequence[str] | None, n_first: 
         rows=rows,
         symmetry=symmetry_of(law.models),
     )
-
-
-def _refitted(board: Board, law: Predictor, rows: Rows, start: Floats, n_first: int | None) -> Floats:
-    """The constants fitted to the readings that are a mode."""
-    kept = np.flatnonzero(rows[:n_first] >= 0)
-    return refit(law.of(rows[kept]), log_measured(board)[kept], reading_scales(board)[kept], start)
 
 
 def _likely(problem: PosedProblem, law: Predictor, rows: Rows, fitted: Floats) -> Rows:

@@ -10,11 +10,12 @@ import numpy as np
 
 from bayesplate.board.material import MODULI
 from bayesplate.diagnosis.known import KnownFit
+from bayesplate.diagnosis.stated import LEAST_FALL, StatedClaim
 from bayesplate.effects.words import effect_name, effect_names
 from bayesplate.frequencies.laws import cents
 from bayesplate.results.contract import rms
 from bayesplate.results.tables import Row, Table
-from bayesplate.results.words import number
+from bayesplate.results.words import cents_alike, number
 
 _COMPUTED = "Computed at its known size, with nothing fitted but the constants by weighted least squares, "
 AS_IT_STANDS = "as it stands"
@@ -26,36 +27,21 @@ _RISES = (
 
 @dataclass(frozen=True, kw_only=True)
 class KnownModel:
-    """The board with effects of known sizes, nothing fitted but the constants: errors and change of the moduli.
+    """The board with effects of known sizes, nothing fitted but the constants: errors and change of the moduli."""
 
-    Attributes
-    ----------
-    effects : tuple of str
-        Those beyond what is declared; empty for the board as it stands.
-    without : tuple of str
-        Declared ones that are left out, as the stated mass of a sensor, to show what they do; mostly none.
-    in_sample_rms_cents : float
-        Of the readings, by weighted least squares, all inputs at their nominal values, declared sizes that the card
-        leaves open where the fit has them.
-    leave_one_out_rms_cents : float or None
-        Of each reading, predicted by a fit that has not seen it; of those that every model predicts so, but of modes
-        that alone carry a constant or a size in any of the models compared. None where they are too few.
-    change_percent : dict of float
-        Of E_x, E_y, G_xy against the board as it stands.
-    combination : tuple of str
-        All known effects that it has, declared or not.
-    n_left_out, n_readings : int
-        How many readings have a left-out error, and of how many.
-    """
-
-    effects: tuple[str, ...]
+    effects: tuple[str, ...]  # those beyond what is declared; empty for the board as it stands
+    # declared ones that are left out, as the stated mass of a sensor, to show what they do; mostly none
     without: tuple[str, ...]
+    # of the readings, by weighted least squares, all inputs at their nominal values, declared sizes that the card
+    # leaves open where the fit has them
     in_sample_rms_cents: float
+    # of each reading, predicted by a fit that has not seen it; of those that every model predicts so, but of modes that
+    # alone carry a constant or a size in any of the models compared; None where they are too few
     leave_one_out_rms_cents: float | None
-    change_percent: Mapping[str, float]
-    combination: tuple[str, ...]
-    n_left_out: int
-    n_readings: int
+    change_percent: Mapping[str, float]  # of E_x, E_y, G_xy against the board as it stands
+    combination: tuple[str, ...]  # all known effects that it has, declared or not
+    n_left_out: int  # readings that have a left-out error
+    n_readings: int  # all of them
 
 
 def known_models(fits: Sequence[KnownFit], carried: Sequence[int] = ()) -> tuple[KnownModel, ...]:
@@ -105,7 +91,7 @@ def known_table(known: Sequence[KnownModel]) -> Table | None:
 
 
 def known_titles(known: Sequence[KnownModel]) -> list[str]:
-    """Which model each is; the first is the board as it stands."""
+    """A title of each model; the first is the board as it stands."""
     return [AS_IT_STANDS, *map(model_words, known[1:])]
 
 
@@ -135,7 +121,7 @@ def known_sentence(known: Sequence[KnownModel]) -> str:
 
 
 def _of_some(known: Sequence[KnownModel]) -> list[str]:
-    """That left-out errors are not of all readings, where it is so."""
+    """A sentence where left-out errors are not of all readings."""
     n, n_all = known[0].n_left_out, known[0].n_readings
     if n in (0, n_all):
         return []
@@ -152,18 +138,16 @@ class _Errors:
         self.name = "left-out error" if self._is_left_out else "error in the fit"
 
     def of(self, one: KnownModel) -> float:
-        """Rms, cents."""
         left_out = one.leave_one_out_rms_cents if self._is_left_out else None
         return one.in_sample_rms_cents if left_out is None else left_out
 
     def shown(self, *models: KnownModel) -> list[str]:
-        """The same of some models in as many digits as the smallest of them needs."""
-        values = [self.of(one) for one in models]
-        return [f"{value:.0f}" if min(values) >= 10.0 else f"{value:.1f}" for value in values]
+        """Errors of some models, cents, with the same decimals."""
+        return cents_alike(*map(self.of, models))
 
 
 def _clause(one: KnownModel, as_it_stands: KnownModel, errors: _Errors) -> tuple[str, bool]:
-    """What an effect does to {error}, and whether that rises; a stated one from the model without it."""
+    """What an effect does to {error}, in words, and whether that rises; a stated one from the model without it."""
     ends = (one, as_it_stands) if one.without else (as_it_stands, one)
     old, new = errors.shown(*ends)
     who = f"{effect_name(one.without[0])}, as the card states it," if one.without else effect_names(one.effects)
@@ -203,3 +187,21 @@ def _only_together(known: Sequence[KnownModel], errors: _Errors) -> list[str]:
                 f"{shown[0]} to {shown[1]} cents, {other} alone to {shown[2]}, both to {shown[3]}."
             )
     return said
+
+
+def stated_sentence(one: StatedClaim) -> str:
+    """What is predicted, the error without and with the stated effects, and whether it is reduced."""
+    who = f"{effect_names(one.effects)}, as stated and not chosen by the readings,"
+    verb = "takes" if len(one.effects) == 1 else "take"
+    if one.predicts:
+        what = f"the error of setup '{one.predicts}', predicted by the constants of the first setup alone,"
+    else:
+        what = "the left-out error"
+    told = (
+        f"{who[0].upper()}{who[1:]} {verb} {what} from {one.before_rms_cents:.1f} to {one.after_rms_cents:.1f} cents; "
+        f"the log score changes by {one.log_score_gain:+.1f} ± {one.standard_error:.1f} over {one.n_modes} modes"
+    )
+    if one.holds:
+        return f"{told}: error reduced."
+    needs = f"that asks for a fall by {LEAST_FALL:.0%} and a score that rises by more than two standard errors"
+    return f"{told}. That an error is reduced is not claimed: {needs}."

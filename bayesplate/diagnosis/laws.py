@@ -13,11 +13,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Values
 from bayesplate.board.material import RIGIDITIES
-from bayesplate.diagnosis.baseline import Baseline, symmetry_of
+from bayesplate.diagnosis.baseline import Baseline, Rows, symmetry_of
 from bayesplate.diagnosis.forms import Form
 from bayesplate.frequencies.laws import ExactLaw
 from bayesplate.frequencies.model import OtherMode, SetupModel, setup_model
@@ -28,8 +28,6 @@ from bayesplate.plate.terms import Parity, Weights
 from bayesplate.posterior.laplace import exact_models
 from bayesplate.posterior.parameters import Parameters
 
-Floats = NDArray[np.float64]
-
 _ACCEPTED_CENTS = 0.05
 """Error of a law where it is checked, cents. It errs more at the ends of a prior: with half a cent here, transverse
 shear was 0.7 cents off there, which took two nats from its odds on a half-top."""
@@ -39,27 +37,17 @@ _BEYOND = 3
 
 @dataclass(frozen=True, eq=False)
 class Following:
-    """Shapes of a block without the effect.
-
-    Attributes
-    ----------
-    shapes : (n_modes, r) array
-        Shape times mass of its lowest modes: their product with another shape is the share.
-    wanted : (n_wanted,) array of int
-        Which of them are labelled.
-    groups : tuple of array of int
-        Positions in `wanted` of the modes of one symmetry class, in the order of their ranks.
-    """
+    """Shapes of a block without the effect."""
 
     block: ReducedClass
+    # (n_modes, r) array: shape times mass of its lowest modes: their product with another shape is the share
     shapes: Floats
-    wanted: NDArray[np.intp]
-    groups: tuple[NDArray[np.intp], ...]
+    wanted: Rows  # (n_wanted,) array of int: which of them are labelled
+    # tuple of array of int: positions in `wanted` of the modes of one symmetry class, in the order of their ranks
+    groups: tuple[Rows, ...]
 
     @classmethod
-    def of(
-        cls, block: ReducedClass, without: Weights, wanted: NDArray[np.intp], groups: tuple[NDArray[np.intp], ...]
-    ) -> Following:
+    def of(cls, block: ReducedClass, without: Weights, wanted: Rows, groups: tuple[Rows, ...]) -> Following:
         """Take the shapes at the weights of one draw without the effect."""
         _, vectors = block.modes(without, int(wanted.max()) + 1 + _BEYOND)
         return cls(block, vectors[0].T @ block.mass(without)[0], wanted, groups)
@@ -99,32 +87,17 @@ class FollowedLaw(ExactLaw):
 
 @dataclass(frozen=True, eq=False)
 class FormLaw:
-    """Frequencies of a form as a function of the constants and of its free parameters.
-
-    Attributes
-    ----------
-    models : tuple of SetupModel
-        With the exact law.
-    """
+    """Frequencies of a form as a function of the constants and of its free parameters."""
 
     form: Form
-    models: tuple[SetupModel, ...]
+    models: tuple[SetupModel, ...]  # with the exact law
 
     def log_frequencies(self, baseline: Baseline, log_rigidities: Floats, values: Mapping[str, Floats]) -> Floats:
-        """ln f (Hz) of all labelled modes: (n, n_modes) array.
-
-        Parameters
-        ----------
-        baseline : Baseline
-            Whose inputs are taken.
-        log_rigidities : (n, n_constants) array
-        values : dict of (n,) array
-            The form's free parameters by name, SI.
-        """
+        """ln f (Hz) of labelled modes, (n, n_modes), at (n, n_constants) ln D and (n,) free parameters, SI."""
         return self.every_log_frequency(baseline, log_rigidities, values)[:, baseline.rows]
 
     def every_log_frequency(self, baseline: Baseline, log_rigidities: Floats, values: Mapping[str, Floats]) -> Floats:
-        """The same of all modes that the baseline's readings may be: (n, n_every) array."""
+        """ln f (Hz) of all modes that the baseline's readings may be, at the same values: (n, n_every) array."""
         there = _with_rigidities(baseline, _inputs(baseline, self.form) | dict(values), np.exp(log_rigidities).T)
         parts = [model.every_log_frequency(there, "exact") for model in self.models]
         return np.concatenate(parts, axis=1) + baseline.every.discrepancy
@@ -204,11 +177,8 @@ class FormLaw:
 def form_law(baseline: Baseline, form: Form, half_width: float | None = None) -> FormLaw:
     """Solve a form around a baseline and over the prior of its parameters.
 
-    Parameters
-    ----------
-    half_width : float, optional
-        Of the region in ln D_x / D_s and ln D_y / D_s, of which an isotropic board has none; by default three standard
-        deviations of the fit.
+    `half_width` is that of the region in ln D_x / D_s and ln D_y / D_s, of which an isotropic board has none; by
+    default three standard deviations of the fit.
     """
     board = form.board
     parameters = Parameters(board)

@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.diagnosis.folds import ALWAYS, CERTAINLY_NEEDED, Nested, nested
 from bayesplate.diagnosis.hypotheses import log_evidences, odds_against_none
 from bayesplate.diagnosis.search import Ground, noise_of_board
-
-Floats = NDArray[np.float64]
 
 N_SETS = 500
 """Simulated boards at most, a batch at a time until the answer is certain."""
@@ -25,25 +24,14 @@ BY_CHANCE = 0.05
 
 @dataclass(frozen=True, eq=False)
 class NullControl:
-    """What the search makes of readings that contain nothing.
+    """What the search makes of readings that contain nothing."""
 
-    Attributes
-    ----------
-    against : (n_sets,) array
-        ln odds that something is lacking against that nothing is.
-    ratio : (n,) array or None
-        Nested leave-one-out rms after over before of the first n sets, every fold made to choose its most probable
-        effect; None with too few readings, or where nothing is claimed that chance might have chosen.
-    residuals : (n_sets, n_modes) array or None
-        The sets themselves, ln f.
-    folded : Nested or None
-        The errors that the ratios are of.
-    """
-
-    against: Floats
+    against: Floats  # (n_sets,) array: ln odds that something is lacking against that nothing is
+    # (n,) array: nested leave-one-out rms after over before of the first n sets, every fold made to choose its most
+    # probable effect; None with too few readings, or where nothing is claimed that chance might have chosen
     ratio: Floats | None = None
-    residuals: Floats | None = None
-    folded: Nested | None = None
+    residuals: Floats | None = None  # (n_sets, n_modes) array: the sets themselves, ln f
+    folded: Nested | None = None  # the errors that the ratios are of
 
     def without(self, carried: Sequence[int]) -> NullControl:
         """The same sets, some readings not counted in the ratios, for their modes alone carry something."""
@@ -84,23 +72,11 @@ class NullControl:
 def null_control(
     ground: Ground, rng: np.random.Generator, n_sets: int = N_SETS, against: float = np.inf
 ) -> NullControl:
-    """Simulate readings of a board without any effect and search each of them.
+    """Readings of boards like this one without any effect, at most `n_sets`, and the odds that a search gives each of
+    them.
 
-    Where the odds of the board at hand are clearly within chance, fewer sets say so as well as many.
-
-    Parameters
-    ----------
-    ground : Ground
-        What the board at hand says does not matter, only its sizes, its modes and its priors do.
-    n_sets : int
-        At most; fewer as soon as more than the false alarms certainly have larger odds than the board.
-    against : float
-        ln odds against no effect of the board at hand; by default none that fewer sets could judge.
-
-    Returns
-    -------
-    NullControl
-        Without ratios, which take as many searches as there are readings: see `made_to_choose`.
+    Where the ln odds `against` no effect of the board at hand are clearly within chance, fewer sets say so as well.
+    Without ratios, which take as many searches as there are readings: see `made_to_choose`.
     """
     sets: list[Floats] = []
     odds: list[Floats] = []
@@ -115,23 +91,10 @@ def null_control(
 def made_to_choose(
     ground: Ground, control: NullControl, ratio: float = np.nan, carried: Sequence[int] = ()
 ) -> NullControl:
-    """The same simulated boards with the errors of their readings left out, every fold made to choose an effect.
+    """The same boards with the errors of their readings left out, every fold made to choose an effect.
 
-    Where it is clear on which side of the threshold the board at hand lies, fewer sets say so as well as many.
-
-    Parameters
-    ----------
-    control : NullControl
-        With its sets.
-    ratio : float
-        Nested left-out rms after over before of the board at hand; by default none that fewer sets could judge.
-    carried : sequence of int
-        Readings that are not counted in that.
-
-    Returns
-    -------
-    NullControl
-        With the ratios of as many of its sets as were needed; without any where there are too few readings.
+    Where it is clear on which side of the threshold the nested `ratio` of the board at hand lies, fewer sets say so as
+    well. Without ratios where there are too few readings.
     """
     assert control.residuals is not None
     parts: list[Nested] = []

@@ -13,18 +13,15 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesplate.diagnosis.baseline import Baseline
+from bayesplate.arrays import Floats
+from bayesplate.diagnosis.baseline import Baseline, Rows
 from bayesplate.diagnosis.draws import TermDraws, draw_hypothesis
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.search import Ground
 from bayesplate.estimates.labelling import LIKELY
 from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.posterior.statistics import resampled
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.intp]
 
 _N_DRAWS, _N_WIDE, _N_BEST = 64, 256, 3
 _NOISES = (8.0, 4.0, 2.0, 1.0)
@@ -36,13 +33,7 @@ _MOST_WAYS, _WORTH = 6, 5.0
 
 
 def with_own_labels(ground: Ground) -> Ground:
-    """The hypotheses about a board, each with the labels that its readings likely have if it holds.
-
-    Returns
-    -------
-    Ground
-        The same one where all labels are certain.
-    """
+    """The hypotheses about a board, each with the labels that readings likely have if it holds."""
     baseline = ground.baseline
     if not baseline.every.is_open:
         return ground
@@ -52,19 +43,14 @@ def with_own_labels(ground: Ground) -> Ground:
     for one in ground.hypotheses:
         if one.members not in found:
             known = [found[members] for members in ((), *((name,) for name in one.members))]
-            found[one.members] = _best(ground, one, [_rows(baseline, each) for each in known])
+            found[one.members] = _best(ground, one, [each.own.rows for each in known])
     return replace(ground, hypotheses=tuple(found[one.members] for one in ground.hypotheses))
 
 
 def log_summed(baseline: Baseline, log_frequency: Floats, noise: Floats) -> Floats:
     """ln of the likelihood of all readings and peaks, summed over the ways to take them for modes: (n_draws,) array.
 
-    Parameters
-    ----------
-    log_frequency : (n_draws, n_every) array
-        ln f (Hz) of all modes that readings may be.
-    noise : (n_draws, n_setups) array
-        Relative.
+    From ln f (Hz) of all modes, (n_draws, n_every), and the relative noise, (n_draws, n_setups).
     """
     total = np.zeros(len(log_frequency))
     for i, (setup, every) in enumerate(zip(baseline.board.setups, _by_setup(baseline, log_frequency), strict=True)):
@@ -78,13 +64,7 @@ def log_summed(baseline: Baseline, log_frequency: Floats, noise: Floats) -> Floa
 
 
 def log_of_terms(own: Baseline, seen: Floats, drawn: TermDraws) -> Floats:
-    """ln of the likelihood of the readings under the labels of a baseline, by its normal terms: (n_draws,) array.
-
-    Parameters
-    ----------
-    seen : (n_modes,) array
-        ln of the readings.
-    """
+    """ln of the likelihood of readings (ln f) under the labels of a baseline, by its terms: (n_draws,) array."""
     kept = own.is_mode
     variance = drawn.noise[:, own.setup_index[kept]] ** 2 + own.own_variance[kept]
     squares = (seen[kept] - drawn.predicted[:, own.rows[kept]]) ** 2 / variance + np.log(2.0 * np.pi * variance)
@@ -107,27 +87,12 @@ def _annealed(ground: Ground, one: Hypothesis) -> Iterator[Rows]:
         yield rows
 
 
-def _relabelled(ground: Ground, one: Hypothesis, rows: Rows) -> Rows:
-    """The likely labels at draws that rest on other labels."""
-    return _labels_of(ground, _drawn(ground, one.labelled(ground.baseline, rows)), rows)
-
-
 def _labels_of(ground: Ground, drawn: TermDraws, otherwise: Rows) -> Rows:
     return likely_labels(ground.baseline, drawn.predicted, drawn.noise, otherwise)
 
 
 def likely_labels(baseline: Baseline, log_frequency: Floats, noise: Floats, otherwise: Rows) -> Rows:
-    """Which mode each reading likely is at some draws: (n_modes,) array, -1 where none is likely.
-
-    Parameters
-    ----------
-    log_frequency : (n_draws, n_every) array
-        ln f (Hz) of all modes that readings may be.
-    noise : (n_draws, n_setups) array
-        Relative.
-    otherwise : (n_modes,) array of int
-        What is given where too few have a likely label.
-    """
+    """Which mode each reading likely is at some draws: (n_modes,) rows, -1 where none; `otherwise` if too few are."""
     result = baseline.rows.copy()
     every = _by_setup(baseline, log_frequency)
     n_before = 0
@@ -152,16 +117,12 @@ def _best(ground: Ground, one: Hypothesis, begun: Iterable[Rows]) -> Hypothesis:
     tried = {tuple(rows): rows for rows in begun}
     for rows in list(tried.values()):
         for _ in range(_ROUNDS):
-            rows = _relabelled(ground, one, rows)
+            rows = _labels_of(ground, _drawn(ground, one.labelled(ground.baseline, rows)), rows)
             if tuple(rows) in tried:
                 break
             tried[tuple(rows)] = rows
     labelled = [one.labelled(ground.baseline, rows) for rows in tried.values()]
     return _summed(ground, labelled)
-
-
-def _rows(baseline: Baseline, one: Hypothesis) -> Rows:
-    return one.own.rows
 
 
 def _summed(ground: Ground, labelled: Sequence[Hypothesis]) -> Hypothesis:
@@ -175,14 +136,15 @@ def _summed(ground: Ground, labelled: Sequence[Hypothesis]) -> Hypothesis:
     evidence = np.array([_log_evidence(ground, one) for one in labelled])
     drawn = [_drawn(ground, one) for one in labelled]
     full = [log_summed(ground.baseline, each.predicted, each.noise) for each in drawn]
+    read = ground.baseline.log_readings
     both = zip(full, labelled, drawn, strict=True)
-    alone = evidence + [log_mean(sums - _log_of(ground, one, each)) for sums, one, each in both]
+    alone = evidence + [log_mean(sums - log_of_terms(one.own, read, each)) for sums, one, each in both]
     kept = np.argsort(-alone)[:_MOST_WAYS]
     kept = kept[alone[kept] > alone[kept[0]] - _WORTH]
     log_share = alone[kept] - logsumexp(alone[kept])
     log_weights = []
     for share, at in zip(log_share, kept, strict=True):
-        densities = [_log_of(ground, labelled[other], drawn[at]) - evidence[other] for other in kept]
+        densities = [log_of_terms(labelled[other].own, read, drawn[at]) - evidence[other] for other in kept]
         log_weights.append(share + full[at] - logsumexp(np.array(densities) + log_share[:, None], axis=0))
     weights = np.concatenate(log_weights)
     log_sum = float(logsumexp(weights)) - np.log(_N_DRAWS)
@@ -199,11 +161,6 @@ def _summed(ground: Ground, labelled: Sequence[Hypothesis]) -> Hypothesis:
 def _log_evidence(ground: Ground, one: Hypothesis) -> float:
     """Under its own labels alone, by its normal terms."""
     return float(one.terms.log_evidence(one.seen(ground.baseline, ground.baseline.residual[None, :]))[0])
-
-
-def _log_of(ground: Ground, one: Hypothesis, drawn: TermDraws) -> Floats:
-    own = one.own
-    return log_of_terms(own, own.middle + one.seen(ground.baseline, ground.baseline.residual[None, :])[0], drawn)
 
 
 def log_mean(values: Floats) -> float:

@@ -14,24 +14,12 @@ from bayesplate.frequencies.laws import cents
 
 @dataclass(frozen=True)
 class Suspect:
-    """A reading without which the others agree.
+    """A reading without which the others agree."""
 
-    Attributes
-    ----------
-    index : int
-        Among all readings.
-    p_value : float
-        Of the others.
-    off : float
-        ln of the reading over what the others let expect.
-    log_weight : float
-        How little the others expect it: minus the log density of the reading, given them.
-    """
-
-    index: int
-    p_value: float
-    off: float
-    log_weight: float
+    index: int  # among all readings
+    p_value: float  # of the others
+    off: float  # ln of the reading over what the others let expect
+    log_weight: float  # how little the others expect it: minus the log density of the reading, given them
 
 
 def suspects(found: Found) -> tuple[Suspect, ...]:

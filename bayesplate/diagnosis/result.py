@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
-from bayesplate.diagnosis.candidates import CandidateEntry
 from bayesplate.diagnosis.claim import Condition
+from bayesplate.diagnosis.hypotheses import RELABELLING
 from bayesplate.diagnosis.known_words import KnownModel
 from bayesplate.diagnosis.stated import StatedClaim
 from bayesplate.diagnosis.verdict import Word
@@ -19,27 +19,13 @@ FORMAT = 1
 
 @dataclass(frozen=True, kw_only=True)
 class Errors:
-    """The errors of a model; None for what these readings are too few to tell.
+    """The errors of a model; None for what these readings are too few to tell."""
 
-    Attributes
-    ----------
-    in_sample_rms_cents : float
-        Of the modes that the fit has seen.
-    leave_one_out_rms_cents : float or None
-        Of each mode, predicted by a fit that has not seen it.
-    nested_leave_one_out_rms_cents : float or None
-        The same, the effect chosen anew without that mode.
-    log_score : float or None
-        Sum of the log densities of the readings, each predicted from the others.
-    hits_90 : float
-        Share of the readings inside their 90 % intervals.
-    """
-
-    in_sample_rms_cents: float
-    leave_one_out_rms_cents: float | None
-    nested_leave_one_out_rms_cents: float | None
-    log_score: float | None
-    hits_90: float
+    in_sample_rms_cents: float  # of the modes that the fit has seen
+    leave_one_out_rms_cents: float | None  # of each mode, predicted by a fit that has not seen it
+    nested_leave_one_out_rms_cents: float | None  # the same, the effect chosen anew without that mode
+    log_score: float | None  # sum of the log densities of the readings, each predicted from the others
+    hits_90: float  # share of the readings inside their 90 % intervals
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,13 +38,7 @@ class PValues:
 
 @dataclass(frozen=True, kw_only=True)
 class Histogram:
-    """Numbers of simulated sets by a value.
-
-    Attributes
-    ----------
-    edges : (n_bins + 1,) tuple of float
-    counts : (n_bins,) tuple of int
-    """
+    """Numbers of simulated sets by a value."""
 
     edges: tuple[float, ...]
     counts: tuple[int, ...]
@@ -66,35 +46,19 @@ class Histogram:
 
 @dataclass(frozen=True, kw_only=True)
 class NullControlSummary:
-    """What the same search makes of simulated readings without any effect.
-
-    Attributes
-    ----------
-    flagged_percent : float
-        Share of the sets in which an effect would be called needed.
-    log_odds : float or None
-        ln odds of these readings that something is lacking; None where nothing could be.
-    log_odds_needed : float
-        Those above which an effect is needed.
-    log_odds_of_sets : Histogram or None
-        None where nothing could be lacking.
-    nested_ratio, nested_ratio_to_beat : float or None
-        Nested error after over before of these readings, and what 95 of 100 sets stay above that are made to choose
-        their most probable effect.
-    nested_ratio_percentile : float or None
-        Share of the sets with a larger ratio than these readings, percent.
-    nested_ratio_of_sets : Histogram or None
-        Of as many sets as were needed to tell; this, its limit and the percentile None where nothing is claimed.
-    """
+    """What the same search makes of simulated readings without any effect."""
 
     n_sets: int
-    flagged_percent: float
-    log_odds: float | None
-    log_odds_needed: float
-    log_odds_of_sets: Histogram | None
+    flagged_percent: float  # share of the sets in which an effect would be called needed
+    log_odds: float | None  # ln odds of these readings that something is lacking; None where nothing could be
+    log_odds_needed: float  # those above which an effect is needed
+    log_odds_of_sets: Histogram | None  # None where nothing could be lacking
+    # nested error after over before of these readings; None of too few
     nested_ratio: float | None
+    # what 95 of 100 sets stay above that are made to choose their most probable effect
     nested_ratio_to_beat: float | None
-    nested_ratio_percentile: float | None
+    nested_ratio_percentile: float | None  # share of the sets with a larger ratio than these readings, percent
+    # of as many sets as were needed to tell; this, its limit and the percentile None where nothing is claimed
     nested_ratio_of_sets: Histogram | None
 
 
@@ -109,39 +73,24 @@ class ElasticShift:
 
 @dataclass(frozen=True, kw_only=True)
 class Finalist:
-    """An explanation that was fitted again: its errors, its constants (Pa) and its sizes, by the sampler.
-
-    Attributes
-    ----------
-    elastic : dict of Spread
-        By modulus.
-    sizes : dict
-        "board" or setup -> effect -> parameter -> Spread.
-    """
+    """An explanation that was fitted again: its errors, its constants (Pa) and its sizes, by the sampler."""
 
     effects: tuple[str, ...]
     probability: float
     in_sample_rms_cents: float
     leave_one_out_rms_cents: float | None
     elastic: Mapping[str, Spread]
-    sizes: Mapping[str, Mapping[str, Mapping[str, Spread]]]
+    sizes: Mapping[str, Mapping[str, Mapping[str, Spread]]]  # "board" or setup -> effect -> parameter -> Spread
 
 
 @dataclass(frozen=True, kw_only=True)
 class Explanation:
-    """One way to explain the residual, an effect, a pair or an exchange of labels, with its probability.
-
-    Attributes
-    ----------
-    words : str
-        The same as people read it; not written to JSON.
-    is_stated : bool
-        Whether it is of known effects of which the card states one; not written to JSON.
-    """
+    """One way to explain the residual, an effect, a pair or an exchange of labels, with its probability."""
 
     effects: tuple[str, ...]
     probability: float
-    words: str = field(metadata=NOT_IN_JSON)
+    words: str = field(metadata=NOT_IN_JSON)  # as people read it
+    # whether it is of known effects of which the card states one; not written to JSON
     is_stated: bool = field(default=False, metadata=NOT_IN_JSON)
 
 
@@ -265,3 +214,66 @@ class Diagnosis:
 def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
     """The content of diagnosis.json."""
     return dict(as_json(diagnosis))
+
+
+Fate = Literal["in the verdict", "not detectable", "not needed", "not established", "does not fit", "less probable"]
+"""What became of a candidate, in two words."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Amplitude:
+    """Posterior quantiles of an effect's first parameter, given that it is there; all alike if the card fixes it."""
+
+    parameter: str
+    form: str  # empty if the effect has one only
+    # q05, q50, q95: in `unit`
+    q05: float
+    q50: float
+    q95: float
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class EffectEntry:
+    """A candidate effect: what it would do, how probable it is, and why it was rejected."""
+
+    name: str
+    setup: str  # "board" for an effect of the whole board
+    raw_rms_cents: float | None  # shift of the modes at the nominal size; None where there is no frequency
+    # what is left of it after the constants are fitted again, both with the weights of that fit, so that it is never
+    # the larger; None where nothing is left because there are as many constants as modes
+    visible_rms_cents: float | None
+    visible_cents: tuple[float | None, ...]  # the same mode by mode
+    below_detection_limit: bool  # whether these readings could not show it even if it were there
+    bias_percent: Mapping[str, float]  # what ignoring it does to each modulus
+    inclusion_probability: float
+    inclusion_probability_with_doubled_priors: float
+    log_bayes_factor: float  # against no effect
+    ockham_log_factor: float  # the part of the Bayes factor that the width of the prior costs
+    p_value: float | None
+    amplitude: Amplitude | None  # None if it has no size
+    learnt_bits: Mapping[str, float]  # how far the posterior of each size left its prior, by parameter
+    look_alikes: tuple[str, ...]
+    rejected_because: str | None  # None if it is part of the verdict
+    fate: Fate = field(metadata=NOT_IN_JSON)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExchangeEntry:
+    """Two labels that may have been exchanged, as a candidate beside the effects; fields as of `EffectEntry`."""
+
+    name: str = RELABELLING
+    setup: str
+    labels: tuple[str, str]
+    raw_rms_cents: None = None
+    visible_rms_cents: None = None
+    bias_percent: None = None
+    inclusion_probability: float
+    log_bayes_factor: float
+    amplitude: None = None
+    look_alikes: tuple[()] = ()
+    rejected_because: str | None
+    fate: Fate = field(metadata=NOT_IN_JSON)
+
+
+CandidateEntry = EffectEntry | ExchangeEntry

@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.forms import Form, forms
-from bayesplate.diagnosis.hypotheses import (
-    Hypothesis,
-    hypotheses,
-    log_evidences,
-    odds_against_none,
-    probabilities,
-)
+from bayesplate.diagnosis.hypotheses import Hypothesis, hypotheses, log_evidences, odds_against_none, probabilities
 from bayesplate.diagnosis.laws import FormLaw, form_law
-from bayesplate.diagnosis.shifts import COARSE, Table, refitted, tabulate
+from bayesplate.diagnosis.shifts import COARSE, Cells, refitted, tabulate
 from bayesplate.diagnosis.signatures import Signature, signature
 from bayesplate.diagnosis.terms import Terms
-
-Floats = NDArray[np.float64]
 
 LEAST_TRACE = 2.0
 """Length of a trace, in units of the readings' uncertainty, from which an effect may be one of two."""
@@ -36,24 +28,15 @@ _MOST_TERMS = 2_000_000
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An effect that is tried.
-
-    Attributes
-    ----------
-    laws : tuple of FormLaw
-        Of its forms.
-    signature : Signature
-        Of the form that shows most.
-    trace : float
-        Length of its visible shift at nominal size, at the constants of a board with the effect that looks like the one
-        at hand, in units of the readings' uncertainty: what the search goes by.
-    """
+    """An effect that is tried."""
 
     name: str
     laws: tuple[FormLaw, ...]
-    fine: Table
-    coarse: Table
-    signature: Signature
+    fine: Cells
+    coarse: Cells
+    signature: Signature  # of the form that shows most
+    # length of its visible shift at nominal size, at the constants of a board with the effect that looks like the one
+    # at hand, in units of the readings' uncertainty: what the search goes by
     trace: float
 
 
@@ -75,6 +58,13 @@ class Ground:
         """Effects that may be one of two: those whose trace the search could see."""
         return tuple(name for name, one in self.candidates.items() if not one.trace < LEAST_TRACE)
 
+    def with_hypotheses(self, paired: Sequence[str]) -> Ground:
+        """The same candidates and every hypothesis about them, pairs being of these effects."""
+        fine, coarse = (
+            {name: getattr(one, kind) for name, one in self.candidates.items()} for kind in ("fine", "coarse")
+        )
+        return replace(self, hypotheses=hypotheses(self.baseline, fine, coarse, paired))
+
     def members(self, index: int) -> tuple[Candidate, ...]:
         """The effects of a hypothesis; none where it only exchanges labels."""
         return tuple(self.candidates[name] for name in self.hypotheses[index].members if name in self.candidates)
@@ -82,17 +72,11 @@ class Ground:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What the search finds in one set of readings.
-
-    Attributes
-    ----------
-    residual : (n_modes,) array
-        ln measured less ln f of the baseline.
-    log_evidence, probability : (n_hypotheses,) array
-    """
+    """What the search finds in one set of readings."""
 
     ground: Ground
-    residual: Floats
+    residual: Floats  # (n_modes,) array: ln measured less ln f of the baseline
+    # log_evidence, probability: (n_hypotheses,) array
     log_evidence: Floats
     probability: Floats
 
@@ -141,37 +125,16 @@ def prepare_search(
     tried: Sequence[str] | None = None,
     tell: Callable[[float], None] | None = None,
 ) -> Ground:
-    """Tabulate every candidate of a board.
-
-    Parameters
-    ----------
-    solve : callable, optional
-        Makes the law of a form around the baseline; by default by full solves.
-    tried : sequence of str, optional
-        Effects to try; by default all that are not declared and can act.
-    tell : callable, optional
-        Told which share of the effects is done.
-
-    Returns
-    -------
-    Ground
-        Without effects that leave no plate, whatever their size.
-    """
+    """Tabulate the candidates of a board, their forms solved by `solve`; without any that leaves no plate."""
     every = {name: each for name, each in forms(baseline.board).items() if tried is None or name in tried}
-
-    def candidate(name: str) -> Candidate:
-        return _candidate(baseline, name, tuple(solve(baseline, form).placed(baseline) for form in every[name]))
-
     made = []
-    for name in every:
-        made.append(candidate(name))
+    for name, each in every.items():
+        made.append(_candidate(baseline, name, tuple(solve(baseline, form).placed(baseline) for form in each)))
         if tell is not None:
             tell(len(made) / len(every))
     candidates = {one.name: one for one in made if one.fine.n_cells and one.coarse.n_cells}
     ground = Ground(baseline, candidates, ())
-    fine = {name: one.fine for name, one in candidates.items()}
-    coarse = {name: one.coarse for name, one in candidates.items()}
-    return Ground(baseline, candidates, hypotheses(baseline, fine, coarse, ground.paired))
+    return ground.with_hypotheses(ground.paired)
 
 
 def search(ground: Ground, residual: Floats | None = None) -> Found:
@@ -197,25 +160,13 @@ def _candidate(baseline: Baseline, name: str, laws: tuple[FormLaw, ...]) -> Cand
 
 
 def predictive_p_value(hypothesis: Hypothesis, baseline: Baseline, residuals: Floats) -> Floats:
-    """Prior predictive probability of readings that a hypothesis expects as little as these.
+    """Prior predictive probability of readings that a hypothesis expects as little as these: (n_sets,) array.
 
     The share of readings simulated under the hypothesis whose marginal density is no larger: noise and sizes are drawn
     from their priors and integrated over in the density, so that a size that the prior hardly allows counts as misfit,
     and neither noise nor size can follow the residual. Uniform if the hypothesis is true, whatever the number of setups
-    and however different their noise.
+    and however different their noise. At least 1 / 1001, and 1 / 20,001 where nothing is lacking.
 
-    Parameters
-    ----------
-    residuals : (n_sets, n_modes) array
-        Of its labels.
-
-    Returns
-    -------
-    (n_sets,) array
-        At least 1 / 1001, and 1 / 20,001 where nothing is lacking.
-
-    References
-    ----------
     Box, Sampling and Bayes' inference in scientific modelling and robustness, J. R. Stat. Soc. A 143, 383 (1980).
     """
     terms = hypothesis.terms

@@ -11,21 +11,22 @@ of two effects that were not solved together the shifts at a draw's constants ad
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
+from bayesplate.board.material import MODULI, moduli
 from bayesplate.board.quantity import Quantity
+from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.draws import TermDraws, draw_terms, joint_sizes_of, sizes_of
 from bayesplate.diagnosis.hypotheses import Hypothesis, probabilities
 from bayesplate.diagnosis.peaks import log_mean, log_of_terms, log_summed
 from bayesplate.diagnosis.search import Found, search
-from bayesplate.diagnosis.shifts import Table
-
-Floats = NDArray[np.float64]
+from bayesplate.diagnosis.shifts import Cells
+from bayesplate.diagnosis.terms import normalised
 
 WIDTHS = {"halved": 0.5, "doubled": 2.0}
 """Factors of the standard deviation of the priors of all sizes."""
@@ -55,15 +56,10 @@ def variants(found: Found) -> Iterator[tuple[str, Found]]:
 
 @lru_cache(maxsize=8)  # the verdict, the claim and the result ask for the same
 def varied(found: Found, *, width: float = 1.0, noise: float = 1.0) -> Found:
-    """The same search with other priors.
+    """The same search, the standard deviation of every size's prior and every noise prior multiplied by a factor.
 
-    Parameters
-    ----------
-    width : float
-        Factor of the standard deviation of every size's prior. The cells reach three of the old standard deviations;
-        what a wider prior puts beyond them counts as unable to explain the readings.
-    noise : float
-        Factor of every noise prior.
+    The cells reach three of the old standard deviations; what a wider prior puts beyond them counts as unable to
+    explain the readings.
     """
     ground = found.ground
     changed = replace(ground, hypotheses=tuple(_changed(found, i, width, noise) for i in range(len(ground.hypotheses))))
@@ -79,7 +75,7 @@ def _changed(found: Found, index: int, width: float, noise: float) -> Hypothesis
     return replace(one, table=replace(one.table, weights=weights), noise=replace(one.noise, sd=noise * one.noise.sd))
 
 
-def _widening(table: Table, priors: list[list[Quantity]], factor: float) -> Floats:
+def _widening(table: Cells, priors: list[list[Quantity]], factor: float) -> Floats:
     """Density of the wider prior over that of the old one at each cell: (n_cells,) array."""
     result = np.ones(table.n_cells)
     for index, of_form in enumerate(priors):
@@ -95,19 +91,13 @@ def _inside(prior: Quantity, factor: float) -> float:
     """Share of a normal distribution of that standard deviation within the prior's bounds."""
     from scipy.special import ndtr
 
-    low, high = (float(prior.standard(bound)) / factor for bound in (prior.lower, prior.upper))
+    low, high = (bound / factor for bound in prior.standard_bounds)
     return float(ndtr(high) - ndtr(low))
 
 
 @lru_cache(maxsize=2)  # the verdict and the averages ask for the same
 def under_exact_law(found: Found) -> Found | None:
-    """The same search with every evidence corrected to the exact law.
-
-    Returns
-    -------
-    Found or None
-        None where no draw of any hypothesis is a plate by it.
-    """
+    """The same search, every evidence corrected to the exact law; None where no draw is a plate by it."""
     rng = np.random.default_rng(0)
     corrections = np.full(found.probability.size, _correction(found, 0, rng))
     worth = found.probability > _WORTH * found.probability.max()
@@ -125,8 +115,7 @@ def draw_exact(found: Found, index: int, rng: np.random.Generator, n_draws: int)
     log_weights = log_weights_of(found, index, drawn)
     if not np.isfinite(log_weights.max()):  # no draw is a plate by the exact law: the linear terms are all there is
         return drawn.at(np.arange(0, drawn.n_draws, _OVERSAMPLED))  # which stand in the order of their noise
-    shares = np.exp(log_weights - log_weights.max())
-    return drawn.at(rng.choice(drawn.n_draws, size=n_draws, p=shares / shares.sum()))
+    return drawn.at(rng.choice(drawn.n_draws, size=n_draws, p=normalised(log_weights)))
 
 
 def log_weights_of(found: Found, index: int, drawn: TermDraws) -> Floats:
@@ -168,3 +157,56 @@ def _correction(found: Found, index: int, rng: np.random.Generator) -> float:
     # The sum over labels is in the evidence already: what the law adds is the ratio of both sums at the same draws.
     by_terms = log_of_terms(own, own.middle + found.seen(index)[0], drawn)
     return log_mean(log_weights) - log_mean(log_summed(own, drawn.predicted, drawn.noise) - by_terms)
+
+
+Constants = Mapping[str, Floats]
+"""Draws of rigidities (N m) and moduli (Pa) by name."""
+
+
+def draw_constants(
+    found: Found,
+    rng: np.random.Generator,
+    n_draws: int,
+    among: Sequence[int] | None = None,
+    sampled: Mapping[int, Constants] | None = None,
+) -> Constants:
+    """Draws of the constants and inputs by name, (n_draws,) arrays, from the terms of hypotheses, weighted to the exact
+    law.
+
+    Over the hypotheses `among` by their probability, by default over all by that under the exact law; of hypotheses
+    that were `sampled` from those draws.
+    """
+    weighed = (under_exact_law(found) or found) if among is None else found
+    indices = np.arange(len(found.ground.hypotheses)) if among is None else np.asarray(among)
+    shares = weighed.probability[indices] / weighed.probability[indices].sum()
+    parts: list[Constants] = []
+    for index, n in zip(indices.tolist(), rng.multinomial(n_draws, shares).tolist(), strict=True):
+        if n and sampled and index in sampled:
+            picked = rng.integers(next(iter(sampled[index].values())).size, size=n)
+            parts.append({name: np.ravel(values)[picked] for name, values in sampled[index].items()})
+        elif n:
+            parts.append(_drawn(found, index, rng, n))
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _drawn(found: Found, index: int, rng: np.random.Generator, n_draws: int) -> Constants:
+    """The same under one hypothesis, whose effects may replace thickness (m) and nu_xy by their own."""
+    drawn, symmetry = draw_exact(found, index, rng, n_draws), found.ground.baseline.board.symmetry
+    inputs = {name: _input(found.ground.baseline, name, drawn.inputs) for name in ("thickness", "poisson_xy")}
+    for which in range(len(found.ground.members(index))):
+        for _, law, rows, values in sizes_of(found, index, drawn, which):
+            for free in law.form.free:
+                if free.replaces in inputs:
+                    inputs[free.replaces][rows] = values[free.name]
+    D = symmetry.rigidities(np.exp(drawn.log_rigidities).T, inputs["poisson_xy"])
+    constants = moduli(D["D_x"], D["D_y"], D["D_s"], inputs["thickness"], inputs["poisson_xy"])
+    return D | dict(zip(MODULI, constants, strict=True))
+
+
+def _input(baseline: Baseline, name: str, z: Floats) -> Floats:
+    """An input of the board from the standard coordinates of all uncertain ones: (n,) array from (n, n_inputs)."""
+    uncertain = tuple(baseline.board.uncertain_inputs)
+    if name not in uncertain:
+        return np.full(len(z), float(baseline.values[name]))
+    quantity = baseline.board.inputs[name]
+    return np.array(quantity.value(np.clip(z[:, uncertain.index(name)], *quantity.standard_bounds)))

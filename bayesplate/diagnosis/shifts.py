@@ -19,13 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.quantity import Quantity
-from bayesplate.diagnosis.baseline import Baseline
+from bayesplate.diagnosis.baseline import Baseline, Rows
 from bayesplate.diagnosis.forms import Form, with_forms
 from bayesplate.diagnosis.laws import FormLaw, form_law
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.intp]
 JointLaws = Mapping[tuple[int, int], FormLaw]
 """Laws of two effects at once, by the indices of their forms; the free parameters are those of the first, then those
 of the second."""
@@ -41,57 +40,35 @@ _LONGEST_STEP = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
-    """Cells of one effect, or of two together.
+class Cells:
+    """Cells of one effect, or of two together."""
 
-    Attributes
-    ----------
-    weights : (n_cells,) array
-        Prior probability, summing to 1.
-    shift : (n_cells, n_modes) array
-        ln f with the effect, constants refitted, less ln f of the baseline; of all modes that readings may be, or of
-        those that they are taken for.
-    slopes : (n_cells, n_modes, n_tangents) array
-        Change of the shift over one standard deviation of the cell.
-    moved : (n_cells, n_constants) array
-        Change of ln D by the refit.
-    moved_slopes : (n_cells, n_constants, n_tangents) array
-    form : (n_cells,) array of int
-        Which form of the effect; of the first one where there are two.
-    z : (n_cells, n_parameters) array
-        Standard coordinates of the first effect's parameters.
-    z_slopes : (n_cells, n_parameters) array
-        Their change over one standard deviation of the cell.
-    parts : tuple of Table
-        Of two effects together: the tables of both, the cells of the second running fastest.
-    """
-
-    weights: Floats
-    shift: Floats
-    slopes: Floats
-    moved: Floats
-    moved_slopes: Floats
-    form: Rows
-    z: Floats
-    z_slopes: Floats
-    parts: tuple[Table, ...] = ()
+    weights: Floats  # (n_cells,) array: prior probability, summing to 1
+    shift: Floats  # (n_cells, n_modes) array: ln f with the effect, constants refitted, less ln f of the baseline
+    slopes: Floats  # (n_cells, n_modes, n_tangents) array: change of the shift over one standard deviation of the cell
+    moved: Floats  # (n_cells, n_constants) array: change of ln D by the refit
+    moved_slopes: Floats  # (n_cells, n_constants, n_tangents) array
+    form: Rows  # (n_cells,) array of int: which form of the effect; of the first one where there are two
+    z: Floats  # (n_cells, n_parameters) array: standard coordinates of the first effect's parameters
+    z_slopes: Floats  # (n_cells, n_parameters) array: their change over one standard deviation of the cell
+    # of two effects together: the tables of both, the cells of the second running fastest
+    parts: tuple[Cells, ...] = ()
 
     @property
     def n_cells(self) -> int:
-        """Number of cells."""
         return int(self.weights.size)
 
-    def some(self, cells: slice | Rows) -> Table:
+    def some(self, cells: slice | Rows) -> Cells:
         """Some of the cells, with the weights that they have among all."""
         return replace(self, **{key: getattr(self, key)[cells] for key in _PER_CELL})
 
-    def of(self, rows: Rows) -> Table:
+    def of(self, rows: Rows) -> Cells:
         """The same cells for some of the modes, by their indices."""
         if np.array_equal(rows, np.arange(self.shift.shape[1])):
             return self
         return replace(self, shift=self.shift[:, rows], slopes=self.slopes[:, rows])
 
-    def member(self, which: int, cells: Rows | None = None) -> tuple[Table, Rows]:
+    def member(self, which: int, cells: Rows | None = None) -> tuple[Cells, Rows]:
         """The table of one of its effects, and which cell there each cell of this one has; by default of all."""
         cells = np.arange(self.n_cells) if cells is None else cells
         return (self.parts[which], np.divmod(cells, self.parts[1].n_cells)[which]) if self.parts else (self, cells)
@@ -105,9 +82,9 @@ class Table:
 _PER_CELL = ("weights", "shift", "slopes", "moved", "moved_slopes", "form", "z", "z_slopes")
 
 
-def nothing(n_modes: int, n_constants: int = 3) -> Table:
+def nothing(n_modes: int, n_constants: int = 3) -> Cells:
     """No effect: one cell without shift."""
-    return Table(
+    return Cells(
         weights=np.ones(1),
         shift=np.zeros((1, n_modes)),
         slopes=np.zeros((1, n_modes, 0)),
@@ -119,28 +96,15 @@ def nothing(n_modes: int, n_constants: int = 3) -> Table:
     )
 
 
-def tabulate(baseline: Baseline, laws: Sequence[FormLaw], cells: tuple[int, int, int] = FINE) -> Table:
-    """Tabulate an effect over all its forms.
-
-    Parameters
-    ----------
-    laws : sequence of FormLaw
-        Of the effect's forms, equally probable.
-    cells : tuple of int
-        `FINE` or `COARSE`.
-
-    Returns
-    -------
-    Table
-        Without any cells where no size of the effect leaves a plate.
-    """
+def tabulate(baseline: Baseline, laws: Sequence[FormLaw], cells: tuple[int, int, int] = FINE) -> Cells:
+    """Tabulate an effect over all its forms, equally probable; without cells where no size of it leaves a plate."""
     n_tangents = max(len(law.form.free) for law in laws)
     parts = [_of_form(baseline, i, law, cells, n_tangents) for i, law in enumerate(laws)]
     joined: dict[str, Any] = {key: np.concatenate([getattr(part, key) for part in parts]) for key in _PER_CELL}
     return replace(parts[0], **joined | {"weights": joined["weights"] / len(laws)})
 
 
-def together(one: Table, other: Table) -> Table:
+def together(one: Cells, other: Cells) -> Cells:
     """Two effects at once: their shifts and refits add."""
 
     def added(first: Floats, second: Floats) -> Floats:
@@ -151,7 +115,7 @@ def together(one: Table, other: Table) -> Table:
         parts = (np.repeat(first, len(second), axis=0), np.tile(second, (len(first), 1, 1)))
         return np.concatenate(parts, axis=2)
 
-    return Table(
+    return Cells(
         weights=np.outer(one.weights, other.weights).ravel(),
         shift=added(one.shift, other.shift),
         slopes=joined(one.slopes, other.slopes),
@@ -172,19 +136,8 @@ def joint_law(baseline: Baseline, one: Form, other: Form) -> FormLaw:
     return form_law(baseline, both).placed(baseline)
 
 
-def joint_table(baseline: Baseline, added: Table, laws: JointLaws) -> Table:
-    """Two effects at once, exactly where there are laws of both.
-
-    Parameters
-    ----------
-    added : Table
-        Of both, their shifts added.
-
-    Returns
-    -------
-    Table
-        With the same cells in the same order.
-    """
+def joint_table(baseline: Baseline, added: Cells, laws: JointLaws) -> Cells:
+    """Two effects at once: exactly where there are laws of both, elsewhere as in `added`, whose cells it has."""
     (one, first), (other, second) = added.member(0), added.member(1)
     found = {key: getattr(added, key).copy() for key in ("shift", "moved", "slopes", "moved_slopes")}
     for (i, j), law in laws.items():
@@ -205,18 +158,10 @@ def joint_table(baseline: Baseline, added: Table, laws: JointLaws) -> Table:
 
 
 def refitted(baseline: Baseline, law: FormLaw, z: Floats) -> tuple[Floats, Floats]:
-    """Shifts of all modes with the constants refitted to the baseline's readings, and what the refit changed.
+    """Shifts, (n, n_every), with the constants refitted at (n, n_parameters) standard coordinates, and the changes of
+    ln D.
 
-    Parameters
-    ----------
-    z : (n, n_parameters) array
-        Standard coordinates.
-
-    Returns
-    -------
-    shift : (n, n_every) array
-        Not a number where the law gives no frequency.
-    moved : (n, n_constants) array
+    A shift is not a number where the law gives no frequency.
     """
     values = {free.name: free.prior.value(z[:, i]) for i, free in enumerate(law.form.free)}
     moved = np.zeros((len(z), baseline.log_rigidities.size))
@@ -253,7 +198,7 @@ def _finite(*values: Floats) -> NDArray[np.bool_]:
     return np.all([np.isfinite(one).reshape(len(one), -1).all(axis=1) for one in values], axis=0)
 
 
-def _of_form(baseline: Baseline, index: int, law: FormLaw, cells: tuple[int, int, int], n_tangents: int) -> Table:
+def _of_form(baseline: Baseline, index: int, law: FormLaw, cells: tuple[int, int, int], n_tangents: int) -> Cells:
     free = law.form.free
     axes = [_axis(one.prior, cells_along(len(free), cells)) for one in free]
     points = list(product(*(points for points, _ in axes)))
@@ -264,7 +209,7 @@ def _of_form(baseline: Baseline, index: int, law: FormLaw, cells: tuple[int, int
     good = _finite(shift, slopes, log_weights)
     weights = np.exp(np.where(good, log_weights, -np.inf))
     none = n_tangents - len(free)
-    return Table(
+    return Cells(
         weights=weights / max(weights.sum(), np.finfo(float).tiny),
         shift=shift,
         slopes=np.pad(slopes, ((0, 0), (0, 0), (0, none))),
@@ -284,7 +229,7 @@ def cells_along(n_parameters: int, cells: tuple[int, int, int]) -> int:
 
 def _axis(prior: Quantity, n: int) -> tuple[Floats, float]:
     """Middles of n equal cells between the prior's bounds or three standard deviations, and their width."""
-    low = max(float(prior.standard(prior.lower)), -_REACH) if np.isfinite(prior.lower) else -_REACH
-    high = min(float(prior.standard(prior.upper)), _REACH) if np.isfinite(prior.upper) else _REACH
+    low, high = prior.standard_bounds
+    low, high = max(low, -_REACH), min(high, _REACH)
     width = (high - low) / n
     return np.asarray(low + width * (np.arange(n) + 0.5)), width

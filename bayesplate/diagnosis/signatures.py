@@ -11,8 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.material import MODULI, moduli
 from bayesplate.board.parameter import Parameter
@@ -23,8 +23,6 @@ from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import system_of
 from bayesplate.posterior.posing import PosedProblem
-
-Floats = NDArray[np.float64]
 
 LOOK_ALIKE = 0.95
 """Cosine of two visible parts above which two effects look alike: they differ by less than a third of their trace.
@@ -44,31 +42,19 @@ INVISIBLE = (
 
 @dataclass(frozen=True, eq=False)
 class Signature:
-    """One effect at its nominal size.
-
-    Attributes
-    ----------
-    size : dict of float
-        Value of each parameter, SI.
-    raw : (n_modes,) array, cents
-        Shift of every frequency, constants unchanged; not a number where there is no frequency.
-    visible : (n_modes,) array, cents
-        What remains after the constants have been fitted again without the effect.
-    bias_percent : dict of float
-        What ignoring the effect does to E_x, E_y, G_xy.
-    scales : (n_modes,) array
-        Relative uncertainty of each reading: its weight in the fit, in every rms and in the likeness of two effects.
-    acts_both_ways : bool
-        Whether it may also be the opposite of what it is here: see `acts_both_ways`.
-    """
+    """One effect at its nominal size."""
 
     effect: str
-    size: Mapping[str, float]
+    size: Mapping[str, float]  # value of each parameter, SI
+    # (n_modes,) array, cents: shift of every frequency, constants unchanged; not a number where there is no frequency
     raw: Floats
+    # (n_modes,) array, cents: what remains after the constants have been fitted again without the effect
     visible: Floats
-    bias_percent: Mapping[str, float]
+    bias_percent: Mapping[str, float]  # what ignoring the effect does to E_x, E_y, G_xy
+    # (n_modes,) array: relative uncertainty of each reading: its weight in the fit, in every rms and in the likeness of
+    # two effects
     scales: Floats
-    acts_both_ways: bool = False
+    acts_both_ways: bool = False  # whether it may also be the opposite of what it is here: see `acts_both_ways`
 
     @property
     def raw_rms(self) -> float:
@@ -95,15 +81,7 @@ class Signature:
 
 
 def signature(baseline: Baseline, effect: str, sizes: Sequence[Parameter], log_frequency: Floats) -> Signature:
-    """The signature of an effect that takes a baseline's modes to other frequencies.
-
-    Parameters
-    ----------
-    sizes : sequence of Parameter
-        What has its nominal size there.
-    log_frequency : (n_modes,) array
-        ln f (Hz) with the effect, constants unchanged.
-    """
+    """The signature of an effect that takes a baseline's modes to other ln f (Hz), constants unchanged."""
     raw = log_frequency - baseline.log_frequency
     visible, step = baseline.refitted_to(raw)
     return Signature(
@@ -118,17 +96,9 @@ def signature(baseline: Baseline, effect: str, sizes: Sequence[Parameter], log_f
 
 
 def signatures(problem: PosedProblem, names: Sequence[str] | None = None) -> tuple[Signature, ...]:
-    """Signatures of effects around the estimate of a problem, by full solves.
+    """Signatures of all effects that can act, or of those named, around the estimate of a problem, by full solves.
 
-    Parameters
-    ----------
-    names : sequence of str, optional
-        By default all that are not declared and can act in at least one setup of the board.
-
-    Returns
-    -------
-    tuple of Signature
-        Without an effect that at its nominal size leaves no plate with these modes, or none to fit them.
+    Without an effect that at its nominal size leaves no plate with these modes, or none to fit them.
     """
     baseline = baseline_of(problem)
     found = (_solved(baseline, problem, name) for name in _acting(problem.board) if names is None or name in names)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.parameter import unit_of_people
 from bayesplate.board.quantity import Quantity
@@ -12,25 +12,13 @@ from bayesplate.diagnosis.draws import draw_terms, standard_sizes_of
 from bayesplate.diagnosis.forms import with_forms, with_labels_exchanged
 from bayesplate.diagnosis.search import Found
 
-Floats = NDArray[np.float64]
-
 AT_LIMIT = 0.005
 """Prior probability between the posterior median of a size and a bound below which the size is at its limit."""
 _N_DRAWS = 2000
 
 
 def size_posterior(found: Found, index: int, member: int, form: int, parameter: int) -> tuple[Floats, Floats]:
-    """Probability and standard coordinate of each cell of a member's form, under one hypothesis.
-
-    Parameters
-    ----------
-    index : int
-        Of the hypothesis.
-    member : int
-        0 or 1: which of its effects.
-    form, parameter : int
-        Which form of that effect, and which of its parameters.
-    """
+    """Probability and standard coordinate of each cell of a member's form, under one hypothesis."""
     table, cells = found.ground.hypotheses[index].table.member(member)
     by_cell = np.bincount(cells, weights=found.cells(index), minlength=table.n_cells)
     of_form = table.form == form
@@ -74,7 +62,7 @@ def at_limit(found: Found, index: int) -> str:
 
 def _median_within(prior: Quantity, z: Floats) -> float:
     """Median of the draws that lie within the bounds of a prior; the bound next to them where none does."""
-    low, high = float(prior.standard(prior.lower)), float(prior.standard(prior.upper))
+    low, high = prior.standard_bounds
     inside = z[(low <= z) & (z <= high)]
     return float(np.median(inside) if inside.size else np.clip(np.median(z), low, high))
 
@@ -83,7 +71,7 @@ def _is_extreme(prior: Quantity, z: float) -> bool:
     """Whether hardly any of a prior lies between a size and a bound; a zero that means no effect is no bound."""
     from scipy.special import ndtr
 
-    low, high = float(prior.standard(prior.lower)), float(prior.standard(prior.upper))
+    low, high = prior.standard_bounds
     whole = ndtr(high) - ndtr(low)
     starts_at_nothing = prior.lower == 0.0 and prior.mean == 0.0
     near_top = np.isfinite(high) and (ndtr(high) - ndtr(z)) / whole < AT_LIMIT

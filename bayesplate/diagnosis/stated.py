@@ -11,21 +11,18 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.sessions import same_modes
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.claim import STANDARD_ERRORS, score_gain
 from bayesplate.diagnosis.known import KnownFit, acting_at_known_size, fit_with, stated_effects
-from bayesplate.diagnosis.noise_grid import noise_grid, reach_of
 from bayesplate.diagnosis.shifts import nothing
-from bayesplate.diagnosis.terms import Terms
+from bayesplate.diagnosis.terms import Terms, noise_grid, reach_of
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.results.contract import rms
-
-Floats = NDArray[np.float64]
 
 LEAST_FALL = 0.2
 """Share of the error by which it has to fall."""
@@ -35,53 +32,25 @@ _FEWEST = 3
 
 @dataclass(frozen=True, kw_only=True)
 class StatedClaim:
-    """Whether it may be said that effects which the card states reduce the error.
+    """Whether it may be said that effects which the card states reduce the error."""
 
-    Attributes
-    ----------
-    effects : tuple of str
-        At their stated sizes, or the medians of their priors; nothing but the constants is fitted.
-    predicts : str
-        The setup that is predicted by constants of the first setup alone; empty where each mode is predicted by the
-        others.
-    before_rms_cents, after_rms_cents : float
-        Error of the predicted readings without these effects and with them.
-    log_score_gain, standard_error : float
-        Sum over the modes of what the effects add to the log density of each prediction, and its standard error from
-        their scatter.
-    n_modes : int
-        Which have a prediction both without and with the effects.
-    holds : bool
-        Whether the error falls by a fifth at least and the score rises by more than two standard errors.
-    """
-
+    # at their stated sizes, or the medians of their priors; nothing but the constants is fitted
     effects: tuple[str, ...]
+    # the setup that is predicted by constants of the first setup alone; empty where each mode is predicted by the
+    # others
     predicts: str
-    before_rms_cents: float
-    after_rms_cents: float
-    log_score_gain: float
-    standard_error: float
-    n_modes: int
-    holds: bool
+    before_rms_cents: float  # error of the predicted readings without these effects
+    after_rms_cents: float  # the same with them
+    log_score_gain: float  # sum over the modes of what the effects add to the log density of each prediction
+    standard_error: float  # of that, from its scatter over the modes
+    n_modes: int  # which have a prediction both without and with the effects
+    holds: bool  # whether the error falls by a fifth at least and the score rises by more than two standard errors
 
 
 def judge_stated(
     effects: Sequence[str], predicts: str, before: Floats, after: Floats, gains: Floats
 ) -> StatedClaim | None:
-    """Judge effects that the card states.
-
-    Parameters
-    ----------
-    before, after : (n_readings,) arrays
-        ln f, errors of prediction.
-    gains : (n_modes,) array
-        What the effects add to the log density of each mode.
-
-    Returns
-    -------
-    StatedClaim or None
-        None of too few modes.
-    """
+    """Judge stated effects by errors of prediction, ln f, and each mode's gain in log density; None of too few."""
     if gains.size < _FEWEST:
         return None
     old, new = (rms(cents(errors)) or 0.0 for errors in (before, after))
@@ -100,18 +69,7 @@ def judge_stated(
 
 
 def stated_claims(problem: PosedProblem, fits: Sequence[KnownFit]) -> tuple[StatedClaim, ...]:
-    """Judge what the card states of a board: by modes left out, and by each further setup in which it is another.
-
-    Parameters
-    ----------
-    fits : sequence of KnownFit
-        Of its combinations.
-
-    Returns
-    -------
-    tuple of StatedClaim
-        Empty where the card states no known effect.
-    """
+    """Judge what the card states of a board: by modes left out, and by each further setup in which it is another."""
     board = problem.board
     effects = stated_effects(board)
     if not effects:
@@ -144,23 +102,11 @@ def _of_further_setups(problem: PosedProblem, effects: Sequence[str], names: Seq
 
 
 def scores_given(fit: Baseline, groups: Sequence[Sequence[int]], given: Iterable[int] | None = None) -> Floats:
-    """ln of the probability density of the readings of each group given others, by constants fitted to all.
+    """ln of the probability density of the readings of each group given the others, or those `given`: (n_groups,)
+    array.
 
-    To first order about the fit. The constants are left open and the noise is averaged over its prior, so that neither
-    a better fit to the reading itself nor a noise that follows it can raise its score.
-
-    Parameters
-    ----------
-    fit : Baseline
-        Of fixed inputs.
-    groups : sequence of sequence of int
-        Readings of one mode, in all sessions of a setup.
-    given : iterable of int, optional
-        Readings by which each group is predicted; by default all but its own.
-
-    Returns
-    -------
-    (n_groups,) array
+    To first order about a fit of fixed inputs. The constants are left open and the noise is averaged over its prior, so
+    that neither a better fit to the reading itself nor a noise that follows it can raise its score.
     """
     reach = reach_of(fit.board, fit.setup_index, np.where(fit.is_mode, fit.residual, np.nan))
     noise = noise_grid(fit.board, reach=reach if len(fit.board.setups) <= 2 else ())

@@ -2,42 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from bayesplate.board.parameter import unit_of_people
-from bayesplate.diagnosis.candidates import Amplitude, CandidateEntry
 from bayesplate.diagnosis.known_words import known_table
-from bayesplate.diagnosis.result import Diagnosis
-from bayesplate.diagnosis.told import known_sentences, verdict_sentences, warnings
-from bayesplate.diagnosis.words import CONDITIONS, MERITS, VERDICTS, names_of, worth_showing
-from bayesplate.effects.words import effect_name
+from bayesplate.diagnosis.result import Amplitude, Diagnosis, EffectEntry, Finalist
+from bayesplate.diagnosis.words import (
+    CONDITIONS,
+    MERITS,
+    VERDICTS,
+    known_sentences,
+    names_of,
+    verdict_sentences,
+    warnings,
+)
+from bayesplate.effects.words import effect_name, effect_names
+from bayesplate.results.contract import Spread
 from bayesplate.results.fit_tables import write_tables
 from bayesplate.results.folder import BEFORE_AFTER, KNOWN_EFFECTS
 from bayesplate.results.tables import Cell, Row, Table, by_constant, constants_table, notebook
-from bayesplate.results.words import (
-    GPA,
-    Value,
-    decimals,
-    interval,
-    is_isotropic,
-    number,
-    plus_minus,
-)
+from bayesplate.results.words import GPA, Value, decimals, interval, is_isotropic, number, plus_minus
 
 _WORTH_A_ROW = 0.01
+_UNLIKELY = 0.01
+"""Probability below which an exchange of two labels is not worth showing: any two neighbours are a candidate."""
 _NARROW = ("effect", "shift", "visible", "size (90 %)", "fate")
-_WIDE = (
-    "effect",
-    "shift",
-    "visible",
-    "E_x / E_y / G_xy off by, %",
-    "inclusion probability",
-    "size (90 %)",
-    "looks like",
-    "rejected because",
-)
 
 
 def every_table(diagnosis: Diagnosis) -> tuple[Table, ...]:
@@ -138,53 +129,40 @@ def sizes_table(diagnosis: Diagnosis) -> Table | None:
     rows: list[Row] = []
     are_several = len(diagnosis.finalists) > 1
     for one in diagnosis.finalists:
-        explanation = (" and ".join(map(effect_name, one.effects)),) if are_several else ()
-        for owner, effects in one.sizes.items():
-            where = "" if owner == "board" else f", {owner}"
-            for effect, parameters in effects.items():
-                for parameter, spread in parameters.items():
-                    factor, unit = unit_of_people(spread.unit)
-                    after = f" {unit}" * bool(unit)
-                    size = plus_minus(spread, factor, after)
-                    range_ = None if spread.sd == 0.0 else interval(spread, factor, after)
-                    rows.append((*explanation, f"{effect_name(effect)}{where}", parameter, size, range_))
+        explanation = (effect_names(one.effects),) if are_several else ()
+        for owner, effect, parameter, spread, factor, unit in _every_size(one):
+            where, after = "" if owner == "board" else f", {owner}", f" {unit}" * bool(unit)
+            range_ = None if spread.sd == 0.0 else interval(spread, factor, after)
+            rows.append((*explanation, f"{effect}{where}", parameter, plus_minus(spread, factor, after), range_))
     columns = (*(["fitted with"] if are_several else []), "effect", "size", "mean ± sd", "90 % interval")
     return Table("Sizes of what was fitted again", columns, tuple(rows)) if rows else None
 
 
 def candidates_table(diagnosis: Diagnosis, *, narrow: bool = False) -> Table | None:
-    """Candidates, the most probable first: what each would do, and why it was rejected; None if there are none.
-
-    Parameters
-    ----------
-    narrow : bool
-        Fit for a terminal: without the bias and the look-alikes, the reason of a rejection in two words.
-    """
-    shown = sorted(worth_showing(diagnosis), key=lambda one: -one.inclusion_probability)
+    """Candidates, the most probable first, and why each was rejected; narrow for a terminal. None if there are none."""
+    likely = (
+        one for one in diagnosis.candidates if isinstance(one, EffectEntry) or one.inclusion_probability >= _UNLIKELY
+    )
+    shown = sorted(likely, key=lambda one: -one.inclusion_probability)
     if not shown:
         return None
-    columns = _NARROW if narrow else _WIDE
-    rows = []
-    for name, one in zip(names_of(shown), shown, strict=True):
-        cells = _cells(name, one)
-        rows.append(tuple(cells[column] for column in columns))
+    every: list[dict[str, Cell]] = [
+        {
+            "effect": name,
+            "shift": number(one.raw_rms_cents, 1),
+            "visible": number(one.visible_rms_cents, 1),
+            "E_x / E_y / G_xy off by, %": _bias(one.bias_percent),
+            "inclusion probability": number(one.inclusion_probability, 3),
+            "size (90 %)": _size(one.amplitude),
+            "looks like": ", ".join(map(effect_name, one.look_alikes)) or None,
+            "rejected because": one.rejected_because or None,
+            "fate": one.fate,
+        }
+        for name, one in zip(names_of(shown), shown, strict=True)
+    ]
+    columns = _NARROW if narrow else tuple(column for column in every[0] if column != "fate")
     title = "Candidates at their usual size: shift of the modes, rms cents, and what of it shows"
-    return Table(title, columns, tuple(rows))
-
-
-def _cells(name: str, one: CandidateEntry) -> Mapping[str, Cell]:
-    """Every cell that a row of a candidate may have, by its column."""
-    return {
-        "effect": name,
-        "shift": number(one.raw_rms_cents, 1),
-        "visible": number(one.visible_rms_cents, 1),
-        "E_x / E_y / G_xy off by, %": _bias(one.bias_percent),
-        "inclusion probability": number(one.inclusion_probability, 3),
-        "size (90 %)": _size(one.amplitude),
-        "looks like": ", ".join(effect_name(other) for other in one.look_alikes) or None,
-        "rejected because": one.rejected_because or None,
-        "fate": one.fate,
-    }
+    return Table(title, columns, tuple(tuple(cells[column] for column in columns) for cells in every))
 
 
 def _summing(shares: Sequence[float]) -> list[str]:
@@ -222,39 +200,25 @@ def before_after_table(diagnosis: Diagnosis) -> Table:
     title = f"Before and after; verdict: {diagnosis.verdict}"
     columns = ("", "before", "after", "shift, sd", "averaged")
     keys = ("quantity", "before", "after", "shift_in_sd", "averaged")
-    if diagnosis.is_refitted:
-        rows += [(name, None, size, None, None) for name, size in _sizes(diagnosis)]
-        return Table(title, columns, tuple(rows), keys)
+    for added in (one for one in diagnosis.finalists if one.effects == diagnosis.refitted):
+        for owner, effect, parameter, spread, factor, unit in _every_size(added):
+            words = f"{effect} {parameter}, {owner}" + f", {unit}" * bool(unit)
+            rows.append((words, None, number(spread.mean, decimals(spread.sd * factor), factor=factor), None, None))
+    kept = range(len(columns)) if diagnosis.is_refitted else (0, 1, 4)
+    cells = tuple(tuple(row[i] for i in kept) for row in rows)
+    return Table(title, tuple(columns[i] for i in kept), cells, tuple(keys[i] for i in kept))
 
-    def known(row: tuple[Cell, ...]) -> tuple[Cell, ...]:
-        return (*row[:2], row[4])
 
-    return Table(title, (*columns[:2], columns[4]), tuple(map(known, rows)), (*keys[:2], keys[4]))
-
-
-def _sizes(diagnosis: Diagnosis) -> list[tuple[str, Value]]:
-    """Name with unit, and mean, of each size of what was added."""
-    found = []
-    for one in diagnosis.finalists:
-        for owner, effects in one.sizes.items() if one.effects == diagnosis.refitted else ():
-            for effect, parameters in effects.items():
-                for parameter, spread in parameters.items():
-                    factor, unit = unit_of_people(spread.unit)
-                    words = f"{effect_name(effect)} {parameter}, {owner}" + f", {unit}" * bool(unit)
-                    found.append((words, number(spread.mean, decimals(spread.sd * factor), factor=factor)))
-    return found
+def _every_size(one: Finalist) -> Iterator[tuple[str, str, str, Spread, float, str]]:
+    """Board or setup, effect in words, parameter and spread of each size, with the factor and the unit of people."""
+    for owner, effects in one.sizes.items():
+        for effect, parameters in effects.items():
+            for parameter, spread in parameters.items():
+                yield owner, effect_name(effect), parameter, spread, *unit_of_people(spread.unit)
 
 
 def write_diagnosis_tables(folder: Path, diagnosis: Diagnosis, title: str) -> tuple[Path, ...]:
-    """Write errors and constants before and after, and known effects where there are any, as CSV and LaTeX.
-
-    Parameters
-    ----------
-    folder : Path
-        Must be there.
-    title : str
-        Of the board; any text.
-    """
+    """Write errors and constants before and after, and known effects where there are any, as CSV and LaTeX."""
     written: tuple[Path, ...] = ()
     for names, table in ((BEFORE_AFTER, before_after_table(diagnosis)), (KNOWN_EFFECTS, known_table(diagnosis.known))):
         if table is not None:

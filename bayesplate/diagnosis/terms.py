@@ -9,18 +9,17 @@ what the term leaves of all readings, and the others are as probable as all of t
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesplate.diagnosis.baseline import Baseline
-from bayesplate.diagnosis.noise_grid import NoiseGrid
-from bayesplate.diagnosis.shifts import Table
-
-Floats = NDArray[np.float64]
+from bayesplate.arrays import Floats
+from bayesplate.board.board import Board
+from bayesplate.diagnosis.baseline import Baseline, Rows
+from bayesplate.diagnosis.shifts import Cells
 
 _MOST_NUMBERS = 200_000
 """Held at once of any one kind: larger arrays cost more to fetch and to give back than to fill."""
@@ -31,15 +30,9 @@ _LEAST = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """Normal terms of a table: one per level of noise and cell, cells running fastest.
+    """Normal terms of a table: one per level of noise and cell, cells running fastest."""
 
-    Attributes
-    ----------
-    table : Table
-        Of the modes that the readings are taken for.
-    """
-
-    table: Table
+    table: Cells  # of the modes that the readings are taken for
     baseline: Baseline
     noise: NoiseGrid
 
@@ -87,13 +80,7 @@ class Terms:
         return offsets[:, :, None] - 0.5 * squares, inside
 
     def log_densities(self, residuals: Floats) -> Floats:
-        """Logarithm of weight times density of each term: (n_terms, n_sets) array.
-
-        Parameters
-        ----------
-        residuals : (n_sets, n_modes) array
-            ln measured less ln f of the baseline.
-        """
+        """Logarithm of weight times density of each term: (n_terms, n_sets) array."""
         return self._densities(residuals)[0].reshape(-1, len(residuals))
 
     def log_evidence(self, residuals: Floats) -> Floats:
@@ -102,18 +89,10 @@ class Terms:
         return np.asarray(log_sum(np.stack(parts)) - self.baseline.half_log_det)
 
     def left_out(self, residuals: Floats) -> tuple[Floats, Floats]:
-        """Each mode left out in turn, with all its readings.
+        """ln evidence without each mode, (n_same_modes, n_sets), and the errors of its readings, (n_modes, n_sets), ln
+        f.
 
-        Parameters
-        ----------
-        residuals : (n_sets, n_modes) array
-
-        Returns
-        -------
-        log_evidence : (n_same_modes, n_sets) array
-            Of the readings of the other modes.
-        errors : (n_modes, n_sets) array
-            Each reading less its mean prediction by these, ln f; not a number where the reading is no mode.
+        An error is a reading less its mean prediction by the others; not a number where the reading is no mode.
         """
         parts = [part._left_out(residuals) for part in self._in_parts(len(residuals))]
         log_masses, errors = (np.stack(each) for each in zip(*parts, strict=True))
@@ -121,7 +100,7 @@ class Terms:
         return np.asarray(log_sum(log_masses) - self.baseline.half_log_det), np.asarray(mean)
 
     def _left_out(self, residuals: Floats) -> tuple[Floats, Floats]:
-        """The same with the weight of these cells, the change of volume not counted."""
+        """The same of these cells alone: ln of their weight in place of the evidence, no change of volume counted."""
         log_densities, inside = self._densities(residuals)
         white, along = self._whitening, self._tangents[0] @ self._whitening[:, None]
         seen = np.swapaxes(white, 1, 2) @ (white @ residuals.T)
@@ -161,3 +140,68 @@ def normalised(log_values: Floats) -> Floats:
     """Probabilities from logarithms of weights, summing to one over the first axis."""
     shares = np.exp(log_values - log_values.max(axis=0))
     return np.asarray(shares / shares.sum(axis=0))
+
+
+_LOW, _HIGH, _HIGHEST = -2.5, 3.5, 9.0
+_MARGIN = 1.5
+"""Standard deviations of the prior: a noise stands a few tenths off the rms, and is tried 1.5 times smaller."""
+_LEVELS, _FEW_LEVELS = {1: 9, 2: 5}, {1: 5, 2: 4}
+"""Along each of one or two setups."""
+_POINTS, _FEW_POINTS = 64, 32
+"""Of more setups together, whose product would grow without bound; powers of two, as Sobol's sequence wants them."""
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseGrid:
+    """Levels of the relative noise."""
+
+    sd: Floats  # (n_levels, n_setups) array
+    weights: Floats  # (n_levels,) array: prior probability, summing to 1
+
+
+def noise_grid(board: Board, *, few: bool = False, reach: Sequence[float] = ()) -> NoiseGrid:
+    """Equidistant levels in the logarithm of the noise of one setup, each with each of two, and points among more.
+
+    The points are the first of Sobol's sequence (USSR Comput. Math. Math. Phys. 7, 1967), each in the middle of its
+    share of the prior: as many for twenty setups as for three, so that the more setups, the coarser they lie; a `few`
+    for combinations of effects. The levels of one or two setups go up to `reach` at least, in standard coordinates: a
+    misfit of many times the noise is a large noise rather than one that no level comes near.
+    """
+    n_setups = len(board.setups)
+    counts = _FEW_LEVELS if few else _LEVELS
+    if n_setups in counts:
+        axes = [_levels(counts[n_setups], top) for top in reach or (_HIGH,) * n_setups]
+        t = np.array(list(product(*axes)))
+        weights = np.exp(-0.5 * (t**2).sum(axis=1))
+    else:
+        t = _points(_FEW_POINTS if few else _POINTS, n_setups)
+        weights = np.ones(len(t))
+    each = [setup.noise.median * np.exp(setup.noise.log_sd * t[:, i]) for i, setup in enumerate(board.setups)]
+    return NoiseGrid(np.stack(each, axis=1), weights / weights.sum())
+
+
+def reach_of(board: Board, setup_index: Rows, residual: Floats) -> tuple[float, ...]:
+    """How far up each setup's noise levels have to go for its residual (ln f; NaN: no mode), standard coordinates."""
+    found = []
+    for i, setup in enumerate(board.setups):
+        own = residual[(setup_index == i) & np.isfinite(residual)]
+        rms = float(np.sqrt(np.mean(own**2))) if own.size else 0.0
+        needed = np.log(rms / setup.noise.median) / setup.noise.log_sd + _MARGIN if rms > 0.0 else _HIGH
+        found.append(float(np.clip(needed, _HIGH, _HIGHEST)))
+    return tuple(found)
+
+
+def _levels(n_levels: int, top: float) -> Floats:
+    """So many levels up to where the prior ends for most boards, and more of the same distance up to the top."""
+    step = (_HIGH - _LOW) / n_levels
+    n_more = int(np.ceil((top - _HIGH) / step - 1e-9))
+    return np.asarray(_LOW + step * (np.arange(n_levels + n_more) + 0.5))
+
+
+def _points(n_points: int, n_dim: int) -> Floats:
+    """Standard normal coordinates of equally weighted points: (n_points, n_dim) array."""
+    from scipy.special import ndtri
+    from scipy.stats.qmc import Sobol
+
+    shares = Sobol(n_dim, scramble=False).random(n_points) + 0.5 / n_points
+    return np.asarray(ndtri(shares))

@@ -28,47 +28,24 @@ NOTHING_LEFT_OF_ONE = "one mode determines the one constant and leaves nothing t
 
 @dataclass(frozen=True)
 class Answer:
-    """One way to explain a residual: a single effect or a pair, with the support that it has.
-
-    Attributes
-    ----------
-    index : int
-        Of its hypothesis.
-    support : float
-        Its probability, and that of pairs that say little more than it.
-    """
+    """One way to explain a residual: a single effect or a pair, with the support that it has."""
 
     members: tuple[str, ...]
-    index: int
-    support: float
+    index: int  # of its hypothesis
+    support: float  # its probability, and that of pairs that say little more than it
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the readings allow to say.
-
-    Attributes
-    ----------
-    word : str
-        "none needed", "named", "indistinguishable group", "unexplained" or "undetectable".
-    effects : tuple of str
-        Named: all of them are present. Group: each is an alternative.
-    index : int
-        Hypothesis to refit; 0 if the model stays as it is.
-    best : Answer or None
-        The most probable answer, whatever the verdict.
-    is_needed : bool
-        Whether the odds against no effect are larger than the null simulations leave to chance.
-    stands_for : tuple of Answer
-        The one that is named, or the alternatives of a group, the most probable first.
-    """
+    """What the readings allow to say."""
 
     word: Word
-    effects: tuple[str, ...]
-    index: int
-    best: Answer | None
+    effects: tuple[str, ...]  # named: all of them are present. Group: each is an alternative.
+    index: int  # hypothesis to refit; 0 if the model stays as it is
+    best: Answer | None  # the most probable answer, whatever the verdict
     reason: str
-    is_needed: bool = False
+    is_needed: bool = False  # whether the odds against no effect are larger than the null simulations leave to chance
+    # the one that is named, or the alternatives of a group, the most probable first
     stands_for: tuple[Answer, ...] = ()
 
     @property
@@ -83,7 +60,7 @@ class Verdict:
 
     @property
     def fitted_again(self) -> tuple[Answer, ...]:
-        """What it stands for, or what comes nearest."""
+        """Answers to fit again: those that the verdict stands for, or the nearest one."""
         return self.stands_for if self.nearest is None else (self.nearest,)
 
 
@@ -115,15 +92,10 @@ def answers(found: Found) -> tuple[Answer, ...]:
 
 
 def decide(found: Found, control: NullControl, others: Iterable[tuple[str, Found]] | None = None) -> Verdict:
-    """The verdict on one set of readings.
+    """The verdict on one set of readings, by what the search makes of boards without any effect.
 
-    Parameters
-    ----------
-    control : NullControl
-        What the search makes of boards without any effect.
-    others : iterable of (str, Found), optional
-        The searches that a name has to survive, each with what is assumed there; by default those of `variants`, made
-        only if there is a name.
+    A name has to survive other searches, each with what is assumed there; by default those of `variants`, made only if
+    there is a name.
     """
     ranked = answers(found)
     best = ranked[0] if ranked else None
@@ -197,7 +169,7 @@ def answer_words(found: Found, answer: Answer) -> str:
 
 
 def alternatives_words(found: Found, told: Sequence[Answer]) -> str:
-    """Answers of which one is the case, in words; two effects that are one answer stay together."""
+    """Alternative answers in words; the two effects of a pair stay together."""
     words = [answer_words(found, one) for one in told]
     return ", or ".join(words) if any(len(one.members) > 1 for one in told) else joined(words, "or")
 

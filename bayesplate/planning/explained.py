@@ -15,8 +15,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.prior import PriorCard
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.forms import with_forms
@@ -28,16 +28,15 @@ from bayesplate.planning.beliefs import (
     N_TERMS,
     NOTHING_LACKS,
     AtHand,
+    Belief,
     Beliefs,
-    Explanation,
     FormTerms,
     KnownBoard,
+    Rows,
     laws_of,
     log_moduli,
 )
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.intp]
+from bayesplate.posterior.statistics import resampled
 
 UNEXPLAINED = (
     "no effect that is tried explains the readings, so that nothing is said of telling effects apart: what is planned "
@@ -52,17 +51,9 @@ MOST = 4
 def believed(
     found: Found, prior: PriorCard | None, rng: np.random.Generator, among: Sequence[Answer] | None = None
 ) -> Beliefs:
-    """What a search leaves to be believed of a board.
+    """What a search leaves to be believed of a board: of the explanations among those given, or of those that survive.
 
-    Parameters
-    ----------
-    prior : PriorCard or None
-        Of the noise where the board was never held.
-    rng : numpy.random.Generator
-        Picks the terms that stand for all.
-    among : sequence of Answer, optional
-        Explanations that are to be told apart, that of no effect with index 0. By default those that survive; no effect
-        alone where nothing explains the readings.
+    No effect alone where nothing explains the readings. The prior is of the noise where the board was never held.
     """
     base, is_failed = found.ground.baseline, among is None and is_unexplained(found)
     left = [Answer((), 0, found.none)] if is_failed else survivors(found) if among is None else among
@@ -81,21 +72,19 @@ def is_unexplained(found: Found) -> bool:
     return not ranked or found.p_value(ranked[0].index) < PASSES
 
 
-def explanations_of(found: Found, left: Sequence[Answer], rng: np.random.Generator) -> tuple[Explanation, ...]:
+def explanations_of(found: Found, left: Sequence[Answer], rng: np.random.Generator) -> tuple[Belief, ...]:
     """Answers of a search, that of no effect with index 0, as explanations whose probabilities sum to one."""
     total = sum(one.support for one in left)
     return tuple(_explanation(found, one, one.support / total, rng) for one in left)
 
 
-def _explanation(found: Found, answer: Answer, probability: float, rng: np.random.Generator) -> Explanation:
+def _explanation(found: Found, answer: Answer, probability: float, rng: np.random.Generator) -> Belief:
     """An answer of a search as terms: cells and levels of noise drawn by what they weigh now."""
     base, hypothesis = found.ground.baseline, found.ground.hypotheses[answer.index]
     terms = hypothesis.terms
     seen = hypothesis.seen(base, found.residual[None, :])
-    # systematic: drawn with the least scatter
-    places = (np.arange(N_TERMS) + rng.random()) / N_TERMS
-    shares = np.cumsum(normalised(terms.log_densities(seen)[:, 0]))
-    levels, cells = np.divmod(np.minimum(np.searchsorted(shares, places), shares.size - 1), terms.table.n_cells)
+    picked = resampled(normalised(terms.log_densities(seen)[:, 0]), N_TERMS, rng)
+    levels, cells = np.divmod(picked, terms.table.n_cells)
     noise = terms.noise.sd[levels]
     table, own = terms.table, terms.baseline
     sides = np.concatenate([own.slopes, own.input_slopes], axis=1)
@@ -113,7 +102,7 @@ def _explanation(found: Found, answer: Answer, probability: float, rng: np.rando
     slopes = design @ np.linalg.inv(turn)
     shift = own.middle + table.shift[cells] - np.einsum("tru,tu->tr", slopes, start)
     middle, gradient = log_moduli(base.board, base.log_rigidities)
-    return Explanation(
+    return Belief(
         members=hypothesis.members,
         words=answer_words(found, answer) if answer.members else NOTHING_LACKS,
         probability=probability,
@@ -140,19 +129,15 @@ def _sizes(found: Found, answer: Answer, cells: Rows, first: int) -> tuple[tuple
     Coordinates and their changes over one standard deviation of the cell are (n_cells, n_tangents) arrays. Forms that
     are not likely are taken for the likeliest.
     """
-    ground = found.ground
-    candidates = [ground.candidates[name] for name in answer.members if name in ground.candidates]
+    ground, whole = found.ground, found.ground.hypotheses[answer.index].table
+    candidates = ground.members(answer.index)
     if not candidates:
         return (), np.zeros((len(cells), 0)), np.zeros((len(cells), 0))
-    tables = [one.fine if len(candidates) == 1 else one.coarse for one in candidates]
-    of_each = [cells] if len(tables) == 1 else np.divmod(cells, tables[1].n_cells)
-    z, step = (
-        np.concatenate([getattr(table, name)[at] for table, at in zip(tables, of_each, strict=True)], axis=1)
-        for name in ("z", "z_slopes")
-    )
+    parts = [whole.member(i, cells) for i in range(len(candidates))]
+    z, step = (np.concatenate([getattr(table, name)[at] for table, at in parts], axis=1) for name in ("z", "z_slopes"))
     step[step == 0.0] = 1.0  # columns that only other forms have
-    starts = first + np.cumsum([0, *(table.z.shape[1] for table in tables)])
-    index = np.stack([table.form[at] for table, at in zip(tables, of_each, strict=True)])
+    starts = first + np.cumsum([0, *(table.z.shape[1] for table, _ in parts)])
+    index = np.stack([table.form[at] for table, at in parts])
     keys, which, counts = np.unique(index, axis=1, return_inverse=True, return_counts=True)
     which = np.where(counts[which] < _LIKELY * len(cells), counts.argmax(), which)
     forms = []
@@ -183,12 +168,8 @@ def _conditioned(design: Floats, variance: Floats, seen: Floats, used: Rows, n_c
 def survivors(found: Found, rivals: Collection[tuple[str, ...]] = ()) -> tuple[Answer, ...]:
     """No effect, and the answers of a search within a factor ten of the best of them, the most probable first.
 
-    No effect is left out where it is ten times less probable than the best answer.
-
-    Parameters
-    ----------
-    rivals : collection of tuple of str
-        Answers that survive in any case: alternatives that a verdict lists because another assumption favours them.
+    No effect is left out where it is ten times less probable than the best answer. Rivals survive in any case: a
+    verdict lists them because another assumption favours them.
     """
     return surviving(found, {one.members: one.support for one in answers(found)}, found.none, rivals)
 
@@ -196,18 +177,9 @@ def survivors(found: Found, rivals: Collection[tuple[str, ...]] = ()) -> tuple[A
 def surviving(
     found: Found, support: Mapping[tuple[str, ...], float], none: float, rivals: Collection[tuple[str, ...]] = ()
 ) -> tuple[Answer, ...]:
-    """The same by probabilities that are known from a finished diagnosis.
+    """The same by probabilities, of answers by their effects and of none, that are known from a finished diagnosis.
 
-    Parameters
-    ----------
-    found : Found
-        A search that has tried at least these effects; others are left out.
-    support : dict of float
-        By the effects of an answer.
-    none : float
-        Probability of no effect.
-    rivals : collection of tuple of str
-        See `survivors`.
+    Effects that the search has not tried are left out.
     """
     index: dict[tuple[str, ...], int] = {}
     for i, one in enumerate(found.ground.hypotheses):

@@ -8,18 +8,16 @@ readings are drawn from what is believed now, and what would be believed after e
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.material import MODULI
 from bayesplate.diagnosis.terms import log_sum, normalised
-from bayesplate.planning.beliefs import Beliefs, Explanation, entropy
+from bayesplate.planning.beliefs import Belief, Beliefs, entropy
 from bayesplate.planning.plan import Gain
-
-Floats = NDArray[np.float64]
 
 REFERENCES = (
     "D. V. Lindley: On a measure of the information provided by an experiment. Ann. Math. Stat. 27, 986-1005 (1956), "
@@ -36,24 +34,20 @@ _FEWEST_DRAWS = 32
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """Readings that could be taken, linear in u under each explanation.
+    """Readings that could be taken, linear in u under each explanation."""
 
-    Attributes
-    ----------
-    shift : tuple of (n_terms, n) array
-        One per explanation: what is read where u is zero, less the same number under all.
-    slopes : tuple of (n_terms, n, n_u) array
-    variance : tuple of (n_terms, n) array
-        Of the noise.
-    """
-
+    # one (n_terms, n) array per explanation: what is read where u is zero, less the same number under all
     shift: tuple[Floats, ...]
-    slopes: tuple[Floats, ...]
-    variance: tuple[Floats, ...]
+    slopes: tuple[Floats, ...]  # (n_terms, n, n_u) arrays
+    variance: tuple[Floats, ...]  # (n_terms, n) arrays: of the noise
+
+    @classmethod
+    def of(cls, every: Iterable[tuple[Floats, Floats, Floats]]) -> Readings:
+        """From shift, slopes and variance under each explanation."""
+        return cls(*zip(*every, strict=True))
 
     @property
     def n(self) -> int:
-        """Number of readings."""
         return int(self.shift[0].shape[1])
 
     def some(self, rows: Sequence[int]) -> Readings:
@@ -64,11 +58,8 @@ class Readings:
 
 def together(every: Sequence[Readings]) -> Readings:
     """Several sets of readings as one."""
-
-    def joined(parts: Sequence[tuple[Floats, ...]]) -> tuple[Floats, ...]:
-        return tuple(np.concatenate(of_one, axis=1) for of_one in zip(*parts, strict=True))
-
-    return Readings(*(joined([getattr(one, name) for one in every]) for name in ("shift", "slopes", "variance")))
+    parts = zip(*((one.shift, one.slopes, one.variance) for one in every), strict=True)
+    return Readings(*(tuple(np.concatenate(of_one, axis=1) for of_one in zip(*part, strict=True)) for part in parts))
 
 
 def expected_gain(
@@ -81,15 +72,8 @@ def expected_gain(
 ) -> Gain:
     """What some readings are expected to give.
 
-    Parameters
-    ----------
-    goal : str, optional
-        One of `GOALS`: what the score counts. By default the drop of the explanations' entropy and the mean shrinkage,
-        both logarithms, of what the boards share, or of the constants where they share nothing.
-    minutes : float
-        That the readings take.
-    n_draws : int
-        Of what may be read.
+    The score counts the goal, one of `GOALS`; by default the drop of the explanations' entropy and the mean shrinkage,
+    both logarithms, of what the boards share, or of the constants where they share nothing.
     """
     updates = [_Update.of(one, readings, k, beliefs.free) for k, one in enumerate(beliefs.explanations)]
     weights = beliefs.probabilities
@@ -136,7 +120,7 @@ class _Mean:
 
     @classmethod
     def of_strata(cls, values: Sequence[Floats], weights: Floats) -> _Mean:
-        """Of one (n_draws, n) array a stratum; a single draw has no error."""
+        """From one (n_draws, n) array per stratum; a single draw has no error."""
         mean = sum(p * one.mean(axis=0) for p, one in zip(weights, values, strict=True))
         many = ((p, one) for p, one in zip(weights, values, strict=True) if len(one) > 1)
         variance = sum(p**2 * one.var(axis=0, ddof=1) / len(one) for p, one in many)
@@ -145,35 +129,22 @@ class _Mean:
 
 @dataclass(frozen=True, eq=False)
 class _Update:
-    """What readings do to each term of an explanation.
+    """What readings do to each term of an explanation."""
 
-    Attributes
-    ----------
-    expected : (n_terms, n) array
-        Of the readings.
-    factor, whitening : (n_terms, n, n) array
-        L with their covariance L L', and its inverse.
-    log_size : (n_terms,) array
-        ln of the determinant of L.
-    pull : (n_terms, n_wanted, n) array
-        Takes whitened misses to what the wanted numbers change by.
-    wanted, before, after : (n_terms, n_wanted) array
-        Their means, and their variances before and after.
-    information : (n_terms,) array
-    """
-
-    expected: Floats
+    expected: Floats  # (n_terms, n) array: of the readings
+    # factor, whitening: (n_terms, n, n) array: L with their covariance L L', and its inverse
     factor: Floats
     whitening: Floats
-    log_size: Floats
-    pull: Floats
+    log_size: Floats  # (n_terms,) array: ln of the determinant of L
+    pull: Floats  # (n_terms, n_wanted, n) array: takes whitened misses to what the wanted numbers change by
+    # wanted, before, after: (n_terms, n_wanted) array: their means, and their variances before and after
     wanted: Floats
     before: Floats
     after: Floats
     information: Floats
 
     @classmethod
-    def of(cls, one: Explanation, readings: Readings, k: int, free: Sequence[int]) -> _Update:
+    def of(cls, one: Belief, readings: Readings, k: int, free: Sequence[int]) -> _Update:
         slopes, variance = readings.slopes[k], readings.variance[k]
         expected = readings.shift[k] + np.einsum("tnu,tu->tn", slopes, one.mean)
         along = slopes @ one.covariance

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values, density, vibrating_lengths
 from bayesplate.board.sessions import under_prior_scales
 from bayesplate.effects.attached_items import board_mass
@@ -20,8 +20,6 @@ from bayesplate.planning.stations import SEARCHED, Station
 from bayesplate.plate.solve import Modes
 from bayesplate.posterior.parameters import Parameters
 
-Floats = NDArray[np.float64]
-
 _SHARE = 0.02
 """Of the board's mass that a known mass has, about: it shifts a mode by up to some per cent."""
 _HANDY = (0.5e-3, 1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3)
@@ -32,25 +30,13 @@ PLACED = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class SolvedStation:
-    """The modes of a station by full solution, and a known mass among them.
-
-    Attributes
-    ----------
-    values : dict of float
-        With those that the station's effects take.
-    modes : Modes
-        The lowest ones.
-    rows : list of int
-        Where the station's modes stand among them; -1 where one has lost its name.
-    share : float
-        The known mass over that of what vibrates.
-    """
+    """The modes of a station by full solution, and a known mass among them."""
 
     station: Station
-    values: Values
-    modes: Modes
-    rows: list[int]
-    share: float
+    values: Values  # with those that the station's effects take
+    modes: Modes  # the lowest ones
+    rows: list[int]  # where the station's modes stand among them; -1 where one has lost its name
+    share: float  # the known mass over that of what vibrates
 
     @classmethod
     def of(cls, station: Station, board: Board, values: Values, meshed: Values | None = None) -> SolvedStation:
@@ -117,43 +103,19 @@ def known_mass(board: Board) -> float:
 
 @dataclass(frozen=True, eq=False)
 class BareLaw:
-    """The modes of a station without further effects, linear in constants and inputs.
-
-    Attributes
-    ----------
-    solved : (1 + n_spots, n_modes) array
-        Of `SolvedStation.bare_and_added`, at the estimate.
-    middle : (n_modes,) array
-        ln f (Hz) with the inputs at the middle of their priors.
-    slopes : (n_plates, n_modes, n_constants + n_inputs) array
-        By the logarithms of the free rigidities and the inputs' standard coordinates, at the estimate; where nothing
-        was read, at plates drawn from the prior.
-    off_place : (n_spots, n_modes) array
-        Of `SolvedStation`, at the estimate.
-    """
+    """The modes of a station without further effects, linear in constants and inputs."""
 
     station: Station
-    solved: Floats
-    middle: Floats
+    solved: Floats  # (1 + n_spots, n_modes) array: of `SolvedStation.bare_and_added`, at the estimate
+    middle: Floats  # (n_modes,) array: ln f (Hz) with the inputs at the middle of their priors
+    # (n_plates, n_modes, n_constants + n_inputs) array: by the logarithms of the free rigidities and the inputs'
+    # standard coordinates, at the estimate; where nothing was read, at plates drawn from the prior
     slopes: Floats
-    off_place: Floats
+    off_place: Floats  # (n_spots, n_modes) array: of `SolvedStation`, at the estimate
 
 
 def bare_law(board: Board, station: Station, values: Values, drawn: Sequence[Values] = ()) -> BareLaw:
-    """Solve a station at an estimate.
-
-    Parameters
-    ----------
-    values : dict of float
-        Rigidities and the board's inputs, SI.
-    drawn : sequence of dict of float
-        Plates at which the slopes are taken instead; one on which a mode is not to be found is passed over.
-
-    Raises
-    ------
-    KeyError
-        If one of its modes is no mode of the plate at the estimate.
-    """
+    """Solve a station at an estimate, its slopes at the plates drawn instead that have its modes; KeyError without."""
     slopes, inputs, offset = _linear(board, station, values)
     found = SolvedStation.of(station, board, values)
     solved, n = found.bare_and_added, board.symmetry.n

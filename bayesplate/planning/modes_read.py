@@ -6,17 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.sessions import shared_share, unknown_discrepancies
 from bayesplate.frequencies.reading_errors import ReadingErrors
-from bayesplate.planning.beliefs import Beliefs, Explanation, KnownBoard, levels
+from bayesplate.planning.beliefs import Belief, Beliefs, FormTerms, KnownBoard, levels
 from bayesplate.planning.gains import Readings
-from bayesplate.planning.laws import BareLaw
-from bayesplate.planning.shifts import add_effects
+from bayesplate.planning.laws import BareLaw, SolvedStation
 from bayesplate.planning.stations import Station
-
-Floats = NDArray[np.float64]
 
 REPEATED = 2e-4
 """Relative scatter of a frequency that is read once more in one session: what five hits on a free board leave open."""
@@ -24,48 +21,23 @@ REPEATED = 2e-4
 
 @dataclass(frozen=True, eq=False)
 class StationReadings:
-    """Everything that could be read in a station.
-
-    Attributes
-    ----------
-    further : Readings
-        Modes that were not read yet, in the session that goes on, or in a new one where the board is held anew.
-    rows : tuple of int
-        Which of the station's modes they are.
-    old : tuple of int
-        Which of the readings at hand can be taken once more: every explanation knows what is read then.
-    again : Readings or None
-        These in another session; None where there are none, or where what is believed leaves them aside.
-    with_mass : dict of Readings
-        The same with a known mass, in the session that goes on, by the index of its spot; none where there is one
-        explanation only, for a known mass tells by what it adds alone.
-    """
+    """Everything that could be read in a station."""
 
     law: BareLaw
+    # modes that were not read yet, in the session that goes on, or in a new one where the board is held anew
     further: Readings
-    rows: tuple[int, ...]
+    rows: tuple[int, ...]  # which of the station's modes they are
+    # which of the readings at hand can be taken once more: every explanation knows what is read then
     old: tuple[int, ...]
+    # these in another session; None where there are none, or where what is believed leaves them aside
     again: Readings | None
+    # the same with a known mass, in the session that goes on, by the index of its spot; none where there is one
+    # explanation only, for a known mass tells by what it adds alone
     with_mass: Mapping[int, Readings]
 
 
-def station_readings(
-    beliefs: Beliefs,
-    known: KnownBoard,
-    law: BareLaw,
-    rng: np.random.Generator,
-) -> StationReadings:
-    """What each explanation expects of everything that could be read in a station.
-
-    Parameters
-    ----------
-    known : KnownBoard
-        The board.
-    law : BareLaw
-        Of the station.
-    rng : numpy.random.Generator
-        Deals the levels of a new session's noise to the terms.
-    """
+def station_readings(beliefs: Beliefs, known: KnownBoard, law: BareLaw, rng: np.random.Generator) -> StationReadings:
+    """What each explanation expects of everything that could be read in a station of a board."""
     station, board = law.station, known.board
     n, n_old = len(station.setup.readings), station.n_old
     parts = [_expected(one, known, law) for one in beliefs.explanations]
@@ -106,42 +78,30 @@ def station_readings(
 def given_first(
     station: Station, old: Sequence[int], readings: Readings, kept: Sequence[Floats], shares: Sequence[Floats]
 ) -> Readings:
-    """Readings at hand taken once more, given the first reading, with which they share a part of what it is off by.
+    """Readings at hand, rows `old`, taken once more given the first, with which they share part of what it is off by.
 
-    Parameters
-    ----------
-    old : sequence of int
-        Which of its readings.
-    readings : Readings
-        As if they shared nothing.
-    kept : sequence of (n_terms,) array
-        Variance of the noise of the first readings, by explanation.
-    shares : sequence of (n_terms,) array
-        The part of it that is found again.
+    `readings` are as if they shared nothing; `kept` is the variance of the first readings' noise and `shares` the part
+    of it that is found again, (n_terms,) arrays by explanation.
     """
     rows = list(old)
     first, own = np.log(station.base.measured)[rows], ReadingErrors.of(station.base).own_variance[rows]
     new = ReadingErrors.of(station.setup).own_variance[rows]
-    shift, slopes, variance = [], [], []
+    every = []
     for k, (each, part) in enumerate(zip(kept, shares, strict=True)):
         share = part[:, None]
         common = share * each[:, None]
         told = common / (each[:, None] + own)
-        shift.append((1.0 - told) * readings.shift[k] + told * first)
-        slopes.append((1.0 - told)[:, :, None] * readings.slopes[k])
-        variance.append(new + (1.0 - share) * (readings.variance[k] - new) + common * (1.0 - told))
-    return Readings(tuple(shift), tuple(slopes), tuple(variance))
+        shift = (1.0 - told) * readings.shift[k] + told * first
+        variance = new + (1.0 - share) * (readings.variance[k] - new) + common * (1.0 - told)
+        every.append((shift, (1.0 - told)[:, :, None] * readings.slopes[k], variance))
+    return Readings.of(every)
 
 
-def _expected(one: Explanation, known: KnownBoard, law: BareLaw) -> tuple[Floats, Floats]:
+def _expected(one: Belief, known: KnownBoard, law: BareLaw) -> tuple[Floats, Floats]:
     """What is expected of the modes where u is zero, then of what a known mass adds; and the slopes of both.
 
-    Not a number where an explanation takes a reading for no mode, or a mode cannot be followed.
-
-    Returns
-    -------
-    shift : (n_terms, (1 + n_spots) n_modes) array
-    slopes : (n_terms, (1 + n_spots) n_modes, n_u) array
+    Arrays of (n_terms, (1 + n_spots) n_modes) and (.., n_u). Not a number where an explanation takes a reading for no
+    mode, or a mode cannot be followed.
     """
     station, n = law.station, len(law.middle)
     shift = np.tile(np.concatenate([law.middle, law.solved[1:].ravel()]), (one.n_terms, 1))
@@ -159,3 +119,70 @@ def _expected(one: Explanation, known: KnownBoard, law: BareLaw) -> tuple[Floats
     shift, slopes = shift[:, columns], slopes[:, columns]
     shift[:, old], slopes[:, old] = one.again.shift[:, here], one.again.slopes[:, here]
     return np.where(np.tile(taken < 0, len(law.solved)), np.nan, shift), slopes
+
+
+_QUANTILES = (0.03, 0.97)
+"""Of a size over the terms, at which it is solved besides its mean."""
+_TOO_FAR = 0.4
+"""A shift of ln f beyond which a mode has lost its name."""
+
+
+def add_effects(one: Belief, known: KnownBoard, law: BareLaw, shift: Floats, slopes: Floats) -> None:
+    """Add what the effects of an explanation do to what is expected of the modes of a station, in place.
+
+    To the shift where u is zero, (n_terms, (1 + n_spots) n_modes), of the modes, then of what a known mass at each spot
+    adds to each, and to the slopes, (.., n_u). Not a number where a mode cannot be followed in the middle of a size, or
+    to neither side of it.
+
+    By a few full solves about the likely sizes, the constants where the readings then have them, and a parabola along
+    each size between: what remains beside the constants' own linear law is small and smooth. Each term is linear about
+    its own place on it.
+    """
+    n = len(law.middle)
+    for form in one.forms:
+        mean = one.mean[form.rows]
+        sizes, own = mean[:, form.columns], one.covariance[form.rows][:, form.columns, form.columns]
+        centre, narrow = sizes.mean(axis=0), np.sqrt(own.mean(axis=0))
+        low, high = np.quantile(sizes, _QUANTILES, axis=0)
+        ends = np.stack([np.minimum(low, centre - narrow), np.maximum(high, centre + narrow)])
+        bounds = np.array([one.prior.standard_bounds for one in form.parameters]).reshape(-1, 2).T
+        away = np.clip(ends, *bounds) - centre
+        # the constants follow the size
+        design = np.column_stack([np.ones(len(mean)), sizes - centre])
+        constants = np.linalg.lstsq(design, mean[:, : known.board.symmetry.n], rcond=None)[0]
+
+        to_either_side = (np.outer(two, unit) for two, unit in zip(away.T, np.eye(centre.size), strict=True))
+        steps = np.concatenate([[0.0 * centre], *to_either_side])
+        followed = np.column_stack([np.ones(len(steps)), steps]) @ constants
+        pairs = zip(centre + steps, followed, strict=True)
+        solved = np.stack([_beside(known, law, form, at, moved) for at, moved in pairs])
+        shift[form.rows] += solved[0]
+        for j, column in enumerate(form.columns):
+            two, pair = away[:, j], solved[1 + 2 * j : 3 + 2 * j] - solved[0]
+            across = (
+                pair[::-1] * (two / two[::-1])[:, None]
+            )  # a straight line where a mode is followed to one side only
+            pair[:, :n] = np.where(np.isnan(pair), across, pair)[:, :n]
+            linear, square = np.linalg.solve(np.column_stack([two, two**2]), pair)
+            place = np.clip(sizes[:, j] - centre[j], *two)[:, None]
+            along = linear + 2.0 * square * place
+            shift[form.rows] += linear * place + square * place**2 - along * sizes[:, j, None]
+            slopes[form.rows, :, column] += along
+
+
+def _beside(known: KnownBoard, law: BareLaw, form: FormTerms, sizes: Floats, constants: Floats) -> Floats:
+    """What a form does at some sizes, less what the linear law of the constants says: ((1 + n_spots) n_modes,) array.
+
+    On the mesh for the estimate's constants, so that all sizes of a form have the same matrices.
+    """
+    exact = {name: np.asarray(q.mean) for name, q in form.board.inputs.items() if q.is_exact}
+    named = {one.name: np.asarray(one.prior.value(z)) for one, z in zip(form.parameters, sizes, strict=True)}
+    values, symmetry = {**exact, **known.values, **named}, known.board.symmetry
+    at = np.log(symmetry.free_of(known.values))
+    there, meshed = (
+        {**values, **symmetry.rigidities(np.exp(each), values["poisson_xy"])} for each in (at + constants, at)
+    )
+    shift = SolvedStation.of(law.station, form.board, there, meshed).bare_and_added - law.solved
+    shift[0] -= law.slopes[0, :, : at.size] @ constants
+    shift[:, np.abs(shift[0]) > _TOO_FAR] = np.nan
+    return np.asarray(shift.ravel())

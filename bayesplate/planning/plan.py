@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -11,145 +10,80 @@ FORMAT = 1
 
 @dataclass(frozen=True)
 class ExplanationEntry:
-    """An explanation that is to be told from the others.
+    """An explanation that is to be told from the others."""
 
-    Attributes
-    ----------
-    effects : tuple of str
-        Empty for no effect.
-    probability : float
-        Among those that survive.
-    """
-
-    effects: tuple[str, ...]
+    effects: tuple[str, ...]  # empty for no effect
     words: str
-    probability: float
+    probability: float  # among those that survive
 
 
 @dataclass(frozen=True)
 class Gain:
-    """What readings are expected to give.
+    """What readings are expected to give."""
 
-    Attributes
-    ----------
-    E_x, E_y, G_xy : float
-        Expected standard deviation of the constant's logarithm after, over that before; of several boards the geometric
-        mean.
-    constants : float
-        Mean of the logarithms of before over after, nats.
-    constants_error : float
-        Its standard error; 0 where it is exact.
-    explanations : float or None
-        Expected drop of the entropy of the explanations, nats; None where there is one only.
-    explanations_error : float or None
-        Its standard error.
-    information : float
-        Half the log determinant of what the constants gain, the explanation being known, nats; of an isotropic board
-        of what E gains; where boards share something, of what that gains.
-    shared : dict of float
-        Of a campaign: the same as E_x for each parameter that its boards share.
-    score : float
-        What the plan is ordered by, nats.
-    """
-
+    # E_x, E_y, G_xy: expected standard deviation of the constant's logarithm after, over that before; of several boards
+    # the geometric mean
     E_x: float
     E_y: float
     G_xy: float
-    constants: float
-    constants_error: float
-    explanations: float | None
-    explanations_error: float | None
+    constants: float  # mean of the logarithms of before over after, nats
+    constants_error: float  # its standard error; 0 where it is exact
+    explanations: float | None  # expected drop of the entropy of the explanations, nats; None where there is one only
+    explanations_error: float | None  # its standard error
+    # half the log determinant of what the constants gain, the explanation being known, nats; of an isotropic board of
+    # what E gains; where boards share something, of what that gains
     information: float
-    shared: Mapping[str, float]
-    score: float
+    shared: Mapping[str, float]  # of a campaign: the same as E_x for each parameter that its boards share
+    score: float  # what the plan is ordered by, nats
     score_per_minute: float
-
-    def shrinkage(self, name: str) -> float:
-        """ln of the standard deviation of a modulus before over that after."""
-        return -math.log(getattr(self, name))
 
 
 @dataclass(frozen=True)
 class ProposalEntry:
-    """One thing that could be measured next.
+    """One thing that could be measured next."""
 
-    Attributes
-    ----------
-    what : str
-        "modes", "edges", "mass", "again", "size" or "board".
-    setup : str
-        Empty where no frequency is read.
-    sentence : str
-        What to do, as an order.
-    modes : tuple of str
-        Labels of the modes to read.
-    """
-
-    what: str
+    what: str  # "modes", "edges", "mass", "again", "size" or "board"
     board: str
-    setup: str
-    sentence: str
+    setup: str  # empty where no frequency is read
+    sentence: str  # what to do, as an order
     cost_minutes: float
-    modes: tuple[str, ...]
+    modes: tuple[str, ...]  # labels of the modes to read
     gain: Gain
 
 
 @dataclass(frozen=True)
 class SequenceEntry:
-    """Proposals that are best together.
+    """Proposals that are best together."""
 
-    Attributes
-    ----------
-    steps : tuple of str
-        Their sentences, in the order in which they can be done.
-    gain : Gain
-        Of all together.
-    """
-
-    steps: tuple[str, ...]
+    steps: tuple[str, ...]  # their sentences, in the order in which they can be done
     cost_minutes: float
-    gain: Gain
+    gain: Gain  # of all together
 
 
 @dataclass(frozen=True)
 class ModeToFind:
-    """A mode to look for at the bench.
-
-    Attributes
-    ----------
-    hz : float
-        Where it is expected: the median over all explanations.
-    low_hz, high_hz : float
-        Between which it lies two times in three.
-    seen : float
-        Residue between hammer and sensor over the largest that its figure could give: 0 on a nodal line, 1 at best.
-    """
+    """A mode to look for at the bench."""
 
     label: str
-    hz: float
+    hz: float  # where it is expected: the median over all explanations
+    # low_hz, high_hz: between which it lies two times in three
     low_hz: float
     high_hz: float
+    # residue between hammer and sensor over the largest that its figure could give: 0 on a nodal line, 1 at best
     seen: float
 
 
 @dataclass(frozen=True)
 class BenchEntry:
-    """What to do at the bench for one way to hold the board.
-
-    Attributes
-    ----------
-    sensor_mm, hammer_mm : tuple of float
-        Places on the whole board.
-    taps_mm : tuple of tuple of float
-        Where to tap to tell the figures apart.
-    """
+    """What to do at the bench for one way to hold the board."""
 
     board: str
     setup: str
     edges: Mapping[str, str]
+    # sensor_mm, hammer_mm: places on the whole board
     sensor_mm: tuple[float, float]
     hammer_mm: tuple[float, float]
-    taps_mm: tuple[tuple[float, float], ...]
+    taps_mm: tuple[tuple[float, float], ...]  # where to tap to tell the figures apart
     modes: tuple[ModeToFind, ...]
 
 

@@ -28,101 +28,55 @@ _TRIED, _JOINED = 128, 192
 """Simulated readings by which modes, and sequences, are compared."""
 _LONGEST = 3
 """Proposals in a sequence."""
+_ENDING = ("edges", "again")
+"""What takes the board from the place where it was measured, so that nothing goes on there."""
 
 
 @dataclass(frozen=True)
 class Costs:
-    """What each class of work costs, minutes.
+    """What each class of work costs, minutes."""
 
-    Attributes
-    ----------
-    reading : float
-        One frequency of a board in its place, or one reading of a size.
-    clamping : float
-        Another way to hold the board, or the same one again.
-    board : float
-        Another board, its readings not counted.
-    """
-
-    reading: float = 1.0
-    clamping: float = 10.0
-    board: float = 30.0
+    reading: float = 1.0  # one frequency of a board in its place, or one reading of a size
+    clamping: float = 10.0  # another way to hold the board, or the same one again
+    board: float = 30.0  # another board, its readings not counted
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
-        """Of the classes."""
         return tuple(one.name for one in fields(cls))
 
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """One thing that could be measured next.
-
-    Attributes
-    ----------
-    entry : ProposalEntry
-        As it is written.
-    about : str
-        The way to hold a board, the input, the effect or the board that it asks for.
-    known : KnownBoard or None
-        The board; None where it is one that is not there yet.
-    read : StationReadings or None
-        Everything that could be read in its station; None where no frequency is read.
-    rows : tuple of int
-        Which of the station's modes are read.
-    spot : int
-        Of its station, where a known mass stands.
-    """
+    """One thing that could be measured next."""
 
     entry: ProposalEntry
     readings: Readings
-    about: str
-    known: KnownBoard | None = None
-    read: StationReadings | None = None
-    rows: tuple[int, ...] = ()
-    spot: int = 0
-
-    @property
-    def ends_session(self) -> bool:
-        """Whether the board leaves the place where it was measured, so that nothing goes on there."""
-        return self.entry.what in ("edges", "again")
+    about: str  # the way to hold a board, the input, the effect or the board that it asks for
+    known: KnownBoard | None = None  # the board; None where it is one that is not there yet
+    read: StationReadings | None = None  # everything that could be read in its station; None where no frequency is read
+    rows: tuple[int, ...] = ()  # which of the station's modes are read
+    spot: int = 0  # of its station, where a known mass stands
 
 
 @dataclass(frozen=True, eq=False)
 class Planner:
-    """What is believed, what is asked for, and what things cost.
-
-    Attributes
-    ----------
-    seed : int
-        Everything random follows from it; all gains are compared on the same simulated readings.
-    goal : str or None
-        See `bayesplate.planning.gains.expected_gain`.
-    """
+    """What is believed, what is asked for, and what things cost."""
 
     beliefs: Beliefs
-    seed: int
-    goal: str | None = None
+    seed: int  # everything random follows from it; all gains are compared on the same simulated readings
+    goal: str | None = None  # see `bayesplate.planning.gains.expected_gain`
     costs: Costs = Costs()
 
     def gain(self, readings: Readings, minutes: float = 1.0, n_draws: int = N_DRAWS) -> Gain:
-        """What readings are expected to give."""
         rng = stream(self.seed, "gains of further readings")
         return expected_gain(self.beliefs, readings, rng, self.goal, minutes, n_draws)
 
     def ranked(
         self, priors: Sequence[PriorCard] = (), shared: Sequence[Shared] = (), least: float = FAINT
     ) -> tuple[Proposal, ...]:
-        """Everything that could be measured next and gives more than the least, the most promising first.
+        """Everything that could be measured next and gives more than the least (nats), the most promising first.
 
-        Parameters
-        ----------
-        priors : sequence of PriorCard
-            One per board, where more boards could be measured.
-        shared : sequence of Shared
-            What the boards have in common.
-        least : float
-            Nats.
+        The priors are one per board, where more boards could be measured, `shared` is what these have in common.
         """
         listed = [one for known in self.beliefs.boards for one in (*self._of_modes(known), *self._of_sizes(known))]
         listed += self._of_looks()
@@ -213,7 +167,7 @@ class Planner:
             yield self._proposal("size", its, "", told, minutes, readings, about)
 
     def _of_looks(self) -> Iterator[Proposal]:
-        """Effects that are looked at without a frequency."""
+        """Proposals to look at an effect without reading a frequency."""
         for effect, look in LOOKS.items():
             readings, name = look_readings(self.beliefs, effect), self.beliefs.boards[0].board.name
             if readings is not None:
@@ -225,16 +179,6 @@ class Planner:
 
         They stand in the order in which they can be done: what goes on in a session before the board is taken out. Two
         that read modes of one way to hold a board, or the same size, are not put together.
-
-        Parameters
-        ----------
-        listed : sequence of Proposal
-            The best first.
-
-        Returns
-        -------
-        tuple of (tuple of Proposal, SequenceEntry)
-            The pair, then the three; fewer where there is nothing to add.
         """
         chosen, made = list(listed[:1]), []
         while chosen and len(chosen) < _LONGEST:
@@ -248,7 +192,7 @@ class Planner:
             ]
             best = max(range(len(left)), key=lambda i: gains[i].score)
             chosen.append(left[best])
-            steps = tuple(sorted(chosen, key=lambda one: one.ends_session))
+            steps = tuple(sorted(chosen, key=lambda one: one.entry.what in _ENDING))
             told = tuple(one.entry.sentence for one in steps)
             made.append((steps, SequenceEntry(told, minutes[best], gains[best])))
         return tuple(made)

@@ -12,15 +12,13 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.random_field import conditioned, sd_after, thickness_readings, width_readings
 from bayesplate.planning.beliefs import Beliefs, KnownBoard
 from bayesplate.planning.gains import Readings
-
-Floats = NDArray[np.float64]
 
 MORE = 5
 """Readings of a thing that has no places."""
@@ -41,22 +39,12 @@ _PROTRACTOR = 0.5 * np.pi / 180.0
 
 @dataclass(frozen=True)
 class Measured:
-    """One way to know an input better.
-
-    Attributes
-    ----------
-    sentence : str
-        What to do.
-    n : int
-        Readings that it takes.
-    sd : float
-        Standard deviation of the input after it, in its unit.
-    """
+    """One way to know an input better."""
 
     parameter: Parameter
-    sentence: str
-    n: int
-    sd: float
+    sentence: str  # what to do
+    n: int  # readings that it takes
+    sd: float  # of the input after it, in its unit
 
     @property
     def precision(self) -> float:
@@ -118,33 +106,21 @@ def column_of(known: KnownBoard, parameter: Parameter) -> Floats:
 def input_readings(beliefs: Beliefs, known: KnownBoard, one: Measured) -> Readings:
     """A measurement of an input of a board as one reading of its standard coordinate."""
     along = column_of(known, one.parameter)
-    shift, slopes, variance = [], [], []
-    for explanation in beliefs.explanations:
-        n_terms, _, n_u = explanation.covariance.shape
-        shift.append(np.zeros((n_terms, 1)))
-        slopes.append(np.tile(np.pad(along, (0, n_u - along.size)), (n_terms, 1, 1)))
-        variance.append(np.full((n_terms, 1), 1.0 / one.precision))
-    return Readings(tuple(shift), tuple(slopes), tuple(variance))
+    every = []
+    for n_terms, n_u in (each.mean.shape for each in beliefs.explanations):
+        slopes = np.tile(np.pad(along, (0, n_u - along.size)), (n_terms, 1, 1))
+        every.append((np.zeros((n_terms, 1)), slopes, np.full((n_terms, 1), 1.0 / one.precision)))
+    return Readings.of(every)
 
 
 @dataclass(frozen=True)
 class Look:
-    """How an effect is looked at.
-
-    Attributes
-    ----------
-    n : int
-        Readings that it takes.
-    sd : callable
-        From the board to the standard deviation of each of the effect's parameters, SI.
-    can : callable
-        Whether there is anything to look at on a board.
-    """
+    """How an effect is looked at."""
 
     sentence: str
-    n: int
-    sd: Callable[[Board], float]
-    can: Callable[[Board], bool]
+    n: int  # readings that it takes
+    sd: Callable[[Board], float]  # from the board to the standard deviation of each of the effect's parameters, SI
+    can: Callable[[Board], bool]  # whether there is anything to look at on a board
 
 
 def _has_unweighed(board: Board) -> bool:
@@ -152,7 +128,7 @@ def _has_unweighed(board: Board) -> bool:
 
 
 def _of_taper(board: Board) -> float:
-    """Of a taper from readings at the grid of places: a regression on the place."""
+    """Standard deviation of a taper from readings at the grid of places, by a regression on the place."""
     at_place = np.hypot(_CALLIPER / board.inputs["thickness"].mean, _UNEVEN)
     leverage = len(GRID[1]) * sum((s - 0.5) ** 2 for s in GRID[0])
     return float(at_place / np.sqrt(leverage))
@@ -181,7 +157,7 @@ def look_readings(beliefs: Beliefs, effect: str) -> Readings | None:
     if not having or not look.can(board):
         return None
     free = [one for one, name in zip(having[0].parameters, having[0].effects, strict=True) if name == effect]
-    shift, slopes, variance = [], [], []
+    every = []
     for one in beliefs.explanations:
         value = np.tile([0.0 if p.null is None else p.null for p in free], (one.n_terms, 1))
         along = np.zeros((one.n_terms, len(free), one.mean.shape[1]))
@@ -192,7 +168,5 @@ def look_readings(beliefs: Beliefs, effect: str) -> Readings | None:
                 change = (parameter.prior.value(at + sd) - parameter.prior.value(at - sd)) / (2.0 * sd)
                 along[form.rows, j, column] = change
                 value[form.rows, j] = parameter.prior.value(at) - change * at
-        shift.append(value)
-        slopes.append(along)
-        variance.append(np.full((one.n_terms, len(free)), look.sd(board) ** 2))
-    return Readings(tuple(shift), tuple(slopes), tuple(variance))
+        every.append((value, along, np.full((one.n_terms, len(free)), look.sd(board) ** 2)))
+    return Readings.of(every)

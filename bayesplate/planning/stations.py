@@ -6,8 +6,8 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.quantity import Quantity
@@ -21,8 +21,6 @@ from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
 
-Floats = NDArray[np.float64]
-
 FURTHER = 8
 """Modes beyond those that were read from which the best are chosen."""
 ELSEWHERE = 6
@@ -35,21 +33,11 @@ _NEAR_FREE, _NEAR_HELD = 0.94, 0.7
 
 @dataclass(frozen=True, eq=False)
 class Station:
-    """A way to hold the board, and the modes that can be read there.
+    """A way to hold the board, and the modes that can be read there."""
 
-    Attributes
-    ----------
-    setup : Setup
-        Its readings: those of `base` first, then what the model expects of the modes that could be read.
-    base : Setup
-        The setup of the board that goes on, or from which another one takes its sensor and its air.
-    n_old : int
-        Readings that were taken already; 0 where the board was never held so.
-    """
-
-    setup: Setup
-    base: Setup
-    n_old: int = 0
+    setup: Setup  # its readings: those of `base` first, then what the model expects of the modes that could be read
+    base: Setup  # the setup of the board that goes on, or from which another one takes its sensor and its air
+    n_old: int = 0  # readings that were taken already; 0 where the board was never held so
 
     @property
     def is_new(self) -> bool:
@@ -77,7 +65,7 @@ class Station:
         return tuple((s, t) for s in along for t in across)
 
     def places(self, board: Board) -> tuple[tuple[float, float], ...]:
-        """The same on the whole board, m."""
+        """The spots on the whole board, m."""
         return places_on(board, self.setup, self.spots)
 
     def system(self, board: Board) -> System:
@@ -113,13 +101,7 @@ class Station:
 
 
 def old_stations(board: Board, values: Values) -> Iterator[Station]:
-    """The ways in which the board was held, each with the modes that were not read.
-
-    Parameters
-    ----------
-    values : dict of float
-        Where the modes are computed, SI.
-    """
+    """The ways in which the board was held, each with the modes that were not read, computed at these values (SI)."""
     for setup in board.setups:
         read = tuple(replace(one, frequency=Quantity.exact(one.frequency.mean), sign="") for one in setup.readings)
         empty = replace(setup, readings=(), peaks=(), published_coefficients=None)
@@ -129,14 +111,9 @@ def old_stations(board: Board, values: Values) -> Iterator[Station]:
 
 
 def new_stations(board: Board, values: Values, prior: PriorCard | None = None) -> Iterator[Station]:
-    """The ways in which the board was never held: free, and as a cantilever.
+    """The ways in which the board was never held, free and as a cantilever, with the modes at these values (SI).
 
-    Parameters
-    ----------
-    values : dict of float
-        Where the modes are computed, SI.
-    prior : PriorCard, optional
-        Its noise, where it states one, is that of an edge that was not tried yet.
+    The noise that a prior states, if it does, is that of an edge that was not tried yet.
     """
     ways: tuple[tuple[str, Ends], ...] = (("free", ("free", "free")), ("cantilever", ("clamped", "free")))
     taken, first = {setup.name for setup in board.setups}, board.setups[0]

@@ -1,10 +1,14 @@
-"""The tables that people read of a plan."""
+"""A plan as people read it: tables, the first line, and gains in words."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
+
 from bayesplate.board.material import MODULI
-from bayesplate.planning.plan import Gain, Plan
-from bayesplate.planning.words import shared_words
+from bayesplate.effects.words import joined
+from bayesplate.planning.gains import CONSTANTS, EXPLANATIONS
+from bayesplate.planning.plan import ExplanationEntry, Gain, Plan, ProposalEntry
 from bayesplate.results.tables import Table
 from bayesplate.results.words import MISSING
 
@@ -46,12 +50,14 @@ def _proposals(plan: Plan) -> Table:
 
 
 def _sequences(plan: Plan) -> Table:
-    rows = tuple(("\n".join(_numbered(one.steps)), *_cells(one.gain, one.cost_minutes, plan)) for one in plan.sequences)
+    rows = tuple(
+        (
+            "\n".join(f"{number}. {step}" for number, step in enumerate(one.steps, start=1)),
+            *_cells(one.gain, one.cost_minutes, plan),
+        )
+        for one in plan.sequences
+    )
     return Table("The best two and the best three together", ("steps", *_columns(plan)), rows)
-
-
-def _numbered(steps: tuple[str, ...]) -> list[str]:
-    return [f"{number}. {step}" for number, step in enumerate(steps, start=1)]
 
 
 def _benches(plan: Plan) -> tuple[Table, ...]:
@@ -70,3 +76,65 @@ def _benches(plan: Plan) -> tuple[Table, ...]:
 
 def _place(place: tuple[float, float]) -> str:
     return f"x = {place[0]:.0f}, y = {place[1]:.0f} mm"
+
+
+WORTH = 0.05
+"""A gain below this, nats, is no reason to measure: an interval would shrink by less than a twentieth."""
+_CLEAR = 2.0
+"""Standard errors that a gain must stand above zero."""
+
+
+def first_line(
+    proposals: Sequence[ProposalEntry], explanations: Sequence[ExplanationEntry], entropy: float, goal: str | None
+) -> str:
+    """What to do next and what it is expected to give: the best proposal that helps with the goal; empty if none."""
+    for one in proposals:
+        shrunk, doubt = _shrunk(one.gain, goal), _of_doubt(one.gain, explanations, entropy)
+        intervals = _of_intervals(shrunk)
+        by_goal = {None: doubt or intervals, EXPLANATIONS: doubt, CONSTANTS: intervals}
+        if by_goal.get(goal, goal in shrunk):
+            return f"{one.sentence}: {joined([words for words in (doubt, intervals) if words])}."
+    return ""
+
+
+def _of_doubt(gain: Gain, explanations: Sequence[ExplanationEntry], entropy: float) -> str:
+    """How far the doubt between explanations would fall, in words; empty where it is not clear that it would."""
+    drop, error = gain.explanations, gain.explanations_error
+    if drop is None or error is None or drop < max(WORTH, _CLEAR * error):
+        return ""
+    told = f"{drop:.2f} ± {error:.2f} of {entropy:.2f} nats"
+    return f"the doubt between {_names(explanations)} would fall by {100.0 * drop / entropy:.0f} % ({told})"
+
+
+def _names(explanations: Sequence[ExplanationEntry]) -> str:
+    """Explanations in words; where one is two effects, it is told which of them are meant to be alone."""
+    paired = {name for one in explanations if len(one.effects) > 1 for name in one.effects}
+    ways = ["together" if len(one.effects) > 1 else "alone" if paired & {*one.effects} else "" for one in explanations]
+    return joined([f"{one.words} {way}".rstrip() for one, way in zip(explanations, ways, strict=True)])
+
+
+def _of_intervals(shrunk: Mapping[str, float]) -> str:
+    """How far intervals would shrink, in words."""
+    if not shrunk:
+        return ""
+    noun, verb = ("interval", "it is") if len(shrunk) == 1 else ("intervals", "they are")
+    sizes = joined([f"{value:.2f}" if value >= 0.1 else f"{value:.2g}" for value in shrunk.values()])
+    return f"the {noun} of {joined(list(shrunk))} would shrink to {sizes} of what {verb}"
+
+
+def _shrunk(gain: Gain, goal: str | None) -> dict[str, float]:
+    """What is left of each interval that shrinks by as much as is worth telling, and for sure.
+
+    Those of what boards share, where they share something and nothing else was asked for.
+    """
+    shared = {shared_words(name): value for name, value in gain.shared.items()} if goal is None else {}
+    left = shared or {name: getattr(gain, name) for name in MODULI}
+    least = max(WORTH, _CLEAR * gain.constants_error)
+    return {name: value for name, value in left.items() if -math.log(value) >= least}
+
+
+def shared_words(name: str) -> str:
+    """A shared parameter as people read it: "G_xz / E_x" of transverse_shear.G_xz / E_x, "attached mass"."""
+    effect, _, key = name.partition(".")
+    words = effect.replace("_", " ")
+    return key if "/" in key else words if words.endswith(key) else f"{key} of {words}"

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesplate.board.attached import AttachedItem
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.board.prior import PriorCard
@@ -18,15 +17,13 @@ from bayesplate.campaign.scatter import expected_width
 from bayesplate.campaign.shared import Shared
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.reading_errors import ReadingErrors
-from bayesplate.planning.beliefs import NOTHING_LACKS, Beliefs, Explanation, KnownBoard, laws_of, log_moduli
+from bayesplate.planning.beliefs import NOTHING_LACKS, Belief, Beliefs, KnownBoard, laws_of, log_moduli
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.laws import BareLaw, bare_law
 from bayesplate.planning.stations import new_stations
 from bayesplate.posterior.laplace import noise_widenings
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.target import Posterior
-
-Floats = NDArray[np.float64]
 
 LINEAR = (
     "to first order about each board's least-squares estimate, peaks without a label taken for the modes that are "
@@ -48,17 +45,7 @@ def beliefs_together(
     shared: Sequence[Shared],
     tell: Callable[[float], None] | None = None,
 ) -> Beliefs:
-    """What is believed of all boards of a campaign, each solved once.
-
-    Parameters
-    ----------
-    boards : sequence of Board
-        The shared effects declared.
-    priors : sequence of PriorCard
-        One per board.
-    tell : callable, optional
-        Told after every board which share of them is done.
-    """
+    """What is believed of all boards of a campaign, shared effects declared, each solved once."""
     every: list[_Linear] = []
     for board, prior in zip(boards, priors, strict=True):
         every.append(_linear(board, prior, shared))
@@ -91,7 +78,7 @@ def _joined(every: Sequence[_Linear], shared: Sequence[str]) -> Beliefs:
         wide = np.zeros((len(gradient.T), n_u))
         wide[:, columns] = one.known.columns
         known.append(replace(one.known, columns=wide, first_setup=int(setups[i])))
-    explanation = Explanation(
+    explanation = Belief(
         members=(),
         words=NOTHING_LACKS,
         probability=1.0,
@@ -126,7 +113,7 @@ def _linear(board: Board, prior: PriorCard, shared: Sequence[Shared]) -> _Linear
 def _judged(
     board: Board, prior: PriorCard, shared: Sequence[Shared], values: Values, noise: Floats, laws: tuple[BareLaw, ...]
 ) -> _Linear:
-    """What the readings of a board's laws say."""
+    """A board with the precision that the readings of its laws give."""
     columns = _columns(board, prior, shared, values, noise)
     n, n_own = board.symmetry.n, columns.shape[1] - len(shared)
     precision = np.diag(np.r_[np.zeros(n), np.ones(n_own - n), np.zeros(len(shared))])
@@ -188,20 +175,12 @@ def _columns(board: Board, prior: PriorCard, shared: Sequence[Shared], values: V
 
 @dataclass(frozen=True, eq=False)
 class FurtherBoard:
-    """One more board that could be measured.
-
-    Attributes
-    ----------
-    labels : tuple of str
-        Of the modes to read.
-    readings : Readings
-        What it says of the shared parameters.
-    """
+    """One more board that could be measured."""
 
     like: Board
     sentence: str
-    labels: tuple[str, ...]
-    readings: Readings
+    labels: tuple[str, ...]  # of the modes to read
+    readings: Readings  # what it says of the shared parameters
 
 
 def further_boards(beliefs: Beliefs, priors: Sequence[PriorCard], shared: Sequence[Shared]) -> Iterator[FurtherBoard]:
@@ -236,7 +215,10 @@ def _cut(one: KnownBoard, noise: Floats, prior: PriorCard, shared: Sequence[Shar
         name: replace(q, mean=SHORT * q.mean, sd=SHORT * q.sd, readings=(), at_x=(), at_y=())
         for name, q in halved.items()
     }
-    first = replace(board.setups[0], readings=(), peaks=(), attached=_moved(board))
+    attached = tuple(  # at the same fraction of the shorter board
+        replace(item, places=tuple((SHORT * x, y) for x, y in item.places)) for item in board.setups[0].attached
+    )
+    first = replace(board.setups[0], readings=(), peaks=(), attached=attached)
     bare = replace(board.with_priors(cut), setups=(first,), chosen=())
     values = {name: value for name, value in one.values.items() if name in bare.inputs or name in RIGIDITIES}
     values |= {name: np.asarray(SHORT * float(one.values[name])) for name in halved}
@@ -244,10 +226,3 @@ def _cut(one: KnownBoard, noise: Floats, prior: PriorCard, shared: Sequence[Shar
     read = law.station.setup.readings[: len(board.setups[0].readings)]
     station = replace(law.station, base=replace(law.station.base, readings=read), n_old=len(read))
     return _judged(bare, prior, shared, values, noise, (replace(law, station=station),)).known
-
-
-def _moved(board: Board) -> tuple[AttachedItem, ...]:
-    """What is attached, at the same fraction of the shorter board."""
-    return tuple(
-        replace(item, places=tuple((SHORT * x, y) for x, y in item.places)) for item in board.setups[0].attached
-    )

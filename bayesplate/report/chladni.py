@@ -11,7 +11,7 @@ import numpy as np
 from bayesplate.arrays import Floats
 from bayesplate.estimates.sheet import CombinedMode, Sheet, SheetMode, points
 from bayesplate.frequencies.system import Limits
-from bayesplate.planning.places import Placing
+from bayesplate.planning.bench import Placing
 from bayesplate.report.style import BLUE, DARK, GREEN, SMALL, VERMILLION, WORDS, drawable, in_figure, placed
 from bayesplate.results.words import STIFFNESS, STIFFNESS_OF_ISOTROPIC
 

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bayesplate.diagnosis.candidates import EffectEntry
-from bayesplate.diagnosis.result import Diagnosis, Histogram, NullControlSummary
+from bayesplate.diagnosis.result import Diagnosis, EffectEntry, Histogram, NullControlSummary
 from bayesplate.diagnosis.words import MERITS, names_of
 from bayesplate.report.style import (
     BLUE,

@@ -11,7 +11,7 @@ import numpy as np
 from bayesplate.board.material import MODULI
 from bayesplate.planning.bench import Bench
 from bayesplate.planning.plan import Plan, ProposalEntry
-from bayesplate.planning.words import shared_words
+from bayesplate.planning.tables import shared_words
 from bayesplate.report.chladni import chladni_sheet
 from bayesplate.report.style import (
     BLUE,

@@ -16,7 +16,9 @@ from bayesplate.diagnosis.tables import (
     sizes_table,
     what_is_quoted,
 )
-from bayesplate.diagnosis.told import (
+from bayesplate.diagnosis.words import (
+    IN_PART,
+    VERDICTS,
     headline_sentence,
     known_sentences,
     remarks,
@@ -24,7 +26,6 @@ from bayesplate.diagnosis.told import (
     verdict_sentences,
     warnings,
 )
-from bayesplate.diagnosis.words import IN_PART, VERDICTS
 from bayesplate.report.content import summary_sentences
 from bayesplate.results.contract import Elastic, Rigidity
 from bayesplate.results.fit_tables import compared_constants

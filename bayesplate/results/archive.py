@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.prior import StatedPrior
 from bayesplate.files import write_bytes
 from bayesplate.libraries import load_arviz
+from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.results.contract import as_json
@@ -27,19 +29,9 @@ DRAWN = ("chain", "draw")
 
 
 def tree_of(groups: Mapping[str, Variables], labels: Mapping[str, Sequence[str]], attributes: Mapping[str, str]) -> Any:
-    """A tree of groups.
+    """A tree of groups (`GROUPS`) of variables, and labels of each dimension besides chain and draw: xarray.DataTree.
 
-    Parameters
-    ----------
-    groups : dict of dict of (dimensions, array)
-        Variables by group (`GROUPS`) and name.
-    labels : dict of sequence of str
-        Of each dimension besides chain and draw.
-
-    Returns
-    -------
-    xarray.DataTree
-        What ArviZ 1.x works with; nothing is in it that was not given, so that the same draws give the same file.
+    Nothing is in it that was not given, so that the same draws give the same file.
     """
     xarray: Any = import_module("xarray")
     datasets = {"/": xarray.Dataset(attrs=dict(sorted(attributes.items())))}
@@ -60,13 +52,7 @@ def to_arviz(tree: Any) -> Any:
 
 
 def write_tree(path: Path, tree: Any) -> None:
-    """Write a tree as netCDF, completely or not at all.
-
-    Raises
-    ------
-    UnwritableError
-        If the disk is full or the place is not ours.
-    """
+    """Write a tree as netCDF, completely or not at all."""
     # Not by HDF5 itself, which ends the process at its end where a disk was full.
     write_bytes(Path(path), bytes(tree.to_netcdf(None, engine="h5netcdf")))
 
@@ -86,20 +72,11 @@ def attributes_of(inference: Inference, summary: Summary, card_text: str) -> dic
 
 
 def posterior_tree(inference: Inference, draws: Draws, attributes: Mapping[str, str]) -> Any:
-    """The draws of a fit under the names of the archive.
+    """The draws of a fit under the names of the archive: xarray.DataTree.
 
-    Parameters
-    ----------
-    attributes : dict of str
-        What is said of their origin.
-
-    Returns
-    -------
-    xarray.DataTree
-        Its group log_prior holds one variable per factor of the prior: constants, noise, and inputs if any is
-        uncertain.
+    Its group log_prior holds one variable per factor of the prior: constants, noise, and inputs if any is uncertain.
     """
-    problem, convergence = inference.problem, inference.convergence
+    problem = inference.problem
     board = problem.board
     factors = problem.posterior.log_prior_factors(draws.flat)
     all_sure = not any(problem.posterior.peaks)
@@ -114,10 +91,7 @@ def posterior_tree(inference: Inference, draws: Draws, attributes: Mapping[str, 
             "log_prior": {name: (DRAWN, values.reshape(draws.log_posterior.shape)) for name, values in factors.items()},
             "log_likelihood": {likelihood: ((*DRAWN, of_what), draws.log_likelihood)},
             "posterior_predictive": {"frequency": ((*DRAWN, "reading"), draws.predictive)},
-            "sample_stats": {
-                "lp": (DRAWN, draws.log_posterior),
-                **{name: (("parameter",), getattr(convergence, name)) for name in ("tau", "rhat", "ess")},
-            },
+            "sample_stats": sample_stats(draws.log_posterior, inference.convergence),
             "observed_data": {"frequency": (("reading",), np.concatenate([setup.measured for setup in board.setups]))},
         },
         {
@@ -128,6 +102,12 @@ def posterior_tree(inference: Inference, draws: Draws, attributes: Mapping[str, 
         },
         attributes,
     )
+
+
+def sample_stats(log_posterior: Floats, convergence: Convergence) -> Variables:
+    """The log posterior of each draw, and the sampler's health by parameter."""
+    health = {name: (("parameter",), getattr(convergence, name)) for name in ("tau", "rhat", "ess")}
+    return {"lp": (DRAWN, log_posterior), **health}
 
 
 def _stated(prior: StatedPrior) -> dict[str, Any]:

@@ -21,50 +21,28 @@ class CheckedSetup:
 
 @dataclass(frozen=True)
 class CheckedMode:
-    """A reading over the weighted least-squares estimate, and what it tells.
-
-    Attributes
-    ----------
-    leverage : float
-        Share of the reading in its own prediction.
-    share_percent : tuple of float
-        Share of D_x, D_y, D_s in the mode's energy.
-    """
+    """A reading over the weighted least-squares estimate, and what it tells."""
 
     setup: str
     label: str
     measured_hz: float
     residual_cents: float
-    leverage: float
-    share_percent: tuple[float, ...]
+    leverage: float  # share of the reading in its own prediction
+    share_percent: tuple[float, ...]  # share of D_x, D_y, D_s in the mode's energy
     label_correlation: float
 
 
 @dataclass(frozen=True)
 class CheckedEffect:
-    """What an effect that is not declared would do at a usual size, SI.
-
-    Attributes
-    ----------
-    size : dict of float
-        Value of each parameter.
-    raw_rms_cents, visible_rms_cents : float
-        Shift of the modes in all, and what a fit of the constants leaves of it.
-    below_detection_limit : bool
-        Whether that is lost in the noise.
-    bias_percent : Elastic of float
-        What ignoring the effect does to each modulus.
-    look_alikes : tuple of str
-        Effects that no such readings can tell from it.
-    """
+    """What an effect that is not declared would do at a usual size, SI."""
 
     effect: str
-    size: Mapping[str, float]
-    raw_rms_cents: float
-    visible_rms_cents: float
-    below_detection_limit: bool
-    bias_percent: Elastic[float]
-    look_alikes: tuple[str, ...]
+    size: Mapping[str, float]  # value of each parameter
+    raw_rms_cents: float  # shift of the modes in all
+    visible_rms_cents: float  # what a fit of the constants leaves of it
+    below_detection_limit: bool  # whether that is lost in the noise
+    bias_percent: Elastic[float]  # what ignoring the effect does to each modulus
+    look_alikes: tuple[str, ...]  # effects that no such readings can tell from it
 
 
 @dataclass(frozen=True, repr=False)

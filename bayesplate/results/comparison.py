@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bayesplate.board.material import MODULI
-from bayesplate.estimates.coefficients import CoefficientRows
 from bayesplate.estimates.leave_one_out import CarryingMode, Errors
 from bayesplate.estimates.paper import PaperSystem
 from bayesplate.frequencies.laws import cents
@@ -140,13 +139,7 @@ class Comparison:
 
 
 def theory_row(problem: PosedProblem, system: PaperSystem, methods: Sequence[Method], errors: Errors) -> TheoryRow:
-    """What one theory of the plate makes of a board.
-
-    Parameters
-    ----------
-    errors : Errors
-        Of the most likely constants under the exact law, in sample and refitted with each mode left out.
-    """
+    """What one theory of the plate makes of a board; errors are of the most likely constants under the exact law."""
     board = problem.board
     rows = [(setup.name, str(r.label), r.frequency.mean) for setup in board.setups for r in setup.readings]
     in_sample, left_out = cents(errors.in_sample), cents(errors.left_out)
@@ -155,7 +148,15 @@ def theory_row(problem: PosedProblem, system: PaperSystem, methods: Sequence[Met
         effects=tuple(board.effects),
         inputs={one.name: float(one.prior.mean) for one in board.parameters if one.is_of_effect},
         coefficients=tuple(
-            origin_of(setup.name, origin) for setup, origin in zip(board.setups, system.origins, strict=True)
+            Origin(
+                setup.name,
+                one.source,
+                one.theory,
+                one.aspect_ratio,
+                one.sentence,
+                {str(label): r for label, r in one.r_squared.items()},
+            )
+            for setup, one in zip(board.setups, system.origins, strict=True)
         ),
         methods=tuple(_method_row(method, rows) for method in methods),
         modes=tuple(
@@ -174,12 +175,6 @@ def judged_alike(rows: Sequence[TheoryRow], carrying: Sequence[CarryingMode]) ->
         return replace(row, error=replace(row.error, leave_one_out_rms_cents=left_out))
 
     return tuple(map(judged, rows))
-
-
-def origin_of(setup: str, origin: CoefficientRows) -> Origin:
-    """Where the coefficients of a setup come from, as it stands in compare.json."""
-    r_squared = {str(label): r for label, r in origin.r_squared.items()}
-    return Origin(setup, origin.source, origin.theory, origin.aspect_ratio, origin.sentence, r_squared)
 
 
 def better_theory(thin: TheoryRow, sheared: TheoryRow) -> BetterTheory:

@@ -135,21 +135,11 @@ JOINT = (*MODULI, *RIGIDITIES, "density")
 
 @dataclass(frozen=True)
 class Joint:
-    """Natural logarithms of constants and density together, in SI units.
+    """Natural logarithms of constants and density together, in SI units."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        E_x, E_y, G_xy (Pa), D_x, D_y, D_s (N m), density (kg m^-3).
-    log_mean : tuple of float
-        In that order.
-    log_covariance : tuple of tuple of float
-        Row after row.
-    """
-
-    names: tuple[str, ...]
-    log_mean: tuple[float, ...]
-    log_covariance: tuple[tuple[float, ...], ...]
+    names: tuple[str, ...]  # E_x, E_y, G_xy (Pa), D_x, D_y, D_s (N m), density (kg m^-3)
+    log_mean: tuple[float, ...]  # in that order
+    log_covariance: tuple[tuple[float, ...], ...]  # row after row
 
     @classmethod
     def of(cls, draws: Draws) -> Joint:
@@ -164,7 +154,5 @@ class Joint:
         apart = logs - mean[:, None]
         covariance = (apart[:, None] * apart[None]).sum(axis=2) / (logs.shape[1] - 1)
         return cls(
-            JOINT,
-            tuple(float(one) for one in mean),
-            tuple(tuple(float(one) for one in row) for row in covariance),
+            JOINT, tuple(float(one) for one in mean), tuple(tuple(float(one) for one in row) for row in covariance)
         )

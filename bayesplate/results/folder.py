@@ -41,13 +41,7 @@ _DRAWN_BESIDE = ("modes-", "plan.", "plan-bench")
 
 
 class OutputFolder:
-    """Where the files of a run go.
-
-    Parameters
-    ----------
-    path : Path
-        Made by `open`, not before.
-    """
+    """Where the files of a run go; made by `open`, not before."""
 
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
@@ -65,15 +59,7 @@ class OutputFolder:
         return self.checkpoint / EARLIER
 
     def require_usable(self, *, force: bool, resume: bool) -> None:
-        """Check, before any work and without writing, that the run may use this folder.
-
-        Raises
-        ------
-        InputError
-            If it is there and neither `force` nor `resume` is given, or if it is no folder.
-        CheckpointError
-            If there is nothing to resume.
-        """
+        """Check, before any work and without writing, that the run may use this folder: InputError, CheckpointError."""
         has_content = any(map(_is_of_a_run, names_in(self.path)))
         self._is_new = not force and not resume
         if resume:
@@ -94,14 +80,8 @@ class OutputFolder:
         """Make the folder and take it; unless resuming, remove the checkpoint of an earlier run.
 
         The results of an earlier run are laid aside until this one is done (`earlier`). A run that is resumed may yet
-        turn out to be another one: what it left stays until there is something better.
-
-        Raises
-        ------
-        InputError
-            If the folder cannot be written, or another run has used it since it was found to be new.
-        CheckpointError
-            If another run is at work in it; then nothing is removed.
+        turn out to be another one: what it left stays until there is something better. InputError where it cannot be
+        written or has been used since it was found to be new, CheckpointError where another run is at work in it.
         """
         make_folder(self.path)
         self._lock = take(self.checkpoint)
@@ -131,7 +111,7 @@ class OutputFolder:
             _remove_empty(path.parent, self.path)
 
     def _put_back(self) -> None:
-        """Move them back from where a run left nothing in their place."""
+        """Move the earlier results back from where a run left nothing in their place."""
         if not self.earlier.is_dir() or any(path.exists() for path in self._results()):
             return
         for kept in [path for path in self.earlier.rglob("*") if path.is_file()]:
@@ -180,12 +160,7 @@ _HELD: ContextVar[list[OutputFolder] | None] = ContextVar("folders that the run 
 def run_of_its_own() -> Iterator[None]:
     """A run that keeps the folder it opens until it ends, however it ends; to be put above a function.
 
-    Raises
-    ------
-    RunInterrupted
-        In place of a KeyboardInterrupt after the first checkpoint.
-    CheckpointError
-        In place of an UnwritableError after the first checkpoint.
+    After the first checkpoint a KeyboardInterrupt becomes a RunInterrupted, an UnwritableError a CheckpointError.
     """
     held: list[OutputFolder] = []
     token = _HELD.set(held)

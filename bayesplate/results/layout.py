@@ -17,13 +17,7 @@ _RULES = 3
 
 
 def laid_out(title: str, columns: Texts, rows: Sequence[Texts], width: int) -> Any:
-    """A table as rich prints it: as a grid where that fits, otherwise each row as a small list of its own.
-
-    Parameters
-    ----------
-    width : int
-        Of the terminal, characters.
-    """
+    """A table as rich prints it: as a grid where that fits, otherwise each row as a small list of its own."""
     widths = column_widths(columns, rows, width)
     return _stacked(title, columns, rows) if widths is None else _grid(title, columns, rows, widths)
 
@@ -58,12 +52,8 @@ def _least(cell: str) -> int:
     """The least width at which a cell stays whole: that of its longest word, or its own if it is a short number."""
     parts = []
     for line in cell.split("\n"):
-        parts += [line] if len(line) <= _UNBROKEN and _holds_a_number(line) else line.split()
+        parts += [line] if len(line) <= _UNBROKEN and any(map(str.isdigit, line)) else line.split()
     return max(map(len, parts), default=0)
-
-
-def _holds_a_number(line: str) -> bool:
-    return any(character.isdigit() for character in line)
 
 
 def _grid(title: str, columns: Texts, rows: Sequence[Texts], widths: Sequence[int]) -> Any:

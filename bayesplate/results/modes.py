@@ -40,38 +40,24 @@ class Prediction:
 
 @dataclass(frozen=True)
 class ModeRow:
-    """A labelled mode; but for `left_out_cents` and `leverage` every number belongs to the posterior.
-
-    Attributes
-    ----------
-    residual_cents : float
-        Measured over the posterior mean of the prediction.
-    residual_interval_cents : tuple of float
-        Measured over the ends of the predicted 90 % interval, the lower one first.
-    rounding_cents : tuple of float or None
-        Ends of the rounding interval over the reading; None where it is not rounded.
-    left_out_cents : float or None
-        Measured over predicted by the most likely constants of the other readings; None where too few are left. Of a
-        mode that alone carries a constant or a size it says nothing, and no error counts it.
-    leverage : float
-        Share of the mode in its own prediction, what else is free counted in.
-    label_correlation : float
-        Of the mode's shape with what its label names.
-    label_origin : "card", "doubtful" or "proposed"
-        Whether the card states the label as sure or with a doubt, or the peak has none and this one is its likeliest;
-        the probabilities of the latter two stand in `Summary.peaks`.
-    """
+    """A labelled mode; but for `left_out_cents` and `leverage` every number belongs to the posterior."""
 
     setup: str
     label: str
     measured_hz: float
     predicted_hz: Prediction
-    residual_cents: float
+    residual_cents: float  # measured over the posterior mean of the prediction
+    # measured over the ends of the predicted 90 % interval, the lower one first
     residual_interval_cents: tuple[float, float]
+    # ends of the rounding interval over the reading; None where it is not rounded
     rounding_cents: tuple[float, float] | None
+    # measured over predicted by the most likely constants of the other readings; None where too few are left. Of a mode
+    # that alone carries a constant or a size it says nothing, and no error counts it.
     left_out_cents: float | None
-    leverage: float
-    label_correlation: float
+    leverage: float  # share of the mode in its own prediction, what else is free counted in
+    label_correlation: float  # of the mode's shape with what its label names
+    # whether the card states the label as sure or with a doubt, or the peak has none and this one is its likeliest; the
+    # probabilities of the latter two stand in `Summary.peaks`
     label_origin: LabelOrigin = "card"
 
 
@@ -117,12 +103,10 @@ class Labelled(Protocol):
     """A row of a mode of a setup."""
 
     @property
-    def setup(self) -> str:
-        """Name of the setup."""
+    def setup(self) -> str: ...
 
     @property
-    def label(self) -> str:
-        """Label of the mode."""
+    def label(self) -> str: ...
 
 
 def foretold(rows: Iterable[Row], carrying: Iterable[CarryingMode]) -> list[Row]:
@@ -156,77 +140,39 @@ class Assignment:
 
 @dataclass(frozen=True)
 class AssignedPeak:
-    """A peak without a label, or with one that may be wrong.
-
-    Attributes
-    ----------
-    hz : float
-        As read.
-    stated : str or None
-        Its label on the card.
-    assignments : tuple of Assignment
-        The most probable mode first; those below half a per cent are left out.
-    spurious_probability : float
-        That it is no mode of the plate.
-    predicted_hz : Prediction
-        Of its most probable mode.
-    residual_cents : float
-        The peak over that mode's mean.
-    """
+    """A peak without a label, or with one that may be wrong."""
 
     setup: str
-    hz: float
-    stated: str | None
-    assignments: tuple[Assignment, ...]
-    spurious_probability: float
-    predicted_hz: Prediction
-    residual_cents: float
+    hz: float  # as read
+    stated: str | None  # its label on the card
+    assignments: tuple[Assignment, ...]  # the most probable mode first; those below half a per cent are left out
+    spurious_probability: float  # that it is no mode of the plate
+    predicted_hz: Prediction  # of its most probable mode
+    residual_cents: float  # the peak over that mode's mean
 
 
 @dataclass(frozen=True)
 class PredictedMode:
-    """A mode that peaks may be.
-
-    Attributes
-    ----------
-    seen_probability : float
-        That one of the peaks is this mode.
-    """
+    """A mode that peaks may be."""
 
     setup: str
     label: str
     predicted_hz: Prediction
-    seen_probability: float
+    seen_probability: float  # that one of the peaks is this mode
 
 
 @dataclass(frozen=True)
 class Spectrum:
-    """How the peaks of a setup were taken for modes.
-
-    Attributes
-    ----------
-    missed_probability, spurious_probability : float
-        Beforehand: that a mode left no peak, and that a peak is no mode.
-    modes : tuple of PredictedMode
-        In the order of frequency, up to a little above the highest peak.
-    """
+    """How the peaks of a setup were taken for modes."""
 
     setup: str
-    missed_probability: float
-    spurious_probability: float
-    modes: tuple[PredictedMode, ...]
+    missed_probability: float  # beforehand, that a mode left no peak
+    spurious_probability: float  # beforehand, that a peak is no mode
+    modes: tuple[PredictedMode, ...]  # in the order of frequency, up to a little above the highest peak
 
 
 def assigned_peaks(problem: PosedProblem, draws: Draws) -> tuple[tuple[AssignedPeak, ...], tuple[Spectrum, ...]]:
-    """Every peak whose label is not sure, and the modes of its setup, averaged over the posterior.
-
-    Returns
-    -------
-    peaks : tuple of AssignedPeak
-        Setup after setup, in the order of frequency.
-    spectra : tuple of Spectrum
-        Of the setups that have such peaks.
-    """
+    """Every peak whose label is not sure, by frequency, and the modes of its setup, averaged over the posterior."""
     peaks: list[AssignedPeak] = []
     spectra = []
     for i, (setup, likelihood) in enumerate(zip(problem.board.setups, problem.posterior.peaks, strict=True)):

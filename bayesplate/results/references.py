@@ -10,15 +10,14 @@ from bayesplate.effects import effects_of
 from bayesplate.frequencies.system import system_of
 
 PAPER = (
-    "M. Ducceschi, S. Duran, H. Tahvanainen, L. Ausiello: A method to estimate the rectangular "
-    "orthotropic plate elastic "
-    "constants using least-squares and Chladni patterns. [the frequency model, least squares, the percentile method]"
+    "M. Ducceschi, S. Duran, H. Tahvanainen, L. Ausiello: A method to estimate the rectangular orthotropic plate "
+    "elastic constants using least-squares and Chladni patterns. [the frequency model, least squares, the percentile "
+    "method]"
 )
 ELEMENT = (
-    "F. K. Bogner, R. L. Fox, L. A. Schmit: The generation of inter-element-compatible stiffness and "
-    "mass matrices by the "
-    "use of interpolation formulas. Proc. Conf. Matrix Methods in Structural Mechanics, Wright-Patterson AFB, 397-443 "
-    "(1965). [the plate's finite elements]"
+    "F. K. Bogner, R. L. Fox, L. A. Schmit: The generation of inter-element-compatible stiffness and mass matrices "
+    "by the use of interpolation formulas. Proc. Conf. Matrix Methods in Structural Mechanics, Wright-Patterson AFB, "
+    "397-443 (1965). [the plate's finite elements]"
 )
 THIN = "Kirchhoff's thin orthotropic plate, as in eq. (1) to (4) of Ducceschi et al. [the plate theory]"
 COMPUTATION = (
@@ -35,9 +34,8 @@ COMPUTATION = (
     "[convergence]",
     "T. Gustafsson, G. D. McBain: scikit-fem: A Python package for finite element assembly. JOSS 5, 2369 (2020), "
     "doi:10.21105/joss.02369. [finite elements]",
-    "R. Kumar, C. Carroll, A. Hartikainen, O. Martin: ArviZ, a unified library for exploratory analysis "
-    "of Bayesian models "
-    "in Python. JOSS 4, 1143 (2019), doi:10.21105/joss.01143. [the format of posterior.nc]",
+    "R. Kumar, C. Carroll, A. Hartikainen, O. Martin: ArviZ, a unified library for exploratory analysis of Bayesian "
+    "models in Python. JOSS 4, 1143 (2019), doi:10.21105/joss.01143. [the format of posterior.nc]",
 )
 
 
@@ -50,18 +48,7 @@ class Section:
 
 
 def references(card: Board, prior: PriorCard, board: Board) -> tuple[Section, ...]:
-    """What to cite for a fit of a card.
-
-    Parameters
-    ----------
-    board : Board
-        With the effects that the fit declares.
-
-    Returns
-    -------
-    tuple of Section
-        Model, computation, data, prior; nothing that the fit does not use.
-    """
+    """What to cite for a fit of a card, whose effects the board declares: nothing that the fit does not use."""
     systems = [system_of(board, setup) for setup in board.setups]
     theory = (THIN,) if any(system.theory == "thin" for system in systems) else ()
     effects = tuple(dict.fromkeys(entry for system in systems for one in system.effects for entry in one.references))

@@ -22,26 +22,15 @@ class EnergyShares:
 
 @dataclass(frozen=True)
 class SheetRow:
-    """One mode.
+    """One mode."""
 
-    Attributes
-    ----------
-    label : str
-        Or "cannot tell".
-    miss_cents : float or None
-        Computed over measured.
-    likely_hz : tuple of float or None
-        Where it is expected two times in three, if it was not measured.
-    a, b, c : float
-        The paper's coefficients.
-    """
-
-    label: str
+    label: str  # or "cannot tell"
     hz: float
     measured_hz: float | None
-    miss_cents: float | None
-    likely_hz: tuple[float, float] | None
+    miss_cents: float | None  # computed over measured
+    likely_hz: tuple[float, float] | None  # where it is expected two times in three, if it was not measured
     share_percent: EnergyShares
+    # a, b, c: the paper's coefficients
     a: float
     b: float
     c: float
@@ -69,19 +58,12 @@ class SheetReport:
 
 @dataclass(frozen=True)
 class ProposedLabel:
-    """What a peak without a label may be.
-
-    Attributes
-    ----------
-    label : str or None
-        In the most probable way to label all peaks; None where it is no mode of the plate.
-    probability : dict of float
-        Of each label, "none" for no mode, over all ways that were looked at; the highest first.
-    """
+    """What a peak without a label may be."""
 
     setup: str
     measured_hz: float
-    label: str | None
+    label: str | None  # in the most probable way to label all peaks; None where it is no mode of the plate
+    # of each label, "none" for no mode, over all ways that were looked at; the highest first
     probability: Mapping[str, float]
 
 
@@ -134,13 +116,12 @@ def _proposed(setup: str, hertz: float, found: Sequence[tuple[str | None, float]
 
 
 def _label(way: Way, setup: str, hertz: float) -> str | None:
-    """Of a peak in one way to label them; None where it is no mode."""
+    """Label of a peak in one way to label them; None where it is no mode."""
     readings = (one for each in way.board.setups if each.name == setup for one in each.readings)
     return next((str(one.label) for one in readings if one.frequency.mean == hertz), None)
 
 
 def sheet_report(sheet: Sheet) -> SheetReport:
-    """A sheet without its shapes."""
     mixtures = tuple(MixtureRow(one.name, one.modulus, dict(one.weights)) for one in sheet.combined)
     rows = tuple(_row(mode) for mode in sheet.modes)
     return SheetReport(sheet.setup, dict(sheet.edges), sheet.theory, rows, mixtures)

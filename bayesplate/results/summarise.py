@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.material import MODULI, RIGIDITIES, moduli
 from bayesplate.estimates.identifiability import remarks
 from bayesplate.estimates.leave_one_out import carrying_sentence
@@ -37,19 +37,12 @@ from bayesplate.results.summary import (
     Unconverged,
 )
 
-Floats = NDArray[np.float64]
-
 HIGH_EXACT_ERROR = 0.5
 """Cents by which the exact law may miss full solves before a summary warns."""
 
 
 def unconverged_summary(
-    problem: PosedProblem,
-    chains: Chains,
-    convergence: Convergence,
-    seed: int,
-    versions: Mapping[str, str],
-    sha256: str,
+    problem: PosedProblem, chains: Chains, convergence: Convergence, seed: int, versions: Mapping[str, str], sha256: str
 ) -> Unconverged:
     """The summary of a run that failed the gate."""
     return Unconverged(
@@ -66,25 +59,15 @@ def unconverged_summary(
 
 
 def summarise(
-    inference: Inference,
-    draws: Draws,
-    assessment: Assessment,
-    seed: int,
-    versions: Mapping[str, str],
-    card_sha256: str,
+    inference: Inference, draws: Draws, assessment: Assessment, seed: int, versions: Mapping[str, str], card_sha256: str
 ) -> Summary:
-    """The summary of a converged fit.
-
-    Parameters
-    ----------
-    assessment : Assessment
-        Of these draws.
-    """
+    """The summary of a converged fit."""
     problem = inference.problem
     board = problem.board
     system = paper_system(board, problem.estimate, compared=False)
     rows = mode_rows(problem, draws, assessment)
     peaks, spectra = assigned_peaks(problem, draws)
+    paper, off = system.solve(), assessment.surrogate_errors
     return Summary(
         format=FORMAT,
         name=board.name,
@@ -104,7 +87,7 @@ def summarise(
         },
         derived={name: Spread.of(item.values, item.unit) for name, item in draws.derived.items()},
         joint=Joint.of(draws),
-        least_squares=_paper_least_squares(system),
+        least_squares=_point(np.stack(system.moduli(paper)), paper, system.condition_number),
         weighted_least_squares=_weighted(problem),
         percentile=_percentile(system),
         linear_means=law_means(*assessment.means["linear"]),
@@ -117,8 +100,8 @@ def summarise(
             leave_one_out_rms_cents=rms([one.left_out_cents for one in foretold(rows, assessment.carrying)]),
             linearisation_rms_cents=rms(assessment.linear_errors),
             exact_law_worst_cents=assessment.exact_worst,
-            surrogate_rms_cents=rms(assessment.surrogate_errors),
-            surrogate_worst_cents=finite(_worst(assessment.surrogate_errors)),
+            surrogate_rms_cents=rms(off),
+            surrogate_worst_cents=finite(np.nanmax(np.abs(off))) if off.size else None,
         ),
         sampler=replace(
             sampler_health(inference.chains, inference.convergence),
@@ -138,14 +121,12 @@ def summarise(
 
 
 def model_header(problem: PosedProblem) -> ModelHeader:
-    """What is fitted."""
     posterior = problem.posterior
     theory, effects = posterior.models[0].system.theory, tuple(problem.board.effects)
     return ModelHeader(theory, posterior.law, effects, posterior.robust, problem.prior.name, problem.board.isotropic)
 
 
 def sampler_health(chains: Chains, convergence: Convergence) -> SamplerHealth:
-    """How the sampler fared."""
     n_ensembles, n_steps, n_walkers, _ = chains.draws.shape
     return SamplerHealth(
         ensembles=n_ensembles,
@@ -158,39 +139,26 @@ def sampler_health(chains: Chains, convergence: Convergence) -> SamplerHealth:
     )
 
 
-def _worst(values: NDArray[np.float64]) -> float:
-    """Largest magnitude; not a number where there are no values."""
-    return float(np.nanmax(np.abs(values))) if values.size else float("nan")
-
-
 def _effects(problem: PosedProblem, draws: Draws) -> dict[str, dict[str, dict[str, Spread]]]:
     """Parameters of the declared effects, by board or setup, effect and parameter; exact ones have no spread."""
     result: dict[str, dict[str, dict[str, Spread]]] = {}
+
+    def drawn(name: str) -> Floats:
+        return draws.inputs[name] if name in draws.inputs else np.array(problem.board.inputs[name].mean)
+
     for model in problem.posterior.models:
         for effect in model.system.effects:
             owner = result.setdefault(effect.owner.title, {})
             owner[effect.name] = {
-                parameter.key: Spread.of(_values_of(parameter.name, problem, draws), parameter.unit)
-                for parameter in effect.parameters()
+                parameter.key: Spread.of(drawn(parameter.name), parameter.unit) for parameter in effect.parameters()
             }
     return result
-
-
-def _values_of(key: str, problem: PosedProblem, draws: Draws) -> Floats:
-    if key in draws.inputs:
-        return draws.inputs[key]
-    return np.broadcast_to(problem.board.inputs[key].mean, draws.log_posterior.shape)
 
 
 def law_means(means: Mapping[str, float], effective: float) -> LawMeans:
     """Posterior means under a law; none where the two laws are too far apart for one to stand for the other."""
     known = effective >= FEWEST_WEIGHTED_DRAWS
     return LawMeans(**{name: value if known else None for name, value in means.items()}, effective_draws=effective)
-
-
-def _paper_least_squares(system: PaperSystem) -> PointEstimate:
-    constants = system.solve()
-    return _point(np.stack(system.moduli(constants)), constants, system.condition_number)
 
 
 def _weighted(problem: PosedProblem) -> PointEstimate:

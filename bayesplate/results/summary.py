@@ -36,15 +36,7 @@ class ModelHeader:
 
 @dataclass(frozen=True)
 class SamplerHealth:
-    """How the sampler fared; None where a number does not exist, or not yet.
-
-    Attributes
-    ----------
-    drawn_from : "law" or "surrogate"
-        The frequency law of the model, or a polynomial in its place whose draws are weighted to the law.
-    pareto_k : float or None
-        k-hat of these weights.
-    """
+    """How the sampler fared; None where a number does not exist, or not yet."""
 
     ensembles: int
     walkers: int
@@ -53,8 +45,9 @@ class SamplerHealth:
     rhat_max: float | None
     ess_min: float | None
     acceptance: float | None
+    # the law of the model, or a polynomial in its place whose draws are weighted to it
     drawn_from: Literal["law", "surrogate"] = "law"
-    pareto_k: float | None = None
+    pareto_k: float | None = None  # k-hat of these weights
 
 
 @dataclass(frozen=True)
@@ -88,43 +81,26 @@ class LawMeans(Constants[float | None]):
 
 @dataclass(frozen=True)
 class ErrorFigures:
-    """Errors of the fit, cents.
+    """Errors of the fit, cents."""
 
-    Attributes
-    ----------
-    in_sample_rms_cents : float
-        Of the residuals of `Summary.modes`: readings over posterior mean predictions.
-    leave_one_out_rms_cents : float or None
-        Of each reading by the most likely constants of the others, those of `Summary.carrying_modes` not counted; None
-        where too few are left, or none.
-    linearisation_rms_cents : float or None
-        Linear less exact law over the posterior.
-    exact_law_worst_cents : float
-        Exact law against full solves.
-    surrogate_rms_cents, surrogate_worst_cents : float or None
-        Surrogate of the exact law less that law over the posterior; None where the walkers walked on none.
-    """
-
-    in_sample_rms_cents: float
+    in_sample_rms_cents: float  # of the residuals of `Summary.modes`: readings over posterior mean predictions
+    # of each reading by the most likely constants of the others, those of `Summary.carrying_modes` not counted; None
+    # where too few are left, or none
     leave_one_out_rms_cents: float | None
-    linearisation_rms_cents: float | None
-    exact_law_worst_cents: float
+    linearisation_rms_cents: float | None  # linear less exact law over the posterior
+    exact_law_worst_cents: float  # exact law against full solves
+    # surrogate_rms_cents, surrogate_worst_cents: surrogate of the exact law less that law over the posterior; None
+    # where the walkers walked on none
     surrogate_rms_cents: float | None
     surrogate_worst_cents: float | None
 
 
 @dataclass(frozen=True)
 class Run:
-    """What was run, before any result.
-
-    Attributes
-    ----------
-    name : str
-        Of the board.
-    """
+    """What was run, before any result."""
 
     format: int
-    name: str
+    name: str  # of the board
     seed: int
     versions: Mapping[str, str]
     card_sha256: str

@@ -21,18 +21,12 @@ Medium = Literal["terminal", "html", "csv", "latex"]
 
 @dataclass(frozen=True)
 class Table:
-    """A table of values.
-
-    Attributes
-    ----------
-    keys : tuple of str
-        What programs call the columns, where that differs.
-    """
+    """A table of values."""
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
-    keys: tuple[str, ...] = ()
+    keys: tuple[str, ...] = ()  # what programs call the columns, where that differs
 
     @property
     def texts(self) -> tuple[tuple[str, ...], ...]:
@@ -47,13 +41,7 @@ def by_constant(
     isotropic: bool = False,
     names: Iterable[str] = CONSTANTS,
 ) -> Table:
-    """A row for each modulus; a column is its heading and what it holds of a modulus.
-
-    Parameters
-    ----------
-    names : iterable of str
-        The moduli.
-    """
+    """A row for each modulus among the names; a column is its heading and what it holds of a modulus."""
     rows = ((narrow_name(name, isotropic=isotropic), *(held(name) for held in columns.values())) for name in names)
     return Table(title, ("constant", *columns), tuple(rows))
 
@@ -76,16 +64,8 @@ def constants_table(
 def render(shown: Table | str, medium: Medium, *, width: int = 80, styled: bool = False, kind: str = "") -> str:
     """A table, or a sentence, as a medium shows it; every text in it is escaped.
 
-    Parameters
-    ----------
-    medium : "terminal", "html", "csv" or "latex"
-        Programs read CSV at full precision: a number with its uncertainty has two columns, and so has an interval.
-    width : int
-        Of a terminal, characters.
-    styled : bool
-        Whether the terminal knows bold letters.
-    kind : str
-        Classes of a table of HTML.
+    Programs read CSV at full precision: a number with its uncertainty has two columns, and so has an interval. `kind`
+    are classes of a table of HTML, `styled` terminals know bold letters.
     """
     if medium == "terminal":
         return _printed(shown, width, styled=styled)

@@ -15,11 +15,7 @@ MISSING = "–"
 CONSTANTS = {"E_x": "along the grain", "E_y": "across the grain", "G_xy": "shear"}
 _ANY = "in any direction"
 CONSTANTS_OF_ISOTROPIC = {"E_x": _ANY, "E_y": _ANY, "G_xy": "shear"}
-STIFFNESS = {
-    "E_x": "stiffness along the grain",
-    "E_y": "stiffness across the grain",
-    "G_xy": "shear stiffness",
-}
+STIFFNESS = {"E_x": "stiffness along the grain", "E_y": "stiffness across the grain", "G_xy": "shear stiffness"}
 """What each modulus is, to be read without its symbol."""
 STIFFNESS_OF_ISOTROPIC = {"E_x": f"stiffness {_ANY}", "E_y": f"stiffness {_ANY}", "G_xy": "shear stiffness"}
 
@@ -31,55 +27,34 @@ class Uncertain(Protocol):
     """A number with its standard deviation."""
 
     @property
-    def mean(self) -> float:
-        """The number."""
+    def mean(self) -> float: ...
 
     @property
-    def sd(self) -> float:
-        """Its standard deviation."""
+    def sd(self) -> float: ...
 
 
 class Interval(Uncertain, Protocol):
     """The same with the ends of its 90 % interval."""
 
     @property
-    def q05(self) -> float:
-        """The lower end."""
+    def q05(self) -> float: ...
 
     @property
-    def q95(self) -> float:
-        """The upper end."""
+    def q95(self) -> float: ...
 
 
 @dataclass(frozen=True)
 class Value:
-    """A number at full precision that prints with the digits that have meaning for people.
+    """A number at full precision that prints with the digits that have meaning for people."""
 
-    Attributes
-    ----------
-    mean : float or None
-        None where there is no number.
-    sd : float or None
-        Its standard deviation, which decides on the digits; None where it is printed with fixed decimals.
-    ends : (float, float) or None
-        Of an interval, in place of a mean.
-    digits : int
-        Fixed decimals.
-    signed : bool
-        Whether a positive number has its sign.
-    unit : str
-        Printed after it.
-    times : float
-        What it is multiplied by in print: 100 for a share in per cent.
-    """
-
-    mean: float | None = None
+    mean: float | None = None  # None where there is no number
+    # its standard deviation, which decides on the digits; None where it is printed with fixed decimals
     sd: float | None = None
-    ends: tuple[float, float] | None = None
-    digits: int = 0
-    signed: bool = False
-    unit: str = ""
-    times: float = 1.0
+    ends: tuple[float, float] | None = None  # of an interval, in place of a mean
+    digits: int = 0  # fixed decimals
+    signed: bool = False  # whether a positive number has its sign
+    unit: str = ""  # printed after it
+    times: float = 1.0  # what it is multiplied by in print: 100 for a share in per cent
 
     def __str__(self) -> str:
         if self.ends is not None:
@@ -147,6 +122,11 @@ def interval(entry: Interval, factor: float = 1.0, unit: str = "") -> Value:
 def number(value: float | None, digits: int, *, signed: bool = False, factor: float = 1.0) -> Value:
     """A number with fixed decimals, zero without a sign, or a dash where there is none."""
     return Value(None if value is None else value * factor, digits=digits, signed=signed)
+
+
+def cents_alike(*values: float) -> list[str]:
+    """Errors that stand beside each other, cents: whole ones, with a decimal where one is below ten."""
+    return [f"{value:.0f}" if min(values) >= 10.0 else f"{value:.1f}" for value in values]
 
 
 def two_digits(value: float | None, factor: float = 1.0) -> Value:

@@ -9,7 +9,7 @@ import pytest
 from linear_boards import exactly_together, linear_boards, log_evidence
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.campaign.agreement import left_out, p_value, refusing
+from bayesplate.campaign.claim import left_out, p_value, refusing
 from bayesplate.campaign.pulls import Pull
 
 
@@ -81,6 +81,6 @@ def test_the_log_score_is_that_of_the_board_under_what_the_others_teach():
     boards = linear_boards(rng, 4, 2, [0.5, 1.0])
     found = left_out(exactly_together(boards))
 
-    for i, one in enumerate(found):
+    for i, one in enumerate(found.values()):
         exact = log_evidence(boards) - log_evidence([b for j, b in enumerate(boards) if j != i])
         assert abs(one.log_score - exact) < 1e-3

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from linear_boards import exactly_together, linear_boards
 
-from bayesplate.campaign.agreement import left_out, refusing
-from bayesplate.campaign.claim import LEAST_GAIN, TaughtBoard, judge
+from bayesplate.campaign.claim import LEAST_GAIN, TaughtBoard, judge, left_out
 
 N_BOARDS = 8
 
@@ -21,11 +20,10 @@ def claimed(seed, size, without=()):
     rng = np.random.default_rng(seed)
     boards = linear_boards(rng, N_BOARDS, 1, [size], without=without)
     together = exactly_together(boards)
-    refused = refusing(together)
     taught = {}
-    for one, each in zip(left_out(together), boards, strict=True):
+    for (name, one), each in zip(left_out(together).items(), boards, strict=True):
         alone = float(each.at(np.zeros((1, 1)))[0])
-        taught[one.name] = TaughtBoard(one.log_score - alone, 0.0, 0.0, one.p_value, one.name in refused, {})
+        taught[name] = TaughtBoard(one.log_score - alone, 0.0, 0.0, one.p_value, one.refuses, {})
     return judge(taught).holds
 
 

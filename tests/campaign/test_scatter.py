@@ -12,7 +12,7 @@ from scipy.stats import norm
 
 from bayesplate.board.quantity import Quantity
 from bayesplate.campaign import scatter, together
-from bayesplate.campaign.agreement import left_out, p_value
+from bayesplate.campaign.claim import left_out, p_value
 from bayesplate.campaign.pulls import Pull
 from bayesplate.campaign.scatter import ScatteredLikelihood
 from bayesplate.campaign.shared import Shared
@@ -208,7 +208,9 @@ def test_p_values_are_uniform_where_boards_scatter_and_not_where_that_is_left_ou
 
 def test_boards_that_scatter_are_foretold_better_where_that_is_known():
     boards, _ = scattered_boards(np.random.default_rng(3), 8, 1, 1.5, sd=0.2)
-    scores = [sum(one.log_score for one in left_out(together_of(boards, numbers(1, scale=s)))) for s in (SCALE, 0.0)]
+    scores = [
+        sum(one.log_score for one in left_out(together_of(boards, numbers(1, scale=s))).values()) for s in (SCALE, 0.0)
+    ]
 
     assert scores[0] > scores[1] + 3.0
 

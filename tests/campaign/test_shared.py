@@ -10,9 +10,8 @@ from made_campaigns import MASS
 from scipy.linalg import block_diag
 
 from bayesplate.campaign import learning
-from bayesplate.campaign.agreement import left_out
 from bayesplate.campaign.boards import Member, _joint
-from bayesplate.campaign.claim import judge, rms_cents, taught_boards
+from bayesplate.campaign.claim import judge, left_out, rms_cents, taught_boards
 from bayesplate.campaign.learning import learn
 from bayesplate.campaign.likelihood import moments
 from bayesplate.commands.campaign_diagnose import _without_shared
@@ -91,7 +90,7 @@ def test_what_is_told_of_boards_that_are_left_out(fitted_campaign):
     members = {name: Member(one.inference, one.draws, ()) for name, one in alone.items()}
     taught = taught_boards(learnt, members, 1)
 
-    for i, (told, score) in enumerate(zip(taught.values(), left_out(learnt.together), strict=True)):
+    for i, (told, score) in enumerate(zip(taught.values(), left_out(learnt.together).values(), strict=True)):
         name = learnt.members[i].name
         assert told.log_score_gain == pytest.approx(score.log_score - members[name].alone.log_evidence)
         assert told.before_rms_cents == pytest.approx(rms_cents(alone[name].inference, alone[name].draws))

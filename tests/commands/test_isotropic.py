@@ -15,9 +15,8 @@ from bayesplate.diagnosis.known import known_fit
 from bayesplate.errors import InputError
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.laws import cents
-from bayesplate.planning.beliefs import Beliefs
+from bayesplate.planning.beliefs import Beliefs, prior_explanation
 from bayesplate.planning.gains import Readings, expected_gain
-from bayesplate.planning.unmeasured import prior_explanation
 from bayesplate.report.content import summary_sentences
 from bayesplate.results.contract import as_json
 

@@ -18,10 +18,10 @@ from bayesplate.diagnosis.claim import (
 )
 from bayesplate.diagnosis.folds import Nested, log_score, log_score_gains
 from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.noise_grid import noise_grid
 from bayesplate.diagnosis.null_control import NullControl, made_to_choose, null_control
 from bayesplate.diagnosis.search import search
 from bayesplate.diagnosis.sensitivity import varied
+from bayesplate.diagnosis.terms import noise_grid
 from bayesplate.diagnosis.verdict import answers
 
 DIRECTION = 0.05 * np.random.default_rng(2).standard_normal(9)

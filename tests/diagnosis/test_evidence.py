@@ -13,8 +13,7 @@ from scipy.stats import multivariate_normal
 from bayesplate.board.parameter import Owner
 from bayesplate.diagnosis.folds import log_score, log_score_gains, nested
 from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.noise_grid import NoiseGrid, noise_grid
-from bayesplate.diagnosis.terms import Terms
+from bayesplate.diagnosis.terms import NoiseGrid, Terms, noise_grid
 
 _REACH, _STEP = 6.0, 1.0
 """Of the grid, in standard deviations.  The trapezoidal sum of a normal density errs by 2 exp(-2 (pi / step)^2) a

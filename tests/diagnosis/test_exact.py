@@ -10,12 +10,17 @@ import pytest
 from made_searches import bare, baseline, candidate, ground_of, one_level, with_modes
 
 from bayesplate.board.material import RIGIDITIES
-from bayesplate.diagnosis import constants
-from bayesplate.diagnosis.constants import draw_constants
+from bayesplate.diagnosis import sensitivity
 from bayesplate.diagnosis.draws import draw_terms
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.search import search
-from bayesplate.diagnosis.sensitivity import draw_exact, exact_log_frequencies, log_weights_of, under_exact_law
+from bayesplate.diagnosis.sensitivity import (
+    draw_constants,
+    draw_exact,
+    exact_log_frequencies,
+    log_weights_of,
+    under_exact_law,
+)
 from bayesplate.diagnosis.shifts import together
 
 NOISE = 0.01
@@ -175,7 +180,7 @@ def test_two_effects_add_at_the_constants_of_a_draw(found):
 def test_averages_are_by_the_probabilities_of_the_exact_law(found, monkeypatch):
     """Whatever these are: here all of it with the explanation that the search finds least probable."""
     shares = np.array([0.0, 0.0, 1.0])
-    monkeypatch.setattr(constants, "under_exact_law", lambda found: replace(found, probability=shares))
+    monkeypatch.setattr(sensitivity, "under_exact_law", lambda found: replace(found, probability=shares))
     means = np.array(
         [np.exp(draw_exact(found, i, np.random.default_rng(5), N_DRAWS).log_rigidities).mean(axis=0) for i in range(3)]
     )

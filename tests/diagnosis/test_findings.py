@@ -15,22 +15,20 @@ from bayesplate.board.material import RIGIDITIES, moduli
 from bayesplate.board.parameter import BOARD, Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.commands.shown import show_diagnosis
-from bayesplate.diagnosis import constants
-from bayesplate.diagnosis.candidates import EffectEntry
+from bayesplate.diagnosis import sensitivity
 from bayesplate.diagnosis.claim import Claim, Condition
 from bayesplate.diagnosis.entries import effect_entry, exchange_entries, fate_of
 from bayesplate.diagnosis.findings import Case, Side, _nearest_sentence, diagnosis_of
 from bayesplate.diagnosis.folds import Nested, log_score, nested
 from bayesplate.diagnosis.hypotheses import RELABELLING, Hypothesis, Swap, probabilities
-from bayesplate.diagnosis.noise_grid import noise_grid
 from bayesplate.diagnosis.null_control import NullControl, null_control
-from bayesplate.diagnosis.result import Diagnosis, diagnosis_json
+from bayesplate.diagnosis.result import Diagnosis, EffectEntry, diagnosis_json
 from bayesplate.diagnosis.search import Found, search
 from bayesplate.diagnosis.shifts import nothing, together
 from bayesplate.diagnosis.signatures import cosine
-from bayesplate.diagnosis.terms import Terms
-from bayesplate.diagnosis.told import verdict_sentence, verdict_sentences, warnings
+from bayesplate.diagnosis.terms import Terms, noise_grid
 from bayesplate.diagnosis.verdict import NOTHING_LEFT, Answer, answers
+from bayesplate.diagnosis.words import verdict_sentence, verdict_sentences, warnings
 from bayesplate.effects import EFFECTS
 from bayesplate.estimates.leave_one_out import CarryingMode, indices_of
 from bayesplate.report.verdict import diagnosis_section, quoted
@@ -178,7 +176,7 @@ def test_the_constants_to_quote_are_averaged_and_never_those_of_one_member(monke
     found = made({(): 0.4, (SHEAR,): 0.6}, residual=np.zeros(6))
     found = replace(found, probability=np.array([0.04, 0.96, 0.0, 0.0, 0.0]))
     case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25))
-    monkeypatch.setattr(constants, "under_exact_law", lambda _: None)  # the probabilities are made by hand
+    monkeypatch.setattr(sensitivity, "under_exact_law", lambda _: None)  # the probabilities are made by hand
     group = replace(case.verdict, word="indistinguishable group", index=1)
     fitted = replace(case.after, index=1, draws=draws_of(case.before.draws.predictive, 20e9))
     told = diagnosis_of(replace(case, verdict=group, finalists=[(group.best, fitted)]))

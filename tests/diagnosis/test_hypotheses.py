@@ -34,8 +34,8 @@ from bayesplate.diagnosis.hypotheses import (
     log_evidences,
     probabilities,
 )
-from bayesplate.diagnosis.noise_grid import noise_grid
 from bayesplate.diagnosis.shifts import nothing, together
+from bayesplate.diagnosis.terms import noise_grid
 
 CLOSE_PAIR = [(0, 0), (1, 1), (0, 0), (0, 0), (1, 1), (0, 0)]
 

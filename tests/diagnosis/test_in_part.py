@@ -13,8 +13,8 @@ from bayesplate.diagnosis import claim
 from bayesplate.diagnosis.claim import named_in_part
 from bayesplate.diagnosis.folds import Nested
 from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.noise_grid import noise_grid
 from bayesplate.diagnosis.search import PASSES, Found
+from bayesplate.diagnosis.terms import noise_grid
 
 N_MODES = 8
 SIZE = Quantity.from_median(1.0, 1.5)

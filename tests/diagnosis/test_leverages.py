@@ -9,9 +9,9 @@ from made_searches import bare, baseline, candidate, ground_of
 from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.folds import carrying
 from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.noise_grid import noise_grid
 from bayesplate.diagnosis.search import Found
 from bayesplate.diagnosis.shifts import together
+from bayesplate.diagnosis.terms import noise_grid
 
 WIDE = Quantity.from_mean(0.0, 1.0, "normal")
 N_MODES = 8

@@ -14,10 +14,10 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.commands.prepare import prepare
 from bayesplate.diagnosis.entries import effect_entry
 from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.noise_grid import noise_grid
 from bayesplate.diagnosis.search import Found, noise_of_board
 from bayesplate.diagnosis.signatures import Signature, acts_both_ways, look_alikes, signatures
 from bayesplate.diagnosis.sizes import at_limit
+from bayesplate.diagnosis.terms import noise_grid
 from bayesplate.diagnosis.verdict import answers
 from bayesplate.effects import declare, effects_of
 from bayesplate.posterior.posing import pose

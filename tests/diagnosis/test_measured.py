@@ -10,10 +10,9 @@ from made_searches import with_modes
 
 from bayesplate.commands.fit import fit
 from bayesplate.diagnosis.baseline import baseline_of
-from bayesplate.diagnosis.constants import draw_constants
 from bayesplate.diagnosis.null_control import null_control
 from bayesplate.diagnosis.search import prepare_search, search
-from bayesplate.diagnosis.sensitivity import varied
+from bayesplate.diagnosis.sensitivity import draw_constants, varied
 from bayesplate.diagnosis.verdict import decide
 
 slow = pytest.mark.slow

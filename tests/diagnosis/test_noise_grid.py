@@ -9,9 +9,8 @@ import pytest
 from made_searches import baseline, table, with_residual
 
 from bayesplate.diagnosis.hypotheses import hypotheses
-from bayesplate.diagnosis.noise_grid import NoiseGrid, noise_grid
 from bayesplate.diagnosis.shifts import nothing
-from bayesplate.diagnosis.terms import Terms
+from bayesplate.diagnosis.terms import NoiseGrid, Terms, noise_grid
 
 N_SETS = 40
 

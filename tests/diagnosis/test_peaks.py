@@ -12,7 +12,7 @@ from made_searches import NOISE, bare, baseline, candidate, ground_of, one_level
 from scipy.special import logsumexp
 
 from bayesplate.diagnosis import peaks
-from bayesplate.diagnosis.baseline import Baseline, Spectrum
+from bayesplate.diagnosis.baseline import Baseline, PossibleModes
 from bayesplate.diagnosis.folds import log_score_gains, nested
 from bayesplate.diagnosis.hypotheses import Hypothesis, confusable
 from bayesplate.diagnosis.peaks import log_summed, with_own_labels
@@ -43,7 +43,7 @@ def peaked(rng, readings, labels=READ, confidence=0.0, spacing=0.3) -> Baseline:
     setup = replace(setup, readings=told, missed=MISSED, spurious=SPURIOUS)
     others = tuple(OtherMode(PLACE, (20 + i, 0)) for i in range(N_EVERY - len(labels)))
     model = SimpleNamespace(setup=setup, others=others, residues=None, every_place=(PLACE,) * N_EVERY)
-    every = Spectrum(
+    every = PossibleModes(
         log_frequency=whole.log_frequency[order],
         slopes=whole.slopes[order],
         input_slopes=whole.input_slopes[order],

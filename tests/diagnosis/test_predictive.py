@@ -11,8 +11,8 @@ from scipy.stats import chi2, kstest, kstwobign
 
 from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.noise_grid import noise_grid
 from bayesplate.diagnosis.search import PASSES, predictive_p_value
+from bayesplate.diagnosis.terms import noise_grid
 
 N_SETS = 4000
 N_SIMULATED = {"bare": 20_000, "with an effect": 6000}

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from made_searches import NOISE, bare, baseline, ground_of, with_modes, with_residual
 
-from bayesplate.diagnosis.noise_grid import noise_grid
 from bayesplate.diagnosis.readings import suspects, wrong_reading
 from bayesplate.diagnosis.search import Found, search
+from bayesplate.diagnosis.terms import noise_grid
 
 
 def found_of(residual, n_modes=8, noise=(NOISE,)) -> Found:

@@ -8,7 +8,7 @@ from made_boards import setup_of
 
 from bayesplate.board.board import made_board
 from bayesplate.board.quantity import Quantity
-from bayesplate.diagnosis.told import relabelled_sentence
+from bayesplate.diagnosis.words import relabelled_sentence
 
 FREE = {"x0": "free", "x1": "free", "y0": "free", "y1": "free"}
 INPUTS = {"thickness": Quantity.exact(3e-3)}

@@ -10,10 +10,8 @@ from made_searches import bare, baseline, candidate, ground_of, one_level, visib
 from scipy.stats import binom
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.diagnosis.constants import draw_constants
 from bayesplate.diagnosis.folds import ALWAYS, nested
 from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.noise_grid import noise_grid
 from bayesplate.diagnosis.null_control import (
     FALSE_ALARMS,
     NullControl,
@@ -22,7 +20,8 @@ from bayesplate.diagnosis.null_control import (
     null_control,
 )
 from bayesplate.diagnosis.search import Found, noise_of_board, search
-from bayesplate.diagnosis.sensitivity import under_exact_law, variants, varied
+from bayesplate.diagnosis.sensitivity import draw_constants, under_exact_law, variants, varied
+from bayesplate.diagnosis.terms import noise_grid
 
 
 @pytest.fixture

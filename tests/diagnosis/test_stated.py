@@ -15,10 +15,10 @@ from bayesplate.board.attached import DeclaredFluid
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.commands.problem import Problem
-from bayesplate.diagnosis.baseline import Baseline, Spectrum
+from bayesplate.diagnosis.baseline import Baseline, PossibleModes
 from bayesplate.diagnosis.known import known_fit, stated_effects
+from bayesplate.diagnosis.known_words import stated_sentence
 from bayesplate.diagnosis.stated import _states_differently, judge_stated, scores_given, stated_claims
-from bayesplate.diagnosis.told import stated_sentences
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.posterior.posing import pose
 
@@ -58,12 +58,12 @@ def test_two_modes_are_too_few_to_judge_by(n_modes, is_judged):
 
 
 def test_a_claim_in_words():
-    (told,) = stated_sentences(STATED)
+    told = stated_sentence(*STATED)
     assert told == (
         "Attached mass, as stated and not chosen by the readings, takes the left-out error from 61.0 to 46.5 cents; "
         "the log score changes by +4.5 ± 2.0 over 6 modes: error reduced."
     )
-    (told,) = stated_sentences([replace(STATED[0], holds=False, predicts="water")])
+    told = stated_sentence(replace(STATED[0], holds=False, predicts="water"))
     assert "takes the error of setup 'water', predicted by the constants of the first setup alone, from 61.0" in told
     assert "That an error is reduced is not claimed: that asks for a fall by 20%" in told
     assert "error reduced." not in told
@@ -155,7 +155,9 @@ def test_scores_are_those_of_a_bayesian_who_averages_over_the_noise(weighed):
     n = sum(len(setup.readings) for setup in board.setups)
     slopes, errors = rng.uniform(0.0, 0.5, (n, 3)), 0.004 * rng.normal(size=n)
     log_readings = log_measured(board)
-    every = Spectrum(log_readings - errors, slopes, np.zeros((n, 0)), (), np.zeros(0), (None,), lambda x: x @ slopes.T)
+    every = PossibleModes(
+        log_readings - errors, slopes, np.zeros((n, 0)), (), np.zeros(0), (None,), lambda x: x @ slopes.T
+    )
     fit = Baseline(board, {}, np.zeros(3), log_readings, every, np.arange(n), ())
     found = scores_given(fit, [[2], [5]])
     noise = board.setups[0].noise

@@ -10,11 +10,11 @@ from made_searches import bare, baseline, candidate, decided, exchanged, ground_
 
 from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.hypotheses import RELABELLING, Hypothesis, Swap
-from bayesplate.diagnosis.noise_grid import noise_grid
 from bayesplate.diagnosis.null_control import NullControl
 from bayesplate.diagnosis.search import PASSES, Found
 from bayesplate.diagnosis.shifts import nothing, together
 from bayesplate.diagnosis.sizes import at_limit, size_posterior
+from bayesplate.diagnosis.terms import noise_grid
 from bayesplate.diagnosis.verdict import NOTHING_LEFT, alternatives, answers
 
 WORDS = {"none needed", "named", "indistinguishable group", "unexplained", "undetectable"}

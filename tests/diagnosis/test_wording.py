@@ -13,8 +13,7 @@ from diagnoses import AFTER, AIR, BEFORE, DIAGNOSES, EXCHANGE, GRAIN, NEXT, TENS
 from read_pages import Read
 
 from bayesplate.commands.shown import show_diagnosis
-from bayesplate.diagnosis.candidates import Amplitude
-from bayesplate.diagnosis.result import Errors, diagnosis_json
+from bayesplate.diagnosis.result import Amplitude, Errors, diagnosis_json
 from bayesplate.diagnosis.tables import (
     answers_table,
     averaged_table,
@@ -24,18 +23,21 @@ from bayesplate.diagnosis.tables import (
     shift_table,
     sizes_table,
 )
-from bayesplate.diagnosis.told import (
+from bayesplate.diagnosis.verdict import Word
+from bayesplate.diagnosis.words import (
+    MERITS,
+    VERDICTS,
     alike_sentence,
+    claim_sentence,
     headline_sentence,
     known_sentences,
+    meaning,
     remarks,
     shown_model,
     verdict_sentence,
     verdict_sentences,
     warnings,
 )
-from bayesplate.diagnosis.verdict import Word
-from bayesplate.diagnosis.words import MERITS, VERDICTS, claim_sentence, meaning
 from bayesplate.results.tables import render
 
 KEYS = [

@@ -15,7 +15,7 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.board.sessions import shared_share
 from bayesplate.board.setup import DEFAULT_NOISE
 from bayesplate.frequencies.reading_errors import ReadingErrors
-from bayesplate.planning.beliefs import AtHand, Explanation
+from bayesplate.planning.beliefs import AtHand, Belief
 from bayesplate.planning.explained import _at_hand
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.modes_read import REPEATED, _expected, given_first
@@ -95,7 +95,7 @@ def read_as(taken):
     if taken is not None:
         every = np.r_[0, 1, taken]
         at_hand = AtHand(100.0 + every[None], 0.5 * every[None, :, None], every)
-    one = Explanation(
+    one = Belief(
         members=(), words="", probability=1.0, mean=np.zeros((1, 1)), covariance=np.eye(1)[None],
         noise=np.full((1, 2), FIRST), middle=np.zeros((1, 0)), wanted=np.zeros((1, 0, 1)), again=at_hand,
     )  # fmt: skip

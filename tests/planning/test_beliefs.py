@@ -11,8 +11,8 @@ import pytest
 
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.noise_grid import noise_grid
 from bayesplate.diagnosis.search import search
+from bayesplate.diagnosis.terms import noise_grid
 from bayesplate.planning.beliefs import Beliefs
 from bayesplate.planning.explained import asked, explanations_of, survivors
 from bayesplate.planning.gains import Readings, probabilities_after

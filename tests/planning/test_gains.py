@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bayesplate.board.material import MODULI, ORTHOTROPIC
-from bayesplate.planning.beliefs import Beliefs, Explanation
+from bayesplate.planning.beliefs import Belief, Beliefs
 from bayesplate.planning.gains import GOALS, Readings, expected_gain, probabilities_after, together
 
 SIGMA = 0.3
@@ -19,7 +19,7 @@ def explanation(mean=0.0, probability=1.0, variance=(4.0, 1.0, 0.25), n_terms=1,
     """The three constants themselves, normal about a mean of the first one."""
     means = np.zeros((n_terms, 3))
     means[:, 0] = mean
-    return Explanation(
+    return Belief(
         members=(words,), words=words, probability=probability, mean=means,
         covariance=np.tile(np.diag(variance), (n_terms, 1, 1)), noise=np.full((n_terms, 1), SIGMA),
         middle=np.zeros((n_terms, 3)), wanted=np.tile(np.eye(3), (n_terms, 1, 1)),

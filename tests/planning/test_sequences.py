@@ -8,12 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 
 from bayesplate.board.material import ORTHOTROPIC
-from bayesplate.planning.beliefs import Beliefs, Explanation
+from bayesplate.planning.beliefs import Belief, Beliefs
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.plan import ProposalEntry
 from bayesplate.planning.proposals import Planner, Proposal
 
-NOW = Explanation(
+NOW = Belief(
     members=(), words="made", probability=1.0, mean=np.zeros((1, 3)), covariance=np.eye(3)[None],
     noise=np.full((1, 1), 0.1), middle=np.zeros((1, 3)), wanted=np.eye(3)[None],
 )  # fmt: skip

@@ -17,12 +17,11 @@ from bayesplate.board.material import rigidities
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.sessions import unknown_discrepancies, with_discrepancies
-from bayesplate.planning.beliefs import KnownBoard
+from bayesplate.planning.beliefs import KnownBoard, prior_beliefs
 from bayesplate.planning.bench import bench_of
 from bayesplate.planning.laws import PLACED, SolvedStation, bare_law, known_mass
 from bayesplate.planning.modes_read import station_readings
 from bayesplate.planning.stations import new_stations, old_stations
-from bayesplate.planning.unmeasured import prior_beliefs
 
 FREE, CLAMPED = (dict.fromkeys(("x0", "x1", "y0", "y1"), word) for word in ("free", "clamped"))
 READ = ((1, 1), (2, 0), (2, 1), (0, 2))

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from bayesplate.campaign.checking import CampaignCheck
+from bayesplate.campaign.summary import CampaignCheck
 from bayesplate.commands.shown import show_campaign_check, show_check, show_modes
 from bayesplate.results.checking import CheckedEffect, CheckedMode, CheckedSetup, CheckReport
 from bayesplate.results.command_tables import check_tables, forward_table, methods_table, sheet_tables

@@ -47,11 +47,9 @@ ROOMS = {
 WITHIN = {
     "diagnosis": (
         ("baseline", "forms", "laws", "signatures", "shifts"),
-        ("noise_grid", "terms", "hypotheses", "search", "draws", "peaks", "joint", "sensitivity", "folds",
-         "null_control", "known"),
-        ("sizes", "verdict", "claim", "stated", "constants", "readings"),
-        ("candidates", "known_words", "result", "words", "told", "entries", "findings", "tables", "exports",
-         "notebook"),
+        ("terms", "hypotheses", "search", "draws", "peaks", "joint", "sensitivity", "folds", "null_control", "known"),
+        ("sizes", "verdict", "claim", "stated", "readings"),
+        ("known_words", "result", "words", "entries", "findings", "tables"),
     )
 }  # fmt: skip
 """Steps of a folder: the files of each see those of the same step and of the steps before, and every file is in one."""
@@ -267,8 +265,8 @@ BAD_FILES = [
     ),
     (
         "diagnosis/claim.py",
-        "import bayesplate.diagnosis.told",
-        "diagnosis.claim imports diagnosis.told",
+        "import bayesplate.diagnosis.words",
+        "diagnosis.claim imports diagnosis.words",
     ),
     (
         "diagnosis/__init__.py",

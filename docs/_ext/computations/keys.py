@@ -106,17 +106,45 @@ def _words(hint: object, held: list[type]) -> str:
 
 
 def _attributes(kind: type) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of attributes, from the docstrings of a type and of those it extends."""
+    """Unit and meaning of attributes: of a type and those it extends, from docstrings or comments beside the fields."""
     found: dict[str, tuple[str, str]] = {}
     for one in reversed(kind.__mro__):
-        text = inspect.cleandoc(one.__doc__ or "") if is_dataclass(one) else ""
-        _, _, listed = text.partition("Attributes\n----------\n")
-        for entry in re.findall(r"^(\w.*(?:\n[ \n].*)*)", listed, flags=re.MULTILINE):
-            head, *meaning = entry.splitlines()
-            names, _, typed = head.partition(" : ")
-            unit = typed.rpartition(", ")[2] if ", " in typed and '"' not in typed and "(" not in typed else ""
-            told = unit, " ".join(" ".join(meaning).split()).replace("None", "null")
-            found.update(dict.fromkeys((name.strip() for name in names.split(",")), told))
+        if is_dataclass(one):
+            found |= _commented(one)
+            _, _, listed = inspect.cleandoc(one.__doc__ or "").partition("Attributes\n----------\n")
+            for entry in re.findall(r"^(\w.*(?:\n[ \n].*)*)", listed, flags=re.MULTILINE):
+                head, *meaning = entry.splitlines()
+                names, _, typed = head.partition(" : ")
+                unit = typed.rpartition(", ")[2] if ", " in typed and '"' not in typed and "(" not in typed else ""
+                told = unit, " ".join(" ".join(meaning).split()).replace("None", "null")
+                found.update(dict.fromkeys((name.strip() for name in names.split(",")), told))
+    return found
+
+
+def _commented(kind: type) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of fields from the comments above or behind them: `# Pa, of the next board`.
+
+    One that begins with names of several fields is of all of them: `# q05, q95: ends of the interval`.
+    """
+    found: dict[str, tuple[str, str]] = {}
+    above: list[str] = []
+    for line in inspect.getsource(kind).splitlines():
+        code, _, behind = line.partition("#")
+        if behind and not code.strip():
+            above.append(behind.strip())
+            continue
+        field = re.match(r"    (\w+): ", code)
+        comment = behind.strip() or " ".join(above)
+        above = []
+        if field and comment:
+            named = re.match(r"(\w+(?:, \w+)+): ", comment)
+            names = named[1].split(", ") if named and field[1] in named[1].split(", ") else [field[1]]
+            comment = comment.removeprefix(named[0]) if named and len(names) > 1 else comment
+            unit = re.match(r"(Pa|SI|N m), ", comment)
+            meaning = comment.removeprefix(unit[0]) if unit else comment
+            first = meaning[0] if meaning.startswith(("ln ", "k-hat")) else meaning[0].upper()
+            told = unit[1] if unit else "", f"{first}{meaning[1:].removesuffix('.')}.".replace("None", "null")
+            found.update(dict.fromkeys(names, told))
     return found
 
 

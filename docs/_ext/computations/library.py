@@ -13,9 +13,8 @@ import bayesplate
 from bayesplate import errors
 from bayesplate.board.setup import CLAMPED_NOISE, DEFAULT_NOISE
 from bayesplate.board.shelf import card_names
-from bayesplate.campaign import diagnosis as of_campaigns
 from bayesplate.campaign import evidence, likelihood, population, scatter
-from bayesplate.campaign.agreement import p_value
+from bayesplate.campaign.claim import p_value
 from bayesplate.campaign.search import OF_TWO
 from bayesplate.campaign.search import PRIOR as WAYS_BEFORE
 from bayesplate.commands.prepare import prepare
@@ -30,7 +29,7 @@ from bayesplate.diagnosis.sizes import AT_LIMIT
 from bayesplate.diagnosis.verdict import CLEARLY, WITHIN
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import joined
-from bayesplate.planning import gains, places
+from bayesplate.planning import bench, gains
 from bayesplate.posterior.convergence import Gate
 from bayesplate.results import references as cited
 from computations.markdown import plain, table, words_table
@@ -220,7 +219,7 @@ def references(folder: Path) -> str:
 
 def planning_references(folder: Path) -> str:
     """What the plan rests on."""
-    return "\n".join(f"- {_unquoted(entry)}" for entry in (*gains.REFERENCES, *places.REFERENCES)) + "\n"
+    return "\n".join(f"- {_unquoted(entry)}" for entry in (*gains.REFERENCES, *bench.REFERENCES)) + "\n"
 
 
 def campaign_references(folder: Path) -> str:
@@ -306,8 +305,8 @@ def verdict_limits(folder: Path) -> str:
 def campaign_limits(folder: Path) -> str:
     """The limits of what a search of a campaign says, and what is believed before."""
     rows = [
-        ("least probability that nothing is lacking, for *none needed*", f"{of_campaigns.IMPROBABLE:g}"),
-        ("how many times as probable as the next, for *named*", f"{of_campaigns.CLEARLY:g}"),
+        ("least probability that nothing is lacking, for *none needed*", f"{IMPROBABLE:g}"),
+        ("how many times as probable as the next, for *named*", f"{CLEARLY:g}"),
         *((f"probability before: {_WAYS[way]}", f"{before:g}") for way, before in WAYS_BEFORE.items()),
         ("share of what is alike beforehand that is two effects, where the boards can show two", f"{OF_TWO:g}"),
     ]

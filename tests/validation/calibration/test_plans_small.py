@@ -9,7 +9,7 @@ import pytest
 from validation.calibration.plans import WAYS, bars, calibration, is_calibrated, settled, wrongly
 
 from bayesplate.board.material import ORTHOTROPIC
-from bayesplate.planning.beliefs import Beliefs, Explanation, entropy
+from bayesplate.planning.beliefs import Belief, Beliefs, entropy
 from bayesplate.planning.gains import Readings, expected_gain, probabilities_after
 
 N_BOARDS, N_TERMS = 120, 24
@@ -18,7 +18,7 @@ NOISE = 0.5
 
 def explanation(rng, members, probability):
     """Terms of an effect of unknown size: what it does to two further readings scatters."""
-    return Explanation(
+    return Belief(
         members=members, words="", probability=probability, mean=np.zeros((N_TERMS, 4)),
         covariance=np.tile(np.diag([1.0, 1.0, 1.0, 0.1]), (N_TERMS, 1, 1)), noise=np.full((N_TERMS, 1), NOISE),
         middle=np.zeros((N_TERMS, 3)), wanted=np.tile(np.eye(3, 4), (N_TERMS, 1, 1)),

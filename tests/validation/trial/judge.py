@@ -18,9 +18,9 @@ from validation.trial.shared import control_of, ground_of, shared_law
 
 from bayesplate.board.material import MODULI
 from bayesplate.diagnosis.claim import judge_claim, named_in_part, nested_of
-from bayesplate.diagnosis.constants import Constants, draw_constants
 from bayesplate.diagnosis.null_control import NullControl
 from bayesplate.diagnosis.search import Found, search
+from bayesplate.diagnosis.sensitivity import Constants, draw_constants
 from bayesplate.diagnosis.verdict import Verdict, alternatives, answers, decide
 from bayesplate.errors import BayesplateError
 

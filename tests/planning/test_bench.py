@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesplate.planning.places import placing
+from bayesplate.planning.bench import placing
 
 GRID = np.linspace(0.0, 1.0, 25)
 

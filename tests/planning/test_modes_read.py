@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.planning import shifts as home
-from bayesplate.planning.beliefs import Explanation, FormTerms
+from bayesplate.planning import modes_read as home
+from bayesplate.planning.beliefs import Belief, FormTerms
 
 N_TERMS = 12
 LINEAR, SQUARE = np.array([[0.02, -0.01], [0.003, 0.004]]), np.array([[0.001, 0.002], [-0.001, 0.0]])
@@ -30,7 +30,7 @@ def added(monkeypatch):
     prior = Quantity.from_mean(0.0, 1.0, "normal")
     parameters = tuple(SimpleNamespace(name=name, prior=prior) for name in "ab")
     form = FormTerms(np.arange(N_TERMS), None, ("made",) * 2, parameters, np.array([1, 2]))
-    one = Explanation(
+    one = Belief(
         members=("made",), words="", probability=1.0, mean=mean, covariance=np.tile(0.01 * np.eye(3), (N_TERMS, 1, 1)),
         noise=np.ones((N_TERMS, 1)), middle=np.zeros((N_TERMS, 0)), wanted=np.zeros((N_TERMS, 0, 3)), forms=(form,),
     )  # fmt: skip
@@ -70,7 +70,7 @@ def test_a_mode_that_is_lost_to_one_side_goes_on_straight_and_what_a_mass_adds_t
     prior = Quantity.from_mean(0.0, 1.0, "normal")
     form = FormTerms(np.arange(3), None, ("made",), (SimpleNamespace(name="a", prior=prior),), np.array([1]))
     mean = np.column_stack([np.zeros(3), [-0.5, 0.0, 0.5]])
-    one = Explanation(
+    one = Belief(
         members=("made",), words="", probability=1.0, mean=mean, covariance=np.tile(0.01 * np.eye(2), (3, 1, 1)),
         noise=np.ones((3, 1)), middle=np.zeros((3, 0)), wanted=np.zeros((3, 0, 2)), forms=(form,),
     )  # fmt: skip

@@ -10,7 +10,7 @@ import pytest
 from bayesplate.planning.gains import GOALS
 from bayesplate.planning.plan import ExplanationEntry, Gain, ProposalEntry
 from bayesplate.planning.proposals import Costs
-from bayesplate.planning.words import first_line, shared_words
+from bayesplate.planning.tables import first_line, shared_words
 
 
 def explained(words, *effects):
