@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import log_ndtr, ndtr, ndtri
 
+from bayesplate.arrays import Floats
+
 Kind = Literal["normal", "log-normal", "log-uniform"]
-Floats = NDArray[np.float64]
 _BETWEEN = math.nextafter(0.0, 1.0), math.nextafter(1.0, 0.0)
 _LOG_ROOT_TWO_PI = 0.5 * math.log(2.0 * math.pi)
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Floats = NDArray[np.float64]
+from bayesplate.arrays import Floats
 
 RIGIDITIES = ("D_x", "D_y", "D_s")
 MODULI = ("E_x", "E_y", "G_xy")

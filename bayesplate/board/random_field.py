@@ -14,11 +14,10 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial.legendre import legder, leggauss, legval
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.quantity import Quantity
 
-Floats = NDArray[np.float64]
 Degrees = tuple[tuple[int, int], ...]
 
 DEGREE = 6

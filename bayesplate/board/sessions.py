@@ -20,15 +20,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.parameter import Owner, Parameter, shown_name
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import DEFAULT_NOISE, Setup
 from bayesplate.labels import Label
-
-Floats = NDArray[np.float64]
 
 DISCREPANCY, OF_MODES = "discrepancy", "discrepancies of the modes"
 _SOURCE = "free boards, which no clamp disturbs, settle at 0.24-0.30 %"

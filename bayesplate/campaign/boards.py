@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.campaign.evidence import bridge_sampling
 from bayesplate.campaign.given import GivenShared
 from bayesplate.campaign.likelihood import LogDensity, SharedLikelihood, moments
@@ -20,8 +20,6 @@ from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains, SamplerSettings, sample
 from bayesplate.posterior.statistics import effective_draws, resampled
 from bayesplate.posterior.surrogate import Solved, Surrogate, n_terms, with_surrogate
-
-Floats = NDArray[np.float64]
 
 N_SOLVED = 2048
 """Draws of a walk, or taken to other shared parameters, at which the law itself is evaluated."""

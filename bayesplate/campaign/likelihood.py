@@ -23,9 +23,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.diagnosis.terms import log_sum, normalised
 
-Floats = NDArray[np.float64]
 LogDensity = Callable[[Floats], Floats]
 """From (n, n_shared) standard coordinates to (n,) logarithms of a density."""
 

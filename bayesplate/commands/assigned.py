@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.effects.attached_items import fractions_of
 from bayesplate.estimates.least_squares import weighted_least_squares
@@ -22,7 +23,6 @@ from bayesplate.posterior.first_labels import Way, guess_of
 if TYPE_CHECKING:
     from bayesplate.recordings.signals import Place
 
-Floats = NDArray[np.float64]
 
 _ABOVE = 1.16
 """Up to above the highest peak, somewhat more than the modes that a setup's model takes."""

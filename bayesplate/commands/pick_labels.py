@@ -12,8 +12,8 @@ from math import log
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Peak
 from bayesplate.commands.assigned import MostlyKnown
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from bayesplate.recordings.contract import PickedRow
     from bayesplate.recordings.picking import Picked
 
-Floats = NDArray[np.float64]
 
 MOST_PROPOSING = 12
 """Lowest peaks whose labels are proposed: higher ones lie where a thin plate is less and less like a real one."""

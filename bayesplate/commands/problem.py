@@ -11,6 +11,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.sessions import sessions
@@ -23,8 +24,6 @@ from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.target import Posterior
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.results.contract import JOINT
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.material import MODULI
 from bayesplate.grading.boards import BoardRow
 from bayesplate.grading.figures import FIGURES, LogFigure, box_probability, covariance_along, target_thickness
-
-Floats = NDArray[np.float64]
 
 MATCH_PERCENT = 10.0
 LEAST_PROBABILITY = 0.05
