@@ -31,7 +31,7 @@ def short(seed=1, max_steps=100, **changes):
 
 def test_a_run_four_times_as_long_as_the_gate_wants_ends_though_it_does_not_pass():
     """Better proposals than any sampler makes are asked for; what can be reached passes at the first look."""
-    wanted = {share: SamplerSettings(seed=3, gate=Gate(acceptance_min=share)) for share in (0.99, 0.15)}
+    wanted = {share: SamplerSettings(seed=3, max_steps=4000, gate=Gate(acceptance_min=share)) for share in (0.99, 0.15)}
     (never, refused), (soon, passed) = (sample(log_normal_density, MEAN, COVARIANCE, one) for one in wanted.values())
     assert not refused.passed
     assert passed.passed
