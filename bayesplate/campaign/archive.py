@@ -10,7 +10,7 @@ import numpy as np
 from bayesplate.campaign.learning import Learnt
 from bayesplate.campaign.together import values_of
 from bayesplate.posterior.inference import MOST_DRAWS_A_CHAIN
-from bayesplate.posterior.thinning import thin_walker_major
+from bayesplate.posterior.statistics import thin_walker_major
 from bayesplate.results.archive import DRAWN, tree_of
 
 

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import softmax
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.material import MODULI, RIGIDITIES, Moduli, moduli
 from bayesplate.board.prior import PriorCard
@@ -63,7 +63,7 @@ class Way:
     """
 
     board: Board
-    log_rigidities: NDArray[np.float64]
+    log_rigidities: Floats
     log_density: float
     log_density_unlike: float
 
@@ -94,8 +94,8 @@ class Proposed:
     """
 
     board: Board
-    rigidities: NDArray[np.float64] | None
-    spread: NDArray[np.float64]
+    rigidities: Floats | None
+    spread: Floats
 
 
 def propose_labels(board: Board, prior: PriorCard) -> Proposed:
@@ -207,14 +207,14 @@ def _deciding_label(first: Way, second: Way) -> str:
     return ""
 
 
-def _every_way(board: Board, guesses: Sequence[Guess]) -> list[tuple[Board, NDArray[np.float64]]]:
+def _every_way(board: Board, guesses: Sequence[Guess]) -> list[tuple[Board, Floats]]:
     """Labelled boards that come out of guesses of the constants, each once, and the rigidities that go with them."""
     tried: list[tuple[Setup, ...]] = []
     every = (_settled(board, guess, tried) for guess in guesses)
     return [one for one in every if one is not None]
 
 
-def _settled(board: Board, guess: Guess, tried: list[tuple[Setup, ...]]) -> tuple[Board, NDArray[np.float64]] | None:
+def _settled(board: Board, guess: Guess, tried: list[tuple[Setup, ...]]) -> tuple[Board, Floats] | None:
     """The labels that come out of a first guess of the constants, and the rigidities that go with them.
 
     None where they came up from another guess.
@@ -263,13 +263,13 @@ def _of_labelled(board: Board) -> Board:
     return replace(board, setups=tuple(setup for setup in board.setups if setup.readings))
 
 
-def _judged(found: Sequence[tuple[Board, NDArray[np.float64]]], prior: PriorCard) -> list[Way]:
+def _judged(found: Sequence[tuple[Board, Floats]], prior: PriorCard) -> list[Way]:
     """Labelled boards at their own estimates; without those that have too few labels for one."""
     enough = (one for one in found if sum(len(setup.readings) for setup in one[0].setups) >= one[0].symmetry.n)
     return [_way(board, prior, start) for board, start in enough]
 
 
-def _way(board: Board, prior: PriorCard, start: NDArray[np.float64]) -> Way:
+def _way(board: Board, prior: PriorCard, start: Floats) -> Way:
     """A labelled board at its own estimate and the noise that suits it best."""
     estimate = weighted_least_squares(_of_labelled(board), _STEPS, start)
     models = [setup_model(system_of(board, setup), estimate.values) for setup in board.setups]

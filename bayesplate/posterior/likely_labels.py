@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.estimates.identifiability import identifiability
 from bayesplate.estimates.labelling import LIKELY, with_labels
 from bayesplate.estimates.least_squares import weighted_least_squares
@@ -15,8 +15,6 @@ from bayesplate.frequencies.model import SetupModel
 from bayesplate.posterior.draws import Draws, named_draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.target import Posterior
-
-Floats = NDArray[np.float64]
 
 MOST_DRAWS_OF_LABELS = 2000
 """From which the probabilities of labels are taken."""
@@ -82,7 +80,7 @@ def labelled_by(inference: Inference, every_log_frequency: Sequence[Floats], noi
     return replace(inference, problem=again, surrogate=surrogate)
 
 
-def columns_of_each(before: Sequence[SetupModel], after: Sequence[SetupModel]) -> list[NDArray[np.intp]]:
+def columns_of_each(before: Sequence[SetupModel], after: Sequence[SetupModel]) -> list[Indices]:
     """Where the columns of each setup's model stood before it was labelled anew."""
     return [
         np.array([old.every_place.index(place) for place in new.every_place], dtype=np.intp)

@@ -18,8 +18,8 @@ from itertools import combinations, pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.estimates.refit import most_likely, normal_misfit, sensitivities
@@ -30,8 +30,6 @@ from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.frequencies.system import system_of
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.target import Posterior
-
-Floats = NDArray[np.float64]
 
 RARITY = 1000.0
 """A slip is told where the readings are this many times as probable with it as without."""

@@ -17,8 +17,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Indices
 from bayesplate.board.board import Board, Values
 from bayesplate.board.setup import Setup
 from bayesplate.frequencies.model import SetupModel
@@ -118,7 +118,7 @@ def _named_otherwise(model: SetupModel, values: Values) -> dict[int, Beams]:
     return found
 
 
-def _ranks(model: SetupModel, values: Values, least: float = 0.0) -> dict[Beams, NDArray[np.intp]]:
+def _ranks(model: SetupModel, values: Values, least: float = 0.0) -> dict[Beams, Indices]:
     """Rank in its class of the mode that each product of beam functions names, at those draws that are a plate."""
     assert model.exact is not None
     every = model.exact.reduced.ranks(model.system.weights(values), least)
