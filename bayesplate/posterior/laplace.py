@@ -60,13 +60,13 @@ def laplace_approximation(
     medians = np.array([setup.noise.median for setup in board.setups])
     noise = medians * noise_widenings(board, estimate.residuals)
     centre = parameters.theta(estimate.values, noise)
-    models = _with_peaks(estimate.models, estimate.values)
+    models = with_peaks(estimate.models, estimate.values)
     scales = reading_sd(board.setups, noise)
     if robust:
         rigidities, noise = highest_student(board, estimate)
         values = dict(estimate.values) | dict(zip(RIGIDITIES, rigidities, strict=True))
         centre = parameters.theta(values, noise)
-        models = _with_peaks([setup_model(model.system, values, model.plate) for model in models], values)
+        models = with_peaks([setup_model(model.system, values, model.plate) for model in models], values)
         scales = reading_sd(board.setups, noise)
         residuals = log_measured(board) - np.concatenate([m.log_frequencies(values, "linear")[0] for m in models])
         scales = scales / np.sqrt(student_weights(residuals / scales))
@@ -79,7 +79,7 @@ def laplace_approximation(
         centre, values = found, parameters.values_at(found)
         # Named once, where the rough law led: at a veering names would lead back and forth between two places.
         made = [setup_model(model.system, values, model.plate, model if k else None) for model in models]
-        models = _with_peaks(made, values)
+        models = with_peaks(made, values)
         covariance = _covariance(board, models, scales, centre, spread)
         models = exact_models(board, models, centre, covariance)
         noise = np.exp(parameters.log_noise(centre[None])[0])
@@ -127,7 +127,7 @@ def _no_plate(board: Board, models: Sequence[SetupModel], values: Values) -> str
     )
 
 
-def _with_peaks(models: Iterable[SetupModel], values: Values) -> tuple[SetupModel, ...]:
+def with_peaks(models: Iterable[SetupModel], values: Values) -> tuple[SetupModel, ...]:
     """The models, with all modes that peaks may be where a setup has such peaks."""
     return tuple(with_others(model, values) if takes_part(model.setup) else model for model in models)
 

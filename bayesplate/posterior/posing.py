@@ -83,9 +83,8 @@ class PosedProblem:
 
     @property
     def log_widening(self) -> float:
-        """ln of the noise at the centre over the median of its prior, of the setup where that is most."""
-        medians = np.array([setup.noise.median for setup in self.board.setups])
-        return float(np.max(self.parameters.log_noise(self.centre[None])[0] - np.log(medians)))
+        """ln of the noise at the centre over the median of its prior, in the setup where that is largest."""
+        return self.parameters.log_widening(self.centre)
 
     def under(self, law: LawName) -> PosedProblem:
         """The same problem under the law of that name."""

@@ -1,4 +1,4 @@
-"""What to doubt about readings before anything is sampled: an octave, a decimal place, exchanged labels, much scatter.
+"""Doubts about readings before anything is sampled: an octave, a decimal place, exchanged labels, much scatter.
 
 A reading is compared with what the others predict for it, a Student distribution: the plate is fitted without it, and
 the scatter of the others tells the noise, to which the prior of the noise adds no more than one reading would, because
@@ -32,12 +32,12 @@ from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.target import Posterior
 
 RARITY = 1000.0
-"""A slip is told where the readings are this many times as probable with it as without."""
+"""A slip is reported where the readings are this many times as probable with it as without."""
 FEWEST_TO_SPARE = 2
 """Readings beyond as many as there are constants that it takes to see a slip in one of them."""
 LARGE_NOISE, LARGE_NOISE_SDS = 3.0, 3.0
-"""Noise that the residuals want, over the median of its prior, and in standard deviations of its logarithm, beyond
-which the reader is told."""
+"""Noise of the residuals over the median of its prior, and in standard deviations of its logarithm, beyond which a
+remark is made."""
 
 OCTAVES, DECIMALS = (2.0, 0.5), (10.0, 0.1)
 _ANYWHERE = np.log(16.0)
@@ -53,24 +53,12 @@ _LOG_MILLION = np.log(1e6)
 
 @dataclass(frozen=True)
 class Slip:
-    """A slip, and how much better the readings fit with it.
+    """A slip, and how much better the readings fit with it."""
 
-    Attributes
-    ----------
-    readings : tuple of int
-        Position of the reading, or of the two that are exchanged.
-    factor : float
-        What the reading is, over what it should be; 1 where it is of something else, or two are exchanged.
-    log_odds : float
-        ln of how many times as probable the readings are with it.
-    gap : float
-        ln of the reading over what the others predict for it.
-    """
-
-    readings: tuple[int, ...]
-    factor: float = 1.0
-    log_odds: float = 0.0
-    gap: float = 0.0
+    readings: tuple[int, ...]  # position of the reading, or of the two that are exchanged
+    factor: float = 1.0  # of the reading over its right value; 1 where it is of something else, or two are exchanged
+    log_odds: float = 0.0  # ln of the probability of the readings with the slip over that without
+    gap: float = 0.0  # ln of the reading over the prediction of the others
 
     @property
     def is_exchange(self) -> bool:
@@ -79,31 +67,14 @@ class Slip:
 
 
 class Remarks(NamedTuple):
-    """What a reader of the constants must know of the readings, a sentence each.
+    """Sentences about the readings that a reader of the constants needs."""
 
-    Attributes
-    ----------
-    slips : tuple of str
-        The likeliest slip, if one explains the readings.
-    others : tuple of str
-        Otherwise the two readings whose order is least like the plate's, unless no plate fits; and whether the noise
-        that the residuals want is far above its prior.
-    """
-
-    slips: tuple[str, ...]
-    others: tuple[str, ...]
+    slips: tuple[str, ...]  # the likeliest slip, if one explains the readings
+    others: tuple[str, ...]  # otherwise two readings in the wrong order, if a plate fits; a noise far above its prior
 
 
 def reading_remarks(posterior: Posterior, centre: Floats) -> Remarks:
-    """What is to be said of the readings of a posterior.
-
-    Parameters
-    ----------
-    posterior : Posterior
-        Its models hold the exact law.
-    centre : (n_dim,) array
-        Where the readings are most likely.
-    """
+    """Remarks on the readings of a posterior, whose models hold the exact law, at its (n_dim,) centre."""
     readings = Readings(posterior, centre)
     is_lost = is_too_wide(posterior.board, readings.log_widening)
     noise = noise_remarks(posterior.board, readings.log_widening)
@@ -115,15 +86,7 @@ def reading_remarks(posterior: Posterior, centre: Floats) -> Remarks:
 
 
 class Readings:
-    """The readings of a posterior, and what some of them lead to expect of the others.
-
-    Parameters
-    ----------
-    posterior : Posterior
-        Its models hold the exact law.
-    centre : (n_dim,) array
-        Where they are most likely.
-    """
+    """The readings of a posterior, and the predictions of some of them for the others."""
 
     def __init__(self, posterior: Posterior, centre: Floats) -> None:
         self.board, self.is_robust = posterior.board, posterior.robust
@@ -137,9 +100,9 @@ class Readings:
             self._whole = self._refitted(self._whole, ())
         self._starts = [self._whole]
         self.log_widening = 0.5 * float(np.log(self._whole.variance(())[0]))
-        """ln of the noise that the residuals want, over the median of its prior."""
-        if self.is_robust:  # which a reading far off does not widen
-            self.log_widening = float(np.max(self._parameters.log_noise(centre[None])[0] - np.log(self._medians)))
+        """ln of the noise of the residuals over the median of its prior."""
+        if self.is_robust:  # a reading far off does not widen it
+            self.log_widening = self._parameters.log_widening(centre)
 
     @property
     def rms_cents(self) -> float:
@@ -149,11 +112,8 @@ class Readings:
     def likeliest(self, anywhere: bool = False) -> Slip | None:
         """The slip that explains the readings best, if it does so far better than noise.
 
-        Parameters
-        ----------
-        anywhere : bool
-            Whether the plate may be quite another one than the readings as they are lead to: then fits begin as well
-            where least squares without each reading lead.
+        `anywhere` if the plate may be quite another one than that of all readings: then fits begin as well where least
+        squares without each reading lead.
         """
         n = self.target.size
         if n < self._parameters.n_constants + FEWEST_TO_SPARE:
@@ -191,7 +151,7 @@ class Readings:
         return [pair for first, last in pairwise(ends.tolist()) for pair in combinations(range(first, last), 2)]
 
     def _of_one(self, i: int) -> list[Slip]:
-        """What may be wrong with one reading."""
+        """Possible slips of one reading."""
         fit = self._without((i,))
         if fit is None:
             return []
@@ -202,7 +162,7 @@ class Readings:
         return [stray, *(Slip((i,), factor, one - as_read, gap) for factor, one in zip(factors, off, strict=True))]
 
     def _of_pairs(self, pairs: Sequence[tuple[int, int]]) -> list[Slip]:
-        """Exchanges, with their odds."""
+        """Exchanges of two readings each."""
         found = []
         for i, j in pairs:
             fit = self._without((i, j))
@@ -284,12 +244,9 @@ def _rms_cents(residuals: Floats) -> float:
 
 
 def noise_remarks(board: Board, log_widening: float) -> tuple[str, ...]:
-    """That the readings scatter far more than the prior of the noise lets expect, if they do; a sentence.
+    """A sentence if the readings scatter far more than the prior of the noise expects.
 
-    Parameters
-    ----------
-    log_widening : float
-        ln of the noise that the residuals want, over the median of its prior.
+    `log_widening` is ln of the noise of the residuals over the median of its prior.
     """
     if not is_too_wide(board, log_widening):
         return ()
