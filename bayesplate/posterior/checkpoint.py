@@ -84,7 +84,7 @@ class Checkpoint:
             self.folder.rmdir()
 
     def error(self, what: str) -> CheckpointError:
-        """That the checkpoint cannot be used, and what to do."""
+        """The error of a checkpoint that cannot be used, and its remedy."""
         return CheckpointError(f"{self.folder}: {what}; start anew with --force, or give another --out")
 
 

@@ -19,7 +19,7 @@ _TARGET_TAUS = 100  # what a suggestion aims at: twice the least, so that the ne
 
 @dataclass(frozen=True)
 class Gate:
-    """What the draws must satisfy before any constant is printed.
+    """Limits that the draws must keep before any constant is printed.
 
     Acceptance has no upper limit: good independent proposals are all accepted, and steps that are too short fail by
     their autocorrelation time.

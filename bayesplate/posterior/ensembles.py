@@ -72,7 +72,7 @@ class Ensembles:
 
     @property
     def snapshot(self) -> Snapshot:
-        """Where the run stands."""
+        """State of the run."""
         states = [one.random_state for one in self._backends]
         return Snapshot(tuple(self._backends), states, self.n_steps)
 

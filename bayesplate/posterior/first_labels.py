@@ -44,7 +44,7 @@ _UNUSUAL = 0.02
 POSSIBLE = 0.02
 """Probability of another answer from which on it is an error to choose one."""
 UNLIKE = 0.01
-"""Relative: by how much a plate may miss its own modes, for what it lacks; answers are told apart at no less noise."""
+"""Relative error of a plate's own modes for an effect it lacks; answers are compared at no smaller noise."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,23 +51,20 @@ def laplace_approximation(
     """Locate the posterior of a board.
 
     The rigidities have the covariance of the weighted fit, widened where the residuals exceed the expected noise as
-    far as its prior lets them; noise has its prior's. Where inputs are uncertain the fit may move them, which tells the
-    noise anew, and the models are made anew at the point it finds, until they find it themselves: a rough law, or names
+    far as its prior lets them; noise has its prior's. Where inputs are uncertain the fit may move them, which changes
+    the noise, and the models are made anew at the point it finds, until they find it themselves: a rough law, or names
     that modes exchange at a veering, may have led astray. Under Student's errors a reading far off weighs little.
     `spread` is a further covariance of ln D: between several ways to take peaks for modes.
     """
     parameters = Parameters(board)
     medians = np.array([setup.noise.median for setup in board.setups])
-    noise = medians * noise_widenings(board, estimate.residuals)
-    centre = parameters.theta(estimate.values, noise)
-    models = with_peaks(estimate.models, estimate.values)
-    scales = reading_sd(board.setups, noise)
+    noise, values, made = medians * noise_widenings(board, estimate.residuals), dict(estimate.values), estimate.models
     if robust:
         rigidities, noise = highest_student(board, estimate)
-        values = dict(estimate.values) | dict(zip(RIGIDITIES, rigidities, strict=True))
-        centre = parameters.theta(values, noise)
-        models = with_peaks([setup_model(model.system, values, model.plate) for model in models], values)
-        scales = reading_sd(board.setups, noise)
+        values |= dict(zip(RIGIDITIES, rigidities, strict=True))
+        made = tuple(setup_model(model.system, values, model.plate) for model in made)
+    centre, models, scales = parameters.theta(values, noise), with_peaks(made, values), reading_sd(board.setups, noise)
+    if robust:
         residuals = log_measured(board) - np.concatenate([m.log_frequencies(values, "linear")[0] for m in models])
         scales = scales / np.sqrt(student_weights(residuals / scales))
     covariance = _covariance(board, models, scales, centre, spread)
@@ -78,7 +75,7 @@ def laplace_approximation(
     for k in range(_MOST_PLACES):
         centre, values = found, parameters.values_at(found)
         # Named once, where the rough law led: at a veering names would lead back and forth between two places.
-        made = [setup_model(model.system, values, model.plate, model if k else None) for model in models]
+        made = tuple(setup_model(model.system, values, model.plate, model if k else None) for model in models)
         models = with_peaks(made, values)
         covariance = _covariance(board, models, scales, centre, spread)
         models = exact_models(board, models, centre, covariance)

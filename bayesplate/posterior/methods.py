@@ -38,16 +38,14 @@ def point_methods(problem: PosedProblem, system: PaperSystem, expected_sd: Mappi
     The last is left out where there are too many modes, or none of its estimates is positive. `expected_sd` is the
     relative standard deviation of the weighted estimate of each modulus.
     """
-    nominal = problem.board.nominal()
-    paper = system.solve()
-    estimate = problem.estimate
+    nominal, estimate, paper = problem.board.nominal(), problem.estimate, system.solve()
     D_x, D_y, D_s = estimate.rigidities
     weighted = _named(moduli(D_x, D_y, D_s, estimate.values["thickness"], estimate.values["poisson_xy"]))
     methods = [
         Method(
             "paper_least_squares",
             _named(system.moduli(paper)),
-            misses(problem, {**nominal, **_rigidities(paper)}),
+            misses(problem, nominal | dict(zip(RIGIDITIES, paper, strict=True))),
             condition_number=system.condition_number,
         ),
         Method(
@@ -61,12 +59,12 @@ def point_methods(problem: PosedProblem, system: PaperSystem, expected_sd: Mappi
     percentile = percentile_estimate(system)
     if percentile is not None and all(np.isfinite(percentile.mean[name]) for name in MODULI):
         E_x, E_y, G_xy = (percentile.mean[name] for name in MODULI)
-        constants = np.array(rigidities(E_x, E_y, G_xy, nominal["thickness"], nominal["poisson_xy"]))
+        constants = rigidities(E_x, E_y, G_xy, nominal["thickness"], nominal["poisson_xy"])
         methods.append(
             Method(
                 "percentile",
                 percentile.mean,
-                misses(problem, {**nominal, **_rigidities(constants)}),
+                misses(problem, nominal | constants._asdict()),
                 sd=percentile.sd,
                 n_subsets=percentile.n_subsets,
             )
@@ -101,7 +99,3 @@ def misses(problem: PosedProblem, values: Values) -> Floats:
 
 def _named(constants: tuple[Floats, ...]) -> dict[str, float]:
     return {name: float(value) for name, value in zip(MODULI, constants, strict=True)}
-
-
-def _rigidities(constants: Floats) -> dict[str, Floats]:
-    return {name: np.asarray(value) for name, value in zip(RIGIDITIES, constants, strict=True)}

@@ -1,4 +1,4 @@
-"""Where Student's likelihood is highest: at constants that most readings agree on, whatever one of them says.
+"""The highest point of Student's likelihood: constants that most readings agree on, whatever one of them is.
 
 Under normal errors one wrong reading pulls the constants after it. Under Student's they have a second peak, where the
 noise is small and that reading lies far off; a sampler that starts at the first one does not find it. Both are sought

@@ -1,7 +1,7 @@
 """Doubts about readings before anything is sampled: an octave, a decimal place, exchanged labels, much scatter.
 
 A reading is compared with what the others predict for it, a Student distribution: the plate is fitted without it, and
-the scatter of the others tells the noise, to which the prior of the noise adds no more than one reading would, because
+the scatter of the others gives the noise, to which the prior of the noise adds no more than one reading would, because
 an effect that the plate lacks looks like noise. A slip is a hypothesis about one reading, or two that stand for each
 other; its odds are the predictive density of what would have been read, over that of what was.
 
@@ -43,7 +43,7 @@ OCTAVES, DECIMALS = (2.0, 0.5), (10.0, 0.1)
 _ANYWHERE = np.log(16.0)
 """Width in ln f over which a reading of something else may lie: two octaves either way."""
 _READINGS_OF_PRIOR = 1.0
-"""How many readings the prior of the noise counts for."""
+"""Number of readings that the prior of the noise counts for."""
 _OPEN = 1e-6
 """Sensitivity of ln f to the logarithm of a constant, in its best combination of readings, below which it is open."""
 _STEPS, _NEAR = 15, 0.01
@@ -128,9 +128,8 @@ class Readings:
     def disordered(self) -> Slip | None:
         """The two readings in the other order than the modes of the fitted plate that are likeliest exchanged."""
         predicted = self.target - self._whole.residuals
-        pairs = [
-            (i, j) for i, j in self._pairs() if (self.target[i] - self.target[j]) * (predicted[i] - predicted[j]) < 0.0
-        ]
+        apart = np.subtract.outer(self.target, self.target) * np.subtract.outer(predicted, predicted)
+        pairs = [pair for pair in self._pairs() if apart[pair] < 0.0]
         return max(self._of_pairs(pairs), key=lambda one: one.log_odds, default=None)
 
     def exchanged_rms_cents(self, slip: Slip) -> float:
@@ -152,11 +151,10 @@ class Readings:
 
     def _of_one(self, i: int) -> list[Slip]:
         """Possible slips of one reading."""
-        fit = self._without((i,))
+        fit, factors = self._without((i,)), (*OCTAVES, *DECIMALS)
         if fit is None:
             return []
         gap = float(fit.residuals[i])
-        factors = (*OCTAVES, *DECIMALS)
         as_read, *off = fit.log_predictive((i,), np.array([[gap], *([gap - np.log(factor)] for factor in factors)]))
         stray = Slip((i,), 1.0, -np.log(_ANYWHERE) - as_read, gap)
         return [stray, *(Slip((i,), factor, one - as_read, gap) for factor, one in zip(factors, off, strict=True))]
@@ -185,7 +183,7 @@ class Readings:
         return _Fit(start.predict, x, self.target, self._scales)
 
     def _elsewhere(self, left_out: int) -> _Fit | None:
-        """Where least squares without a reading lead from a start of their own; None if to no plate at all."""
+        """Fit by least squares without a reading, from a start of their own; None if it is no plate."""
         at, setups = 0, []
         for setup in self.board.setups:
             kept = tuple(one for i, one in enumerate(setup.readings, start=at) if i != left_out)
@@ -297,7 +295,7 @@ def _disorder(readings: Readings, slip: Slip) -> str:
 
 
 def times(log_odds: float) -> str:
-    """How many times as probable, in words; from the logarithm."""
+    """A ratio of probabilities in words, from its logarithm."""
     if log_odds > _LOG_MILLION:
         return "more than a million times"
     odds = float(np.exp(log_odds))

@@ -1,4 +1,4 @@
-"""Where the walkers start: three standard errors around the estimate, on points that the posterior allows.
+"""Starts of the walkers: three standard errors around the estimate, on points that the posterior allows.
 
 Ensembles that agree after starting so far apart have forgotten where they came from.
 """

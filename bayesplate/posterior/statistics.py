@@ -49,7 +49,7 @@ def rhat(chains: Floats) -> Floats:
 
 def effective_sizes(chains: Floats) -> Floats:
     """The smaller of bulk and tail effective size of (n_chains, n_draws, n_dim) draws: (n_dim,) array."""
-    tails = (0.05, 0.95)  # which 1.x wants to be told
+    tails = (0.05, 0.95)  # 1.x needs them as an argument
     return _of_each(chains, lambda arviz, one: min(arviz.ess(one), arviz.ess(one, method="tail", prob=tails)))
 
 

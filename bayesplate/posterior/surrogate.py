@@ -144,7 +144,7 @@ def _factors(order: int, n: int) -> Indices:
 
 
 def n_terms(n_parameters: int, along_bent: Mapping[int, int] = ALONG_BENT) -> int:
-    """How many coefficients a surrogate has for each mode."""
+    """Number of coefficients of a surrogate for each mode."""
     orders = {0: n_parameters, 1: n_parameters, 2: n_parameters, **along_bent}
     return sum(len(_factors(order, min(n, n_parameters))) for order, n in orders.items())
 

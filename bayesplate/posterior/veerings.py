@@ -14,7 +14,8 @@ then it contradicts the labels that it rests on, and the report says so.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -110,12 +111,9 @@ def _ranks(model: SetupModel, values: Values, least: float = 0.0) -> dict[Beams,
     return {beams: one[is_plate] for beams, one in every.items()}
 
 
-@dataclass(frozen=True)
-class _Doubt:
-    """How sure a label is, the share of plates that agree with the estimate, and whose shapes its mode may have."""
-
-    confidence: float
-    others: tuple[Beams, ...]
+class _Doubt(NamedTuple):
+    confidence: float  # of a label: the share of plates that agree with the estimate
+    others: tuple[Beams, ...]  # whose shapes its mode may have
 
 
 def _doubts(model: SetupModel, values: Values) -> dict[Beams, _Doubt]:
