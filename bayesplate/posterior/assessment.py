@@ -104,7 +104,7 @@ def labels_contradicted(posterior: Posterior, draws: Draws) -> tuple[str, ...]:
 
 
 def _surrogate_errors(inference: Inference, draws: Draws) -> Floats:
-    exact = np.concatenate([each.reshape(-1, each.shape[-1]) for each in draws.every_log_frequency], axis=1)
+    exact = np.concatenate(draws.flat_log_frequency, axis=1)
     if inference.surrogate is None:
         return exact[:0]
     return np.asarray(cents(inference.surrogate.log_frequencies(draws.flat) - exact))

@@ -37,6 +37,11 @@ class Draws:
         return self.theta.reshape(-1, self.theta.shape[-1])
 
     @property
+    def flat_log_frequency(self) -> list[Floats]:
+        """ln f (Hz) of all modes at `flat`: one (n, n_every) array per setup."""
+        return [each.reshape(-1, each.shape[-1]) for each in self.every_log_frequency]
+
+    @property
     def median_noise(self) -> Floats:
         """Posterior median of the relative noise of each setup: (n_setups,) array."""
         return np.asarray(np.median(self.noise.reshape(-1, self.noise.shape[-1]), axis=0))

@@ -24,7 +24,7 @@ def with_likely_labels(inference: Inference, seed: int) -> tuple[Inference, Draw
     """
     draws = named_draws(inference, seed)
     problem, before = inference.problem, inference.problem.posterior
-    every_log_frequency = [each.reshape(-1, each.shape[-1]) for each in draws.every_log_frequency]
+    every_log_frequency = draws.flat_log_frequency
     step = max(1, len(draws.flat) // MOST_DRAWS_OF_LABELS)
     noise = draws.noise.reshape(len(draws.flat), -1)[::step]
     setups = []

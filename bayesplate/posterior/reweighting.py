@@ -16,22 +16,17 @@ FEWEST_WEIGHTED_DRAWS = 200
 _N_LINEARISATION = 2000
 
 
-def means_under(
-    inference: Inference, draws: Draws, law: LawName, errors: Floats | None = None
-) -> tuple[dict[str, float], float]:
+def means_under(inference: Inference, draws: Draws, law: LawName, errors: Floats) -> tuple[dict[str, float], float]:
     """Posterior means of the constants under a law, by weighting the draws of the fit.
 
     The exact law is dear: draws of the linear one are weighted at those draws only at which `linearisation` compared
-    the two (their `errors`, if known), and the shift of their mean is added to the mean of all. Where these leave
+    the two, with these `errors`, and the shift of their mean is added to the mean of all. Where these leave
     few, all are weighted. Means of E_x, E_y, G_xy (Pa), D_x, D_y, D_s (N m), and the effective number of draws.
     """
     constants = {name: values.ravel() for name, values in {**draws.moduli, **draws.rigidities}.items()}
     if law == "exact" != inference.problem.posterior.law:
-        every = _every(draws)
-        errors = linearisation(inference, draws) if errors is None else errors
-        linear = [each.reshape(-1, each.shape[-1])[::every] for each in draws.every_log_frequency]
-        exact = np.concatenate(linear, axis=1) - errors / cents(np.ones(1))
-        posterior = inference.problem.posterior
+        every, posterior = _every(draws), inference.problem.posterior
+        exact = np.concatenate(draws.flat_log_frequency, axis=1)[::every] - errors / cents(np.ones(1))
         log_likelihood = posterior.log_likelihood_of(posterior.by_setup(exact), draws.flat[::every])
         weights = _weights(log_likelihood, draws, every)
         if effective_draws(weights) >= FEWEST_WEIGHTED_DRAWS:
@@ -67,11 +62,10 @@ def linearisation(inference: Inference, draws: Draws) -> Floats:
 
     The draws know what their own law gives; the other one is evaluated.
     """
-    every, law = _every(draws), inference.problem.posterior.law
-    own = [each.reshape(-1, each.shape[-1])[::every] for each in draws.every_log_frequency]
-    other: LawName = "linear" if law == "exact" else "exact"
+    every = _every(draws)
+    other: LawName = "linear" if inference.problem.posterior.law == "exact" else "exact"
     there = inference.problem.under(other).posterior.every_log_frequency(draws.flat[::every])
-    apart = np.concatenate(there, axis=1) - np.concatenate(own, axis=1)
+    apart = np.concatenate(there, axis=1) - np.concatenate(draws.flat_log_frequency, axis=1)[::every]
     return cents(apart if other == "linear" else -apart)
 
 

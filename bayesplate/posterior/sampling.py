@@ -18,7 +18,6 @@ from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.convergence import (
     Convergence,
     Gate,
-    acceptance_by_walker,
     assess,
     burn_in_steps,
     length_in_taus,
@@ -75,11 +74,6 @@ class Chains:
     def pooled(self) -> Floats:
         """Draws after burn-in of all ensembles together, (n_draws, n_dim)."""
         return self.kept.reshape(-1, self.draws.shape[-1])
-
-    @property
-    def accepted(self) -> Floats:
-        """Accepted fraction of every walker's kept steps, (n_ensembles, n_walkers)."""
-        return acceptance_by_walker(self.kept)
 
 
 @dataclass(frozen=True)

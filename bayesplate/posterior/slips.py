@@ -60,11 +60,6 @@ class Slip:
     log_odds: float = 0.0  # ln of the probability of the readings with the slip over that without
     gap: float = 0.0  # ln of the reading over the prediction of the others
 
-    @property
-    def is_exchange(self) -> bool:
-        """Whether two readings stand for each other."""
-        return len(self.readings) == 2
-
 
 class Remarks(NamedTuple):
     """Sentences about the readings that a reader of the constants needs."""
@@ -80,7 +75,7 @@ def reading_remarks(posterior: Posterior, centre: Floats) -> Remarks:
     noise = noise_remarks(posterior.board, readings.log_widening)
     slip = readings.likeliest(anywhere=is_lost)
     if slip is not None:
-        return Remarks((_exchange(readings, slip) if slip.is_exchange else _stray(readings, slip),), noise)
+        return Remarks((_exchange(readings, slip) if len(slip.readings) == 2 else _stray(readings, slip),), noise)
     pair = None if is_lost else readings.disordered()
     return Remarks((), noise if pair is None else (_disorder(readings, pair), *noise))
 
@@ -103,11 +98,6 @@ class Readings:
         """ln of the noise of the residuals over the median of its prior."""
         if self.is_robust:  # a reading far off does not widen it
             self.log_widening = self._parameters.log_widening(centre)
-
-    @property
-    def rms_cents(self) -> float:
-        """Of the residuals of all readings."""
-        return _rms_cents(self._whole.residuals)
 
     def likeliest(self, anywhere: bool = False) -> Slip | None:
         """The slip that explains the readings best, if it does so far better than noise.
@@ -132,9 +122,9 @@ class Readings:
         pairs = [pair for pair in self._pairs() if apart[pair] < 0.0]
         return max(self._of_pairs(pairs), key=lambda one: one.log_odds, default=None)
 
-    def exchanged_rms_cents(self, slip: Slip) -> float:
-        """Of the residuals once two readings have each other's label."""
-        one, other = slip.readings
+    def rms_cents(self, exchange: Slip) -> tuple[float, float]:
+        """Root mean square of the residuals, before and after two readings exchange their labels."""
+        one, other = exchange.readings
         frequencies = [reading.frequency for setup in self.board.setups for reading in setup.readings]
         frequencies[one], frequencies[other] = frequencies[other], frequencies[one]
         rest = iter(frequencies)
@@ -142,7 +132,9 @@ class Readings:
             replace(setup, readings=tuple(replace(one, frequency=next(rest)) for one in setup.readings))
             for setup in self.board.setups
         )
-        return _rms_cents(weighted_least_squares(replace(self.board, setups=setups)).residuals)
+        after = weighted_least_squares(replace(self.board, setups=setups)).residuals
+        before, after = (np.sqrt(np.mean(residuals**2)) for residuals in (self._whole.residuals, after))
+        return float(cents(before)), float(cents(after))
 
     def _pairs(self) -> list[tuple[int, int]]:
         """Two readings of one setup each."""
@@ -237,10 +229,6 @@ class _Fit:
         return np.atleast_1d(multivariate_t(np.zeros(len(here)), variance * spread, df=spare).logpdf(gaps))
 
 
-def _rms_cents(residuals: Floats) -> float:
-    return float(cents(np.sqrt(np.mean(residuals**2))))
-
-
 def noise_remarks(board: Board, log_widening: float) -> tuple[str, ...]:
     """A sentence if the readings scatter far more than the prior of the noise expects.
 
@@ -279,7 +267,7 @@ def _stray(readings: Readings, slip: Slip) -> str:
 
 
 def _exchange(readings: Readings, slip: Slip) -> str:
-    before, after = readings.rms_cents, readings.exchanged_rms_cents(slip)
+    before, after = readings.rms_cents(slip)
     return (
         f"{_pair(readings, slip)} fit far better exchanged, {after:.1f} cents rms in place of {before:.1f} "
         f"({times(slip.log_odds)} as probable): have they each other's label?"
