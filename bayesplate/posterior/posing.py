@@ -121,11 +121,12 @@ def _posed(proposed: Proposed, prior: PriorCard, law: LawName | None, robust: bo
     sensitivities = np.concatenate([model.sensitivities(there) for model in models])
     # At the centre of the posterior modes may stand in another order than at the estimate.
     require_identifiable(board, identifiability(sensitivities, estimate.scales, board.symmetry))
-    if law is None:
+    serving = law
+    if serving is None:
         errors = linearisation_errors(board, models, _plausible(board, centre, covariance))
         medians = [setup.noise.median for setup in board.setups]
         is_linear = linear_suffices([len(model.every_place) for model in models], errors, medians)
-    serving: LawName = law or ("linear" if is_linear else "exact")
+        serving = "linear" if is_linear else "exact"
     posterior = Posterior(board, prior, models, serving, robust)
     _require_reachable(posterior, centre, covariance)
     require_possible_noise(posterior, centre)

@@ -54,7 +54,7 @@ def effective_sizes(chains: Floats) -> Floats:
 
 
 def smoothed(log_weights: Floats) -> tuple[Floats, float]:
-    """Pareto-smoothed importance weights that sum to 1, and the k-hat of their tail; ln 0 where a draw has none."""
+    """Pareto-smoothed importance weights that sum to 1, and the k-hat of their tail; -inf for a draw without weight."""
     arviz = load_arviz()
     if hasattr(arviz, "psislw"):
         log_smoothed, k = arviz.psislw(log_weights)
