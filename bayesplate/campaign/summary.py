@@ -19,7 +19,7 @@ from bayesplate.campaign.together import FEWEST_POINTS, values_of
 from bayesplate.effects.words import joined
 from bayesplate.posterior.inference import MOST_DRAWS_A_CHAIN
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
-from bayesplate.posterior.thinning import thin_walker_major
+from bayesplate.posterior.statistics import thin_walker_major
 from bayesplate.results.archive import DRAWN, sample_stats, tree_of
 from bayesplate.results.checking import CheckReport
 from bayesplate.results.contract import Elastic, Spread

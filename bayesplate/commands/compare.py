@@ -20,11 +20,11 @@ from bayesplate.estimates.leave_one_out import CarryingMode, united
 from bayesplate.estimates.paper import paper_system
 from bayesplate.files import make_folder, require_new, write_text
 from bayesplate.frequencies.laws import LawName
+from bayesplate.posterior.assessment import carried_in_fit, mode_errors
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference, infer
 from bayesplate.posterior.likely_labels import with_likely_labels
 from bayesplate.posterior.methods import Method, point_methods, posterior_method
-from bayesplate.posterior.mode_errors import carried_in_fit, mode_errors
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.reweighting import law_weights
 from bayesplate.posterior.sampling import SamplerSettings

@@ -1,4 +1,4 @@
-"""What a fit is judged by besides its draws: errors, leverages, both frequency laws, spectra and doubts."""
+"""Assessment of a fit besides its draws: errors, leverages, both frequency laws, spectra and doubts."""
 
 from __future__ import annotations
 
@@ -7,71 +7,44 @@ from dataclasses import dataclass
 from typing import get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesplate.estimates.leave_one_out import CarryingMode
+from bayesplate.arrays import Floats
+from bayesplate.board.sessions import same_modes
+from bayesplate.estimates.least_squares import log_measured
+from bayesplate.estimates.leave_one_out import CarryingMode, Errors, carrying_modes, prediction_errors
+from bayesplate.estimates.refit import deviance_misfit
 from bayesplate.frequencies.laws import LawName, cents
+from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.frequencies.spectrum import doubtful_labels, sign_conflicts, spectra
 from bayesplate.posterior.draws import Draws, posterior_mean_values
 from bayesplate.posterior.inference import Inference
-from bayesplate.posterior.laplace import worst_cents
-from bayesplate.posterior.mode_errors import carried_in_fit, mode_errors
+from bayesplate.posterior.laplace import predictor, worst_cents
 from bayesplate.posterior.reweighting import linear_is_enough, linearisation, means_under
 from bayesplate.posterior.target import Posterior
 from bayesplate.posterior.veerings import contradicted_labels
 
-Floats = NDArray[np.float64]
-
+_N_STARTS = 500
 _N_NAMED = 32
 """Draws on which modes are named."""
 
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """What is computed once from the draws of a converged fit.
+    """Quantities computed once from the draws of a converged fit."""
 
-    Attributes
-    ----------
-    left_out : (n_modes,) array
-        ln measured - ln predicted of every reading by the most likely constants of the others; not a number where
-        too few modes are left.
-    leverages : (n_modes,) array
-        Share of each mode in its own prediction, at the posterior's median noise.
-    carrying : tuple of CarryingMode
-        Modes that alone carry a constant or a size.
-    linear_errors : (n_some, n_every) array, cents
-        Linear less exact law over the posterior, of every mode that the likelihood looks at.
-    linear_is_enough : bool
-        Whether these stay below their share of the posterior's own noise.
-    exact_worst : float, cents
-        Largest error of the exact law against full solves.
-    surrogate_errors : (n_draws, n_every) array, cents
-        Surrogate of the exact law less that law over the posterior; without draws where the walkers walked on none.
-    means : dict of (dict of float, float)
-        By law: posterior means of E_x ... D_s, and how many draws of equal weight they rest on.
-    doubts : tuple of str
-        Labels that the fit contradicts or that hardly fit, and signs that contradict them.
-    """
-
-    left_out: Floats
-    leverages: Floats
-    carrying: tuple[CarryingMode, ...]
-    linear_errors: Floats
-    linear_is_enough: bool
-    exact_worst: float
-    surrogate_errors: Floats
-    means: Mapping[LawName, tuple[Mapping[str, float], float]]
-    doubts: tuple[str, ...]
+    left_out: Floats  # (n_modes,), ln measured - ln predicted by the constants of the others; nan if these are too few
+    leverages: Floats  # (n_modes,), share of each mode in its own prediction, at the posterior's median noise
+    carrying: tuple[CarryingMode, ...]  # modes that alone carry a constant or a size
+    linear_errors: Floats  # (n_some, n_every), cents: linear less exact law over the posterior
+    linear_is_enough: bool  # these stay below their share of the posterior's own noise
+    exact_worst: float  # cents, largest error of the exact law against full solves
+    surrogate_errors: Floats  # (n_draws, n_every), cents, less the exact law; no draws where the walk needed none
+    means: Mapping[LawName, tuple[Mapping[str, float], float]]  # posterior means of E_x ... D_s, and effective draws
+    doubts: tuple[str, ...]  # labels that the fit contradicts or that hardly fit, and signs that contradict them
 
 
 def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = None) -> Assessment:
-    """Judge a converged fit.
-
-    Parameters
-    ----------
-    linear_errors : (n_some, n_every) array, cents, optional
-        Those of `bayesplate.posterior.reweighting.linearisation`, where they are known already.
-    """
+    """Judge a converged fit; `linear_errors` are those of `linearisation`, if known."""
     problem = inference.problem
     models = problem.posterior.models
     values = posterior_mean_values(problem, draws)
@@ -97,6 +70,31 @@ def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = No
     )
 
 
+def mode_errors(inference: Inference, draws: Draws) -> Errors:
+    """Errors of the most likely constants under the exact law, in sample and left out.
+
+    One estimator for both, with the likelihood of the fit at the posterior's median noise: rounded readings are
+    intervals, a robust fit has Student's errors. Uncertain inputs move within their priors.
+    """
+    problem, noise = inference.problem, draws.median_noise
+    predict = predictor(problem.board, problem.posterior.models, "exact", problem.centre)
+    misfit = deviance_misfit(problem.posterior.readings, noise)
+    starts = problem.centre[None, :]
+    if problem.posterior.robust:  # Student's likelihood has several peaks
+        starts = np.concatenate([starts, draws.flat[:: max(1, len(draws.flat) // _N_STARTS)]])
+    starts, bounds = starts[:, problem.parameters.fitted_columns], problem.parameters.fitted_bounds
+    scales = reading_sd(problem.board.setups, noise)
+    target, modes = log_measured(problem.board), same_modes(problem.board)
+    return prediction_errors(predict, target, misfit, starts, bounds, modes, scales)
+
+
+def carried_in_fit(inference: Inference, errors: Errors) -> tuple[CarryingMode, ...]:
+    """Modes that alone carry a constant or a size of a fit."""
+    board = inference.problem.board
+    names = (*board.symmetry.moduli, *(one.effect or one.name for one in board.uncertain))
+    return carrying_modes(board, errors.leverages, names)
+
+
 def labels_contradicted(posterior: Posterior, draws: Draws) -> tuple[str, ...]:
     """A sentence per setup whose labels the draws contradict; under the linear law labels follow the shapes."""
     if posterior.law == "linear":
@@ -106,7 +104,7 @@ def labels_contradicted(posterior: Posterior, draws: Draws) -> tuple[str, ...]:
 
 
 def _surrogate_errors(inference: Inference, draws: Draws) -> Floats:
-    exact = np.concatenate([each.reshape(-1, each.shape[-1]) for each in draws.every_log_frequency], axis=1)
+    exact = np.concatenate(draws.flat_log_frequency, axis=1)
     if inference.surrogate is None:
         return exact[:0]
     return np.asarray(cents(inference.surrogate.log_frequencies(draws.flat) - exact))

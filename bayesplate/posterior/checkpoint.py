@@ -30,30 +30,17 @@ _LEAST_PAUSE = 20.0
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """Where a run stands at the end of a chunk.
+    """State of a run at the end of a chunk."""
 
-    Attributes
-    ----------
-    backends : sequence of emcee.backends.Backend
-        One for each ensemble; what they hold beyond `n_steps` is of a chunk that was not ended.
-    random_states : sequence of tuple
-        Of emcee's samplers, as numpy states them.
-    """
-
-    backends: Sequence[Any]
-    random_states: Sequence[Any]
+    backends: Sequence[Any]  # emcee's, one per ensemble; steps beyond `n_steps` are of a chunk that was not ended
+    random_states: Sequence[Any]  # of emcee's samplers, as numpy states them
     n_steps: int
 
 
 class Checkpoint:
-    """The checkpoint folder of one run.
+    """The checkpoint folder of one run, made when first needed.
 
-    Parameters
-    ----------
-    folder : Path
-        Made when first needed.
-    fingerprint : str
-        Hash of everything that defines the run besides the sampler settings: card, priors, effects, law.
+    The fingerprint is a hash of all that defines the run besides the sampler settings: card, priors, effects, law.
     """
 
     def __init__(self, folder: Path, fingerprint: str) -> None:
@@ -62,11 +49,10 @@ class Checkpoint:
 
     @property
     def file(self) -> Path:
-        """The chains."""
         return self.folder / CHAINS
 
     def exists(self) -> bool:
-        """Return True if the folder, or one of a part of the run, holds chains to continue."""
+        """Whether the folder, or one of a part of the run, holds chains to continue."""
         return any(self.folder.rglob(CHAINS))
 
     def part(self, name: str) -> Checkpoint:
@@ -75,17 +61,9 @@ class Checkpoint:
 
     @contextmanager
     def session(self, **identity: int) -> Iterator[Session]:
-        """Lock the folder; a run that is interrupted is saved as far as its last whole chunk.
+        """Lock the folder; a run that is interrupted is saved up to its last whole chunk.
 
-        Parameters
-        ----------
-        **identity : int
-            The sampler settings that decide the draws.
-
-        Raises
-        ------
-        CheckpointError
-            If the folder belongs to another run, is in use, or cannot be read or written.
+        `identity` holds the sampler settings that decide the draws. CheckpointError if the folder is in use.
         """
         with take(self.folder):
             session = Session(self, {"format": FORMAT, "fingerprint": self.fingerprint, **identity})
@@ -106,18 +84,12 @@ class Checkpoint:
             self.folder.rmdir()
 
     def error(self, what: str) -> CheckpointError:
-        """That the checkpoint cannot be used, and what to do."""
+        """The error of a checkpoint that cannot be used, and its remedy."""
         return CheckpointError(f"{self.folder}: {what}; start anew with --force, or give another --out")
 
 
 class Session:
-    """Sole use of a checkpoint while a run is at work.
-
-    Parameters
-    ----------
-    identity : dict
-        What must be the same in a run that is continued.
-    """
+    """Sole use of a checkpoint by a run; a run that is continued must have the same `identity`."""
 
     def __init__(self, checkpoint: Checkpoint, identity: dict[str, int | str]) -> None:
         self.checkpoint, self.identity = checkpoint, identity
@@ -126,13 +98,7 @@ class Session:
         self._due = 0.0  # the first chunk is saved at once
 
     def load(self) -> Snapshot | None:
-        """Where the run stands that is saved; None if there is none.
-
-        Raises
-        ------
-        CheckpointError
-            If it is damaged or another run.
-        """
+        """The saved run, None if there is none; CheckpointError if it is damaged or another run."""
         if not self.checkpoint.file.exists():
             return None
         import h5py
@@ -163,13 +129,7 @@ class Session:
         return Snapshot(backends, states, self._n_saved)
 
     def reached(self, snapshot: Snapshot) -> None:
-        """Note where the run stands, and save it at the first time, then if the last time is long enough ago.
-
-        Raises
-        ------
-        CheckpointError
-            If it cannot be written; what was saved before stays intact.
-        """
+        """Note the state of the run, and save it the first time, then if the last time is long enough ago."""
         self._latest = snapshot
         if time.monotonic() >= self._due:
             begun = time.monotonic()
@@ -178,7 +138,7 @@ class Session:
             self._due = begun + took + max(EVERY_SECONDS, _LEAST_PAUSE * took)
 
     def save(self) -> None:
-        """Save where the run stands; raises as `reached`."""
+        """Save the state of the run; CheckpointError if it cannot be written, and the last file stays intact."""
         if self._latest is None or self._latest.n_steps == self._n_saved:
             return
         try:

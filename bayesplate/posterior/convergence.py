@@ -1,6 +1,6 @@
 """The convergence gate: whether the draws of several ensembles may be turned into results.
 
-Walkers of one ensemble depend on each other, so they are not chains.  Here one chain is one ensemble, its walkers
+Walkers of one ensemble depend on each other, so they are not chains. Here one chain is one ensemble, its walkers
 pooled in time order, and the ensembles, started apart with their own random numbers, are what R-hat compares.
 """
 
@@ -10,79 +10,43 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesplate.posterior.statistics import effective_sizes, rhat
-from bayesplate.posterior.thinning import thinning, walker_major
-
-FloatArray = NDArray[np.float64]
+from bayesplate.arrays import Bools, Floats
+from bayesplate.posterior.statistics import effective_sizes, rhat, thinning, walker_major
 
 _TARGET_TAUS = 100  # what a suggestion aims at: twice the least, so that the next run does not end just short
 
 
 @dataclass(frozen=True)
 class Gate:
-    """What the draws must satisfy before any constant is printed.
+    """Limits that the draws must keep before any constant is printed.
 
-    Attributes
-    ----------
-    rhat_max : float
-        Largest split R-hat of the ensembles.
-    tau_count_min : float
-        Least length of each ensemble in its own autocorrelation times.
-    ess_min : float
-        Least effective sample size of every parameter; 400 serves intervals, 2500 a comparison with an exact answer.
-    acceptance_min : float
-        Least mean acceptance fraction of every ensemble. There is no upper bound: good independent proposals are all
-        accepted, and steps that are too short fail by their autocorrelation time.
-    walker_acceptance_min : float
-        Least acceptance fraction of any single walker.
+    Acceptance has no upper limit: good independent proposals are all accepted, and steps that are too short fail by
+    their autocorrelation time.
     """
 
-    rhat_max: float = 1.01
-    tau_count_min: float = 50.0
-    ess_min: float = 400.0
-    acceptance_min: float = 0.15
-    walker_acceptance_min: float = 0.01
+    rhat_max: float = 1.01  # split R-hat of the ensembles
+    tau_count_min: float = 50.0  # length of each ensemble in its own autocorrelation times
+    ess_min: float = 400.0  # of every parameter; 400 serves intervals, 2500 a comparison with an exact answer
+    acceptance_min: float = 0.15  # mean of every ensemble
+    walker_acceptance_min: float = 0.01  # of every walker
 
 
 @dataclass(frozen=True)
 class Convergence:
-    """The verdict of the gate and the numbers behind it.
-
-    Attributes
-    ----------
-    passed : bool
-        True if there is no reason against the draws.
-    reasons : tuple of str
-        One sentence a failed rule, with its remedy.
-    tau : (n_dim,) array, steps
-        Integrated autocorrelation time, the largest of the ensembles.
-    rhat : (n_dim,) array
-        Rank-normalised split R-hat of the ensembles, by ArviZ.
-    ess : (n_dim,) array
-        Effective sample size, the smaller of that of the bulk and of the tails.
-    tau_max, rhat_max, ess_min : float
-        The worst of each.
-    acceptance : float
-        Mean acceptance fraction.
-    n_kept_steps : int
-        Steps judged, after burn-in.
-    suggested_steps : int
-        Kept steps that should be enough (100 autocorrelation times), never fewer than now.
-    """
+    """The verdict of the gate and the numbers behind it."""
 
     passed: bool
-    reasons: tuple[str, ...]
-    tau: FloatArray
-    rhat: FloatArray
-    ess: FloatArray
+    reasons: tuple[str, ...]  # a sentence per failed rule, with its remedy
+    tau: Floats  # (n_dim,), steps: integrated autocorrelation time, the largest of the ensembles
+    rhat: Floats  # (n_dim,), rank-normalised split R-hat of the ensembles, by ArviZ
+    ess: Floats  # (n_dim,), effective sample size, the smaller of that of the bulk and of the tails
     tau_max: float
     rhat_max: float
     ess_min: float
-    acceptance: float
-    n_kept_steps: int
-    suggested_steps: int
+    acceptance: float  # mean fraction
+    n_kept_steps: int  # after burn-in
+    suggested_steps: int  # kept steps that should be enough (100 autocorrelation times), never fewer than now
 
     @property
     def n_taus(self) -> float:
@@ -91,7 +55,7 @@ class Convergence:
 
 
 def burn_in_steps(n_steps: int) -> int:
-    """Return how many of `n_steps` are discarded: a sixth, and at least 50 (or half of a very short run).
+    """Number of `n_steps` to discard: a sixth, and at least 50 (or half of a very short run).
 
     A sixth depends on the count alone, yet it is long enough whenever the gate passes: if the other five sixths hold
     50 autocorrelation times, the discarded one holds 10, twice what is asked for.
@@ -99,18 +63,10 @@ def burn_in_steps(n_steps: int) -> int:
     return min(max(50, -(-n_steps // 6)), n_steps // 2)
 
 
-def autocorrelation_times(draws: FloatArray) -> FloatArray:
-    """Integrated autocorrelation time of each parameter in one ensemble, by emcee.
+def autocorrelation_times(draws: Floats) -> Floats:
+    """Integrated autocorrelation time, steps, in (n_steps, n_walkers, n_dim) draws of an ensemble: (n_dim,) array.
 
-    Parameters
-    ----------
-    draws : (n_steps, n_walkers, n_dim) array
-        One ensemble after burn-in.
-
-    Returns
-    -------
-    (n_dim,) array, steps
-        At least 1, for less would claim more than independent draws; infinite where a walker never moves.
+    At least 1, for less would claim more than independent draws; infinite where a walker never moves.
     """
     from emcee.autocorr import integrated_time
 
@@ -119,7 +75,7 @@ def autocorrelation_times(draws: FloatArray) -> FloatArray:
     return np.where(np.isnan(times), np.inf, np.maximum(times, 1.0))
 
 
-def length_in_taus(draws: FloatArray) -> float:
+def length_in_taus(draws: Floats) -> float:
     """Length of (n_ensembles, n_steps, n_walkers, n_dim) draws in autocorrelation times of the slowest parameter.
 
     By every fourth walker, for a quick look.
@@ -127,36 +83,14 @@ def length_in_taus(draws: FloatArray) -> float:
     return float(draws.shape[1] / max(autocorrelation_times(one[:, ::4]).max() for one in draws))
 
 
-def acceptance_by_walker(draws: FloatArray) -> FloatArray:
-    """Return the fraction of steps at which each walker moved.
-
-    Read off the draws, so that it counts the kept steps only; an accepted proposal equal to the old point has
-    probability zero.
-
-    Parameters
-    ----------
-    draws : (n_ensembles, n_steps, n_walkers, n_dim) array
-
-    Returns
-    -------
-    (n_ensembles, n_walkers) array
-    """
-    fraction: FloatArray = np.any(draws[:, 1:] != draws[:, :-1], axis=-1).mean(axis=1)
+def acceptance_by_walker(draws: Floats) -> Floats:
+    """Share of the steps at which each walker moved, (n_ensembles, n_walkers), read off the draws that are kept."""
+    fraction: Floats = np.any(draws[:, 1:] != draws[:, :-1], axis=-1).mean(axis=1)
     return fraction
 
 
-def assess(draws: FloatArray, gate: Gate | None = None, *, names: Sequence[str] = ()) -> Convergence:
-    """Judge the draws by the gate.
-
-    Parameters
-    ----------
-    draws : (n_ensembles, n_steps, n_walkers, n_dim) array
-        After burn-in.
-    gate : Gate, optional
-        The rules; the default ones if absent.
-    names : sequence of str, optional
-        Parameter names for the reasons.
-    """
+def assess(draws: Floats, gate: Gate | None = None, *, names: Sequence[str] = ()) -> Convergence:
+    """Judge (n_ensembles, n_steps, n_walkers, n_dim) draws after burn-in by the gate; `names` for the reasons."""
     gate = Gate() if gate is None else gate
     _, n_steps, _, n_dim = draws.shape
     tau = np.array([autocorrelation_times(ensemble) for ensemble in draws]).max(axis=0)
@@ -184,10 +118,8 @@ def assess(draws: FloatArray, gate: Gate | None = None, *, names: Sequence[str] 
     return replace(unjudged, passed=not reasons, reasons=reasons)
 
 
-def _faults_of_parameters(
-    found: Convergence, gate: Gate, names: tuple[str, ...], never_moves: NDArray[np.bool_]
-) -> list[str]:
-    """Sentences about the rules that hold for each parameter, written so that a number that is none fails them."""
+def _faults_of_parameters(found: Convergence, gate: Gate, names: tuple[str, ...], never_moves: Bools) -> list[str]:
+    """Sentences about the rules that hold for each parameter; the comparisons are such that nan fails."""
     reasons = []
     if never_moves.any():
         frozen = ", ".join(name for name, still in zip(names, never_moves, strict=True) if still)
@@ -211,8 +143,7 @@ def _faults_of_parameters(
     return reasons
 
 
-def _faults_of_walkers(by_walker: FloatArray, gate: Gate) -> list[str]:
-    """Sentences about acceptance."""
+def _faults_of_walkers(by_walker: Floats, gate: Gate) -> list[str]:
     reasons = [
         f"Ensemble {number} accepts {100 * fraction:.0f} % of its proposals, at least "
         f"{100 * gate.acceptance_min:.0f} % is wanted: the posterior has a sharp edge or a long thin tail; "

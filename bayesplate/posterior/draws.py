@@ -6,65 +6,51 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import density
 from bayesplate.board.material import MODULI, RIGIDITIES, Derived, derived_quantities, moduli
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.streams import stream
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class Draws:
-    """Thinned draws of an inference; every array starts with (n_chains, n_draws), chain = ensemble.
+    """Thinned draws of an inference; every array starts with (n_chains, n_draws), chain = ensemble; SI."""
 
-    Attributes
-    ----------
-    theta : (n_chains, n_draws, n_dim) array
-    log_posterior : (n_chains, n_draws) array
-    rigidities, moduli, inputs : dict of (n_chains, n_draws) array, SI
-    noise : (n_chains, n_draws, n_setups) array
-        Relative.
-    log_frequency : (n_chains, n_draws, n_modes) array
-        ln f (Hz) under the law of the fit.
-    every_log_frequency : tuple of (n_chains, n_draws, n_every) array
-        Of each setup: the labelled modes, then those that peaks may be.
-    log_likelihood : (n_chains, n_draws, n_factors) array
-        In the order of `bayesplate.posterior.target.Posterior.factors`.
-    predictive : (n_chains, n_draws, n_modes) array, Hz
-        Frequencies that the next measurement would read, noise included, rounded where the readings are.
-    """
-
-    theta: Floats
+    theta: Floats  # (..., n_dim)
     log_posterior: Floats
     rigidities: Mapping[str, Floats]
     moduli: Mapping[str, Floats]
     inputs: Mapping[str, Floats]
-    noise: Floats
+    noise: Floats  # (..., n_setups), relative
     derived: Mapping[str, Derived]
-    log_frequency: Floats
-    every_log_frequency: tuple[Floats, ...]
-    log_likelihood: Floats
-    predictive: Floats
+    log_frequency: Floats  # (..., n_modes), ln Hz, under the law of the fit
+    every_log_frequency: tuple[Floats, ...]  # per setup (..., n_every): labelled modes, then those that peaks may be
+    log_likelihood: Floats  # (..., n_factors), in the order of `Posterior.factors`
+    predictive: Floats  # (..., n_modes), Hz, that the next measurement would read: with noise, rounded as the readings
 
     @property
     def flat(self) -> Floats:
         """theta of all chains together: (n, n_dim) array."""
         return self.theta.reshape(-1, self.theta.shape[-1])
 
+    @property
+    def flat_log_frequency(self) -> list[Floats]:
+        """ln f (Hz) of all modes at `flat`: one (n, n_every) array per setup."""
+        return [each.reshape(-1, each.shape[-1]) for each in self.every_log_frequency]
+
+    @property
+    def median_noise(self) -> Floats:
+        """Posterior median of the relative noise of each setup: (n_setups,) array."""
+        return np.asarray(np.median(self.noise.reshape(-1, self.noise.shape[-1]), axis=0))
+
 
 def named_draws(inference: Inference, seed: int, every_log_frequency: Sequence[Floats] | None = None) -> Draws:
-    """Name what the draws of an inference mean.
+    """Draws of an inference by name; `seed` is of the predictive ones.
 
-    Parameters
-    ----------
-    seed : int
-        Of the predictive draws.
-    every_log_frequency : sequence of (n_draws, n_every) array, optional
-        ln f (Hz) of all modes at the thinned draws, where it is known already.
+    `every_log_frequency` is ln f (Hz) of all modes at the thinned draws, (n_draws, n_every) per setup, if known.
     """
     problem = inference.problem
     shape = inference.theta.shape[:2]

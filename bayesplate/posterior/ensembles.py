@@ -7,20 +7,18 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.posterior.checkpoint import Snapshot
 from bayesplate.posterior.mixture import Mixture
 from bayesplate.posterior.moves import moves
 from bayesplate.posterior.starts import LogDensity, around_estimate, finite_starts
 from bayesplate.streams import stream
 
-Floats = NDArray[np.float64]
-
 _PILOT_STEPS = 40
 FEWEST_ROUNDS, _MOST_ROUNDS = 3, 60
 _PAIRS_A_ROUND = 8
-"""One that teaches proposals makes a round for so many pairs of parameters."""
+"""Pairs of parameters for which a pilot that teaches proposals makes one round."""
 _TEACH_AGAIN = 1.2
 """Times as many rounds, after which proposals are taught anew."""
 _RISE = 1.0
@@ -28,28 +26,16 @@ _RISE = 1.0
 
 
 class Ensembles:
-    """Walkers of several emcee samplers, each with its own random state.
-
-    Parameters
-    ----------
-    log_density : callable, (n_points, n_dim) -> (n_points,) array
-    centre : (n_dim,) array
-    factor : (n_dim, n_dim) array
-        Lower Cholesky factor of the estimate's covariance.
-    shape : (int, int)
-        Ensembles, and walkers of each.
-    near : (n_draws, n_dim) array, optional
-        Draws of a density that is nearly this one.
-    """
+    """Walkers of several emcee samplers, each with its own random state."""
 
     def __init__(
         self,
         log_density: LogDensity,
         centre: Floats,
-        factor: Floats,
+        factor: Floats,  # lower Cholesky factor of the estimate's covariance
         seed: int,
-        shape: tuple[int, int],
-        near: Floats | None = None,
+        shape: tuple[int, int],  # ensembles, and walkers of each
+        near: Floats | None = None,  # (n_draws, n_dim) draws of nearly the same density
     ) -> None:
         self.log_density, self.centre, self.factor, self.seed, self.shape = log_density, centre, factor, seed, shape
         self.near = near
@@ -86,19 +72,19 @@ class Ensembles:
 
     @property
     def snapshot(self) -> Snapshot:
-        """Where the run stands."""
+        """State of the run."""
         states = [one.random_state for one in self._backends]
         return Snapshot(tuple(self._backends), states, self.n_steps)
 
     def advance(self, n_steps: int) -> None:
-        """Let all ensembles make so many steps."""
+        """Let all ensembles make `n_steps`."""
         for i, backend in enumerate(self._backends):
             start = None if self.n_steps else self._start(i)
             walk(self.log_density, self.pilot.mixture, backend, start, n_steps)
         self.n_steps += n_steps
 
     def _start(self, ensemble: int) -> Any:
-        """Where an ensemble begins: with every so many of the pilot's walkers, and random numbers of its own."""
+        """Start of an ensemble: its share of the pilot's walkers, and random numbers of its own."""
         import emcee
 
         own = slice(ensemble, None, self.shape[0])
@@ -107,7 +93,7 @@ class Ensembles:
 
 
 def walk(log_density: LogDensity, mixture: Mixture, backend: Any, start: Any, n_steps: int) -> None:
-    """Let the walkers of one ensemble make so many steps; from where its backend ends unless a start is given.
+    """Let the walkers of one ensemble make `n_steps`, from the end of its backend unless a start is given.
 
     emcee's own check that walkers span the space depends on the units of the parameters, and is left out.
     """
@@ -128,23 +114,12 @@ def random_state(rng: np.random.Generator) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Pilot:
-    """What an ensemble walked that nobody keeps.
+    """Result of a walk to the posterior: where the ensembles begin, and their proposals."""
 
-    Attributes
-    ----------
-    draws : (n_draws, n_dim) array
-        Of its last rounds, a third of them: near the posterior.
-    mixture : Mixture
-        Fitted to its last rounds, two thirds of them.
-    points : (n_walkers, n_dim) array
-        Where it ended.
-    log_prob : (n_walkers,) array
-    """
-
-    draws: Floats
-    mixture: Mixture
-    points: Floats
-    log_prob: Floats
+    draws: Floats  # (n_draws, n_dim), of the last third of its rounds: near the posterior
+    mixture: Mixture  # fitted to the last two thirds of its rounds
+    points: Floats  # (n_walkers, n_dim), the last ones
+    log_prob: Floats  # (n_walkers,)
 
 
 def pilot(
@@ -157,12 +132,7 @@ def pilot(
 ) -> Pilot:
     """Walk from three standard errors around the estimate, in rounds each of which teaches the next, until arrived.
 
-    Parameters
-    ----------
-    log_density : callable, (n_points, n_dim) -> (n_points,) array
-    centre : (n_dim,) array
-    factor : (n_dim, n_dim) array
-        Lower Cholesky factor of the estimate's covariance.
+    `factor` is the lower Cholesky factor of the estimate's covariance.
     """
     import emcee
 
@@ -188,11 +158,11 @@ def pilot(
 
 
 def _last_rounds(backend: Any, n_rounds: int, thirds: int) -> Floats:
-    """Draws of the last rounds, so many thirds of them."""
+    """Draws of the last `thirds` of the rounds: (n_steps, n_walkers, n_dim) array."""
     return np.asarray(backend.chain[-_PILOT_STEPS * max(1, thirds * n_rounds // 3) :])
 
 
 def pilot_from(log_density: LogDensity, near: Floats, rng: np.random.Generator, n_walkers: int) -> Pilot:
-    """What (n_draws, n_dim) draws of a density that is nearly this one teach without a walk."""
+    """A pilot without a walk, from (n_draws, n_dim) draws of nearly the same density."""
     starts = finite_starts(log_density, lambda n: near[rng.integers(len(near), size=n)], n_walkers)
     return Pilot(near, Mixture.fitted(near), *starts)

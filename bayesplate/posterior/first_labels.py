@@ -1,8 +1,8 @@
-"""First labels for peaks that have none, or doubtful ones: from where a search for the posterior begins.
+"""First labels for peaks that have none, or doubtful ones: the start of a search for the posterior.
 
 From a guess of the constants follow labels, from these better constants, and so on; where the sure labels do not make a
 guess, all of the prior is searched for some (`bayesplate.estimates.wide_search`). Of several answers the most probable
-is taken, and how far the others lie from it is told; answers too far apart for one walk between them are refused.
+is taken, with the spread of the others about it; answers too far apart for one walk between them are refused.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import softmax
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.material import MODULI, RIGIDITIES, Moduli, moduli
 from bayesplate.board.prior import PriorCard
@@ -27,6 +27,7 @@ from bayesplate.estimates.wide_search import Guess, are_far_apart, search_widely
 from bayesplate.frequencies.model import setup_model, with_others
 from bayesplate.frequencies.peaks import PeakLikelihood, takes_part
 from bayesplate.frequencies.system import system_of
+from bayesplate.posterior.laplace import with_peaks
 from bayesplate.posterior.target import Posterior
 
 _N_DRAWS = 64
@@ -41,40 +42,34 @@ FEWEST_PEAKS = 4
 _UNUSUAL = 0.02
 """Probability that a plate is stiffer along y than along x, or that no wood is as orthotropic."""
 POSSIBLE = 0.02
-"""Probability from which on another answer is one that has to be told."""
+"""Probability of another answer from which on it is an error to choose one."""
 UNLIKE = 0.01
-"""Relative: by how much a plate may miss its own modes, for what it lacks; answers are told apart at no less noise."""
+"""Relative error of a plate's own modes for an effect it lacks; answers are compared at no smaller noise."""
 
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """One way to take the peaks of a board for modes.
+    """One way to take the peaks of a board for modes."""
 
-    Attributes
-    ----------
-    board : Board
-        With the labels of the peaks that are likely one certain mode.
-    log_rigidities : (n_constants,) array
-        ln of the free rigidities (N m) near those of its readings.
-    log_density : float
-        ln of the posterior density there, at the noise that suits it best.
-    log_density_unlike : float
-        The same where the plate may be as unlike the board as `UNLIKE`.
-    """
+    board: Board  # with the labels of the peaks that are likely one certain mode
+    log_rigidities: Floats  # (n_constants,), ln of the free rigidities (N m) near those of its readings
+    log_density: float  # ln of the posterior density there, at the noise that suits it best
+    log_density_unlike: float  # the same where the plate may be as unlike the board as `UNLIKE`
 
-    board: Board
-    log_rigidities: NDArray[np.float64]
-    log_density: float
-    log_density_unlike: float
+    @property
+    def moduli(self) -> Moduli:
+        """E_x, E_y, G_xy, Pa, at the nominal inputs."""
+        nominal = self.board.nominal()
+        found = self.board.symmetry.rigidities(np.exp(self.log_rigidities), nominal["poisson_xy"])
+        return moduli(found["D_x"], found["D_y"], found["D_s"], nominal["thickness"], nominal["poisson_xy"])
 
     @property
     def is_usual(self) -> bool:
         """Whether the plate is stiffer along x, and no more than any wood is."""
-        elastic = _moduli(self)
-        return bool(1.0 <= elastic.E_x / elastic.E_y <= MOST_ORTHOTROPIC)
+        return bool(1.0 <= self.moduli.E_x / self.moduli.E_y <= MOST_ORTHOTROPIC)
 
     def is_far_from(self, other: Way) -> bool:
-        """Whether the constants are others altogether."""
+        """Whether no walk leads from these constants to the others."""
         return are_far_apart(self.log_rigidities, other.log_rigidities)
 
 
@@ -82,20 +77,13 @@ class Way:
 class Proposed:
     """A board with labels for its peaks, and how far other ways to label them would move the constants.
 
-    Attributes
-    ----------
-    board : Board
-        Readings with a proposed label follow the labelled ones of their setup, with the confidence 0; peaks without a
-        likely label stay peaks.
-    rigidities : (3,) array or None
-        D_x, D_y, D_s near those of its readings, N m; None where there is nothing to propose.
-    spread : (n_constants, n_constants) array
-        Covariance of ln D between the likely ways to take the peaks; zero where there is but one.
+    Readings with a proposed label follow the labelled ones of their setup, with the confidence 0; peaks without a
+    likely label stay peaks.
     """
 
     board: Board
-    rigidities: NDArray[np.float64] | None
-    spread: NDArray[np.float64]
+    rigidities: Floats | None = None  # D_x, D_y, D_s near those of its readings, N m; None if nothing is proposed
+    spread: Floats | None = None  # (n_constants, n_constants), covariance of ln D between the likely ways, if several
 
 
 def propose_labels(board: Board, prior: PriorCard) -> Proposed:
@@ -103,32 +91,15 @@ def propose_labels(board: Board, prior: PriorCard) -> Proposed:
 
     From the constants that the labelled modes give, with their uncertainty, each peak is assigned where it likely
     belongs; the constants are fitted anew to all of them; and again, until no label changes. Where the labels do not
-    determine the constants, all of the prior is searched for constants to begin with.
-
-    Parameters
-    ----------
-    prior : PriorCard
-        For the first labels of a board that has too few.
-
-    Returns
-    -------
-    Proposed
-        The same board where every label is sure and no peak lacks one.
-
-    Raises
-    ------
-    NotIdentifiableError
-        If the peaks may as well be taken another way, with constants that lie far off.
+    determine the constants, all of the prior is searched for constants to begin with. NotIdentifiableError if the peaks
+    may as well be taken another way, with constants that lie far off.
     """
-    none = np.zeros((board.symmetry.n, board.symmetry.n))
     if not any(takes_part(setup) for setup in board.setups):
-        return Proposed(board, None, none)
+        return Proposed(board)
     found = _every_way(board, _guesses(board, prior))
-    if len(found) < 2:
-        return Proposed(*found[0], none) if found else Proposed(board, None, none)
-    judged = _judged(found, prior)
+    judged = _judged(found, prior) if len(found) > 1 else []
     if not judged:
-        return Proposed(*found[0], none)
+        return Proposed(*found[0]) if found else Proposed(board)
     leading = only_way(judged)
     near = [one for one in judged if not one.is_far_from(leading)]
     best = max(near, key=lambda one: one.log_density)
@@ -142,12 +113,7 @@ def probable_ways(board: Board, prior: PriorCard) -> list[tuple[Way, float]]:
     """Ways to take the peaks of a board without a label for modes, with their probabilities, the most probable first.
 
     A plate may be as unlike the board as `UNLIKE`, and is hardly stiffer along y than along x, which cards take along
-    the grain.
-
-    Returns
-    -------
-    list of (Way, float)
-        Empty where there is a label already, or the peaks are too few to tell.
+    the grain. Empty where there is a label already, or the peaks are too few.
     """
     if any(setup.readings for setup in board.setups) or sum(len(one.peaks) for one in board.setups) < FEWEST_PEAKS:
         return []
@@ -161,41 +127,31 @@ def only_way(ways: Sequence[Way]) -> Way:
     """The most probable way, others that lie far from it being improbable: no walk leads from one to the other.
 
     A free plate has nearly the same frequencies with its grain along the other side, and few peaks fit several plates.
-    What any board has that a plate lacks would decide between them, if the noise were left to be as small as it likes.
-
-    Raises
-    ------
-    NotIdentifiableError
-        If another is possible as well; tells the constants of each, and which label would decide.
+    What any board has that a plate lacks would decide between them, if the noise could be as small as it likes.
+    NotIdentifiableError if another is possible as well, with the constants of each and the label that would decide.
     """
     apart: list[Way] = []
     for one in sorted(ways, key=lambda one: -one.log_density_unlike):
         if all(one.is_far_from(other) for other in apart):
             apart.append(one)
     shares = softmax([one.log_density_unlike for one in apart])
-    told = [(one, share) for one, share in zip(apart, shares, strict=True) if share >= POSSIBLE]
-    if len(told) < 2:
+    possible = [(one, share) for one, share in zip(apart, shares, strict=True) if share >= POSSIBLE]
+    if len(possible) < 2:
         return apart[0]
-    each = " or ".join(f"{_constants_words(one)} ({100.0 * share:.0f} %)" for one, share in told)
+    each = [
+        ", ".join(f"{name} {1e-9 * float(value):.3g}" for name, value in zip(MODULI, one.moduli, strict=True))
+        + f" GPa ({100.0 * share:.0f} %)"
+        for one, share in possible
+    ]
+    (first, _), (second, _), *_ = possible
     raise NotIdentifiableError(
-        f"{told[0][0].board.name}: its peaks are modes of plates that lie far apart, {each}; "
-        f"{_deciding_label(told[0][0], told[1][0])}name a prior of the material or give the label of a mode"
+        f"{first.board.name}: its peaks are modes of plates that lie far apart, {' or '.join(each)}; "
+        f"{_deciding_label(first, second)}name a prior of the material or give the label of a mode"
     )
 
 
-def _moduli(way: Way) -> Moduli:
-    nominal = way.board.nominal()
-    found = way.board.symmetry.rigidities(np.exp(way.log_rigidities), nominal["poisson_xy"])
-    return moduli(found["D_x"], found["D_y"], found["D_s"], nominal["thickness"], nominal["poisson_xy"])
-
-
-def _constants_words(way: Way) -> str:
-    elastic = zip(MODULI, _moduli(way), strict=True)
-    return ", ".join(f"{name} {1e-9 * float(value):.3g}" for name, value in elastic) + " GPa"
-
-
 def _deciding_label(first: Way, second: Way) -> str:
-    """Which peak has one label in the first way and another in the second; empty if none has."""
+    """The peak with one label in the first way and another in the second; empty if there is none."""
     labels = [
         {(setup.name, one.frequency.mean): one.label for setup in way.board.setups for one in setup.readings}
         for way in (first, second)
@@ -207,18 +163,15 @@ def _deciding_label(first: Way, second: Way) -> str:
     return ""
 
 
-def _every_way(board: Board, guesses: Sequence[Guess]) -> list[tuple[Board, NDArray[np.float64]]]:
-    """Labelled boards that come out of guesses of the constants, each once, and the rigidities that go with them."""
+def _every_way(board: Board, guesses: Sequence[Guess]) -> list[tuple[Board, Floats]]:
+    """Labelled boards that guesses of the constants lead to, each once, with their rigidities."""
     tried: list[tuple[Setup, ...]] = []
     every = (_settled(board, guess, tried) for guess in guesses)
     return [one for one in every if one is not None]
 
 
-def _settled(board: Board, guess: Guess, tried: list[tuple[Setup, ...]]) -> tuple[Board, NDArray[np.float64]] | None:
-    """The labels that come out of a first guess of the constants, and the rigidities that go with them.
-
-    None where they came up from another guess.
-    """
+def _settled(board: Board, guess: Guess, tried: list[tuple[Setup, ...]]) -> tuple[Board, Floats] | None:
+    """Labels that a first guess of the constants leads to, with the rigidities; None where another guess led there."""
     before: list[tuple[Setup, ...]] = []
     while True:
         labelled = _labelled(board, guess)
@@ -263,17 +216,17 @@ def _of_labelled(board: Board) -> Board:
     return replace(board, setups=tuple(setup for setup in board.setups if setup.readings))
 
 
-def _judged(found: Sequence[tuple[Board, NDArray[np.float64]]], prior: PriorCard) -> list[Way]:
+def _judged(found: Sequence[tuple[Board, Floats]], prior: PriorCard) -> list[Way]:
     """Labelled boards at their own estimates; without those that have too few labels for one."""
     enough = (one for one in found if sum(len(setup.readings) for setup in one[0].setups) >= one[0].symmetry.n)
     return [_way(board, prior, start) for board, start in enough]
 
 
-def _way(board: Board, prior: PriorCard, start: NDArray[np.float64]) -> Way:
-    """A labelled board at its own estimate and the noise that suits it best."""
+def _way(board: Board, prior: PriorCard, start: Floats) -> Way:
+    """A labelled board at its own estimate."""
     estimate = weighted_least_squares(_of_labelled(board), _STEPS, start)
-    models = [setup_model(system_of(board, setup), estimate.values) for setup in board.setups]
-    models = [with_others(one, estimate.values) if takes_part(one.setup) else one for one in models]
+    bare = [setup_model(system_of(board, setup), estimate.values) for setup in board.setups]
+    models = with_peaks(bare, estimate.values)
     posterior = Posterior(board, prior, models, "linear")
     medians, log_sds = np.array([(setup.noise.median, setup.noise.log_sd) for setup in board.setups]).T
     noises = medians * np.exp(np.outer(np.linspace(-1.0, 3.0, _N_LEVELS), log_sds))

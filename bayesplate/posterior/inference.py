@@ -6,20 +6,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
-from bayesplate.posterior.statistics import effective_share, may_stand, resampled, smoothed
+from bayesplate.posterior.statistics import effective_share, may_stand, resampled, smoothed, thin_walker_major
 from bayesplate.posterior.surrogate import Solved, Surrogate, find_surrogate, with_surrogate
 from bayesplate.posterior.tails import TailCoordinates
 from bayesplate.posterior.target import Posterior
-from bayesplate.posterior.thinning import thin_walker_major
 from bayesplate.streams import stream
-
-Floats = NDArray[np.float64]
 
 MOST_DRAWS_A_CHAIN, MOST_WEIGHTED_A_CHAIN = 4000, 1000
 _WALKS = "surrogate", "surrogate-taught"
@@ -28,31 +25,18 @@ _WALKS = "surrogate", "surrogate-taught"
 
 @dataclass(frozen=True, eq=False)
 class Inference:
-    """Draws of a problem and the verdict of the convergence gate.
-
-    Attributes
-    ----------
-    chains : Chains
-        All that was walked: under the law of the problem, or under a surrogate of it.
-    theta : (n_chains, n_draws, n_dim) array
-        Draws of the posterior, thinned, chain = ensemble; those of a surrogate are drawn again by their weights.
-    log_posterior : (n_chains, n_draws) array
-    every_log_frequency : tuple of (n_chains * n_draws, n_every) array or None
-        ln f (Hz) of all modes of each setup at these draws, where it is known.
-    surrogate : Surrogate or None
-        What the walkers walked on in place of the exact law.
-    pareto_k : float or None
-        k-hat of the weights from the surrogate to the exact law.
-    """
+    """Draws of a problem and the verdict of the convergence gate."""
 
     problem: PosedProblem
-    chains: Chains
+    chains: Chains  # the whole walk, under the law of the problem or under a surrogate of it
     convergence: Convergence
-    theta: Floats
-    log_posterior: Floats
-    every_log_frequency: tuple[Floats, ...] | None = None
-    surrogate: Surrogate | None = None
-    pareto_k: float | None = None
+    theta: Floats  # (n_chains, n_draws, n_dim), thinned, chain = ensemble; of a surrogate drawn again by weight
+    log_posterior: Floats  # (n_chains, n_draws)
+    every_log_frequency: tuple[Floats, ...] | None = (
+        None  # of each setup (n_chains * n_draws, n_every), ln Hz, if known
+    )
+    surrogate: Surrogate | None = None  # of the exact law, on which the walkers walked
+    pareto_k: float | None = None  # k-hat of the weights from the surrogate to the exact law
 
 
 def infer(
@@ -68,15 +52,7 @@ def infer(
     to the law by Pareto-smoothed importance sampling. Where too few count, what the law gave at them teaches the
     surrogate, and the walk is made again; where too few count then, the law itself is sampled.
 
-    Parameters
-    ----------
-    checkpoint, progress
-        See `bayesplate.posterior.sampling.sample`.
-
-    Returns
-    -------
-    Inference
-        Its chains are theta, the columns of `Parameters`, and the log density of theta under what was walked on.
+    The chains hold theta, the columns of `Parameters`, and the log density of theta under the surrogate or the law.
 
     References
     ----------
@@ -130,10 +106,7 @@ def infer(
 def _weighted(
     problem: PosedProblem, surrogate: Surrogate, chains: Chains, convergence: Convergence, rng: np.random.Generator
 ) -> tuple[Inference | None, Solved]:
-    """Draws of a surrogate's posterior, drawn again by their weights under the law, and what that gives at them.
-
-    None where too few count.
-    """
+    """Draws of a surrogate, drawn again by their weights under the law, None where too few count; and the law there."""
     posterior = problem.posterior
     thinned, log_walked = (
         thin_walker_major(part, chains.burn_in, convergence.tau_max, n_draws_max=MOST_WEIGHTED_A_CHAIN)

@@ -1,15 +1,14 @@
-"""Where the posterior lies, before sampling: its mode, a normal approximation, and the exact law for that region."""
+"""Place of the posterior before sampling: its mode, a normal approximation, and the exact law for that region."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import product
-from typing import get_args
+from typing import NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.errors import NotIdentifiableError
@@ -22,8 +21,6 @@ from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.robust import highest_student, student_weights
-
-Floats = NDArray[np.float64]
 
 _BOX_SDS = 3.0
 _NARROWEST, _WIDEST = 0.1, 0.6
@@ -40,22 +37,12 @@ _SAME_LEVEL = 1e-3
 """Change of the logarithm of the noise below which a fit of the inputs is not made again."""
 
 
-@dataclass(frozen=True, eq=False)
-class LaplaceApproximation:
-    """A normal approximation of the posterior, and models made at its centre.
+class LaplaceApproximation(NamedTuple):
+    """A normal approximation of the posterior, and models made at its centre."""
 
-    Attributes
-    ----------
-    centre : (n_dim,) array
-        Weighted least squares under the exact law, uncertain inputs moved within their priors.
-    covariance : (n_dim, n_dim) array
-    models : tuple of SetupModel
-        With the linear law at the centre and the exact law around it.
-    """
-
-    centre: Floats
-    covariance: Floats
-    models: tuple[SetupModel, ...]
+    centre: Floats  # (n_dim,), weighted least squares under the exact law, uncertain inputs moved within their priors
+    covariance: Floats  # (n_dim, n_dim)
+    models: tuple[SetupModel, ...]  # with the linear law at the centre and the exact law around it
 
 
 def laplace_approximation(
@@ -64,34 +51,23 @@ def laplace_approximation(
     """Locate the posterior of a board.
 
     The rigidities have the covariance of the weighted fit, widened where the residuals exceed the expected noise as
-    far as its prior lets them; noise has its prior's. Where inputs are uncertain the fit may move them, which tells the
-    noise anew, and the models are made anew at the point it finds, until they find it themselves: a rough law, or names
+    far as its prior lets them; noise has its prior's. Where inputs are uncertain the fit may move them, which changes
+    the noise, and the models are made anew at the point it finds, until they find it themselves: a rough law, or names
     that modes exchange at a veering, may have led astray. Under Student's errors a reading far off weighs little.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        At the nominal inputs.
-    robust : bool
-        Student's distribution for the noise.
-    spread : (n_constants, n_constants) array, optional
-        Covariance of ln D beyond that: between several ways to take peaks for modes.
+    `spread` is a further covariance of ln D: between several ways to take peaks for modes.
     """
     parameters = Parameters(board)
     medians = np.array([setup.noise.median for setup in board.setups])
-    noise = medians * noise_widenings(board, estimate.residuals)
-    centre = parameters.theta(estimate.values, noise)
-    models = _with_peaks(estimate.models, estimate.values)
-    scales = reading_sd(board.setups, noise)
+    noise, values, made = medians * noise_widenings(board, estimate.residuals), dict(estimate.values), estimate.models
     if robust:
         rigidities, noise = highest_student(board, estimate)
-        values = dict(estimate.values) | dict(zip(RIGIDITIES, rigidities, strict=True))
-        centre = parameters.theta(values, noise)
-        models = _with_peaks([setup_model(model.system, values, model.plate) for model in models], values)
-        scales = reading_sd(board.setups, noise)
+        values |= dict(zip(RIGIDITIES, rigidities, strict=True))
+        made = tuple(setup_model(model.system, values, model.plate) for model in made)
+    centre, models, scales = parameters.theta(values, noise), with_peaks(made, values), reading_sd(board.setups, noise)
+    if robust:
         residuals = log_measured(board) - np.concatenate([m.log_frequencies(values, "linear")[0] for m in models])
         scales = scales / np.sqrt(student_weights(residuals / scales))
-    covariance = _covariance(board, models, "linear", scales, centre, spread)
+    covariance = _covariance(board, models, scales, centre, spread)
     if not parameters.inputs:
         return LaplaceApproximation(centre, covariance, exact_models(board, models, centre, covariance))
     models = exact_models(board, models, centre, covariance, is_rough=True, accepted_cents=_ROUGH_CENTS)
@@ -99,9 +75,9 @@ def laplace_approximation(
     for k in range(_MOST_PLACES):
         centre, values = found, parameters.values_at(found)
         # Named once, where the rough law led: at a veering names would lead back and forth between two places.
-        made = [setup_model(model.system, values, model.plate, model if k else None) for model in models]
-        models = _with_peaks(made, values)
-        covariance = _covariance(board, models, "linear", scales, centre, spread)
+        made = tuple(setup_model(model.system, values, model.plate, model if k else None) for model in models)
+        models = with_peaks(made, values)
+        covariance = _covariance(board, models, scales, centre, spread)
         models = exact_models(board, models, centre, covariance)
         noise = np.exp(parameters.log_noise(centre[None])[0])
         found, scales = _fitted(board, models, centre, noise, scales, is_once=robust)
@@ -113,9 +89,9 @@ def laplace_approximation(
 def _fitted(
     board: Board, models: Sequence[SetupModel], centre: Floats, noise: Floats, scales: Floats, *, is_once: bool
 ) -> tuple[Floats, Floats]:
-    """Where rigidities and inputs fit best under the exact law, noises as the residuals tell them: theta and scales.
+    """Best fit of rigidities and inputs under the exact law, and of the noises to the residuals: theta and scales.
 
-    Once where the scales are Student's, at the noise that goes with them.
+    `is_once` where the scales are Student's, at the noise that goes with them.
     """
     parameters, target = Parameters(board), log_measured(board)
     medians = np.array([setup.noise.median for setup in board.setups])
@@ -137,7 +113,7 @@ def _fitted(
 
 
 def _no_plate(board: Board, models: Sequence[SetupModel], values: Values) -> str:
-    """That the plate which least squares found is not even near the readings, and which of them it misses most."""
+    """Message that the plate of least squares is not even near the readings, with the reading it misses most."""
     target = log_measured(board)
     residuals = target - np.concatenate([model.log_frequencies(values, "linear")[0] for model in models])
     worst = int(np.argmax(np.abs(residuals)))
@@ -148,15 +124,13 @@ def _no_plate(board: Board, models: Sequence[SetupModel], values: Values) -> str
     )
 
 
-def _with_peaks(models: Iterable[SetupModel], values: Values) -> tuple[SetupModel, ...]:
+def with_peaks(models: Iterable[SetupModel], values: Values) -> tuple[SetupModel, ...]:
     """The models, with all modes that peaks may be where a setup has such peaks."""
     return tuple(with_others(model, values) if takes_part(model.setup) else model for model in models)
 
 
 def noise_widenings(board: Board, residuals: Floats) -> Floats:
-    """Likely noise of each setup over its prior median, at least 1: (n_setups,) array.
-
-    Of the (n_modes,) residuals of ln f.
+    """Likely noise of each setup over its prior median, at least 1, from (n_modes,) residuals of ln f: (n_setups,).
 
     Where all noises are w times their medians a residual r has the variance v = (w median)^2 + own, so that it tells of
     w by the share s = (w median)^2 / v. With a part p of each reading to spare, the density of ln w is highest where
@@ -197,17 +171,17 @@ def every_predictor(board: Board, models: Sequence[SetupModel], law: LawName, ce
 
 
 def predictor(board: Board, models: Sequence[SetupModel], law: LawName, centre: Floats) -> Predictor:
-    """The same of the labelled modes."""
+    """ln f (Hz) of the labelled modes, as `every_predictor`."""
     return every_predictor(board, models, law, centre).of_labelled()
 
 
 def _covariance(
-    board: Board, models: Sequence[SetupModel], law: LawName, scales: Floats, centre: Floats, spread: Floats | None
+    board: Board, models: Sequence[SetupModel], scales: Floats, centre: Floats, spread: Floats | None
 ) -> Floats:
     """Covariance of all columns: of the weighted fit for the fitted ones, of the prior for the noise."""
     parameters = Parameters(board)
     n, columns = parameters.n_constants, parameters.fitted_columns
-    weighted = design(predictor(board, models, law, centre), scales, centre[columns])
+    weighted = design(predictor(board, models, "linear", centre), scales, centre[columns])
     covariance = np.zeros((parameters.n_dim, parameters.n_dim))
     covariance[np.ix_(columns, columns)] = np.linalg.inv(weighted.T @ weighted)
     for i, setup in enumerate(board.setups, start=n):
@@ -230,21 +204,13 @@ def exact_models(
 
     The box spans D_x / D_s, D_y / D_s and, where it is uncertain, nu_xy: frequencies of a bare plate are homogeneous in
     the rigidities, so a common factor needs no training, and side lengths only rescale the same terms; of an isotropic
-    board it spans D itself, which does no harm. Parameters of
-    effects, and inputs that their fields follow, add the two ends of their own range, each beside an opposite corner of
-    the box, and effects whose place is open the places all over the board.
+    board it spans D itself, which does no harm. Parameters of effects, and inputs that their fields follow, add the two
+    ends of their own range, each beside an opposite corner of the box, and effects whose place is open the places all
+    over the board. The law is checked at places of the box with sizes of effects as likely as their own normal
+    approximation says, and further points are solved until the error there is below `accepted_cents`.
 
-    The law is checked at places of the box with sizes of effects as likely as their own normal approximation says.
-
-    Parameters
-    ----------
-    models : sequence of SetupModel
-        At the centre.
-    centre, covariance : (n_dim,) and (n_dim, n_dim) arrays
-    is_rough : bool
-        Two opposite corners, one end per effect and one check will do: near the centre the error is small all the same.
-    accepted_cents : float, optional
-        Error at the checks up to which no further points are solved; by default `law_tolerance`.
+    A rough law has two opposite corners, one end per effect and one check: near the centre the error is small all the
+    same.
     """
     parameters = Parameters(board)
     n = parameters.n_constants
@@ -279,13 +245,8 @@ def exact_models(
     # Sizes of effects are often known to a factor only: what lies far out in all of them at once counts for nothing.
     held_out[:, alone] = sds[alone] * rng.standard_normal((n_held_out, len(alone)))
 
-    bounds = parameters.fitted_bounds
-    columns_fitted = parameters.fitted_columns
-
     def points(steps: Floats) -> list[Values]:
-        theta = centre + steps
-        theta[:, columns_fitted] = np.clip(theta[:, columns_fitted], bounds.lower, bounds.upper)
-        values = parameters.values(theta)
+        values = parameters.values(parameters.within_bounds(centre + steps))
         columns = {name: np.broadcast_to(value, len(steps)) for name, value in values.items()}
         return [{name: column[i] for name, column in columns.items()} for i in range(len(steps))]
 
@@ -296,13 +257,13 @@ def exact_models(
 
 
 def law_tolerance(board: Board) -> float:
-    """Error of an exact law, cents, that is small beside what any reading of a board scatters: a fifth of the least."""
+    """Error of an exact law, cents, that is small beside the scatter of any reading: a fifth of the least."""
     medians = np.array([setup.noise.median for setup in board.setups])
     return _SHARE_OF_NOISE * float(cents(reading_sd(board.setups, medians).min()))
 
 
 def _also_at(models: Sequence[SetupModel], parameters: Parameters, centre: Floats, reach: Floats) -> Floats:
-    """Where effects want a law to be made too: (n_points, n_dim) array of steps from the centre.
+    """Steps from the centre to further places where effects want the law to be made: (n_points, n_dim) array.
 
     A share of 0 is the lower end of what a parameter reaches within the bounds of its prior, and 1 the upper end; one
     that is exact stays.
@@ -311,9 +272,7 @@ def _also_at(models: Sequence[SetupModel], parameters: Parameters, centre: Float
         tuple(each.items()) for model in models for effect in model.system.effects for each in effect.also_at()
     )
     column = {name: i for i, name in enumerate(parameters.inputs, start=parameters.first_input)}
-    low, high = centre - reach, centre + reach
-    fitted, bounds = parameters.fitted_columns, parameters.fitted_bounds
-    low[fitted], high[fitted] = (np.clip(end[fitted], bounds.lower, bounds.upper) for end in (low, high))
+    low, high = parameters.within_bounds(np.stack([centre - reach, centre + reach]))
     steps = np.zeros((len(asked), parameters.n_dim))
     for step, shares in zip(steps, asked, strict=True):
         for name, share in shares:

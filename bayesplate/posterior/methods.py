@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Values
 from bayesplate.board.material import MODULI, RIGIDITIES, moduli, rigidities
 from bayesplate.estimates.least_squares import log_measured
@@ -18,62 +18,34 @@ from bayesplate.posterior.draws import Draws, posterior_mean_values
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.reweighting import weighted_mean
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class Method:
-    """What one method says of a board.
-
-    Attributes
-    ----------
-    mean : dict of float, Pa
-        E_x, E_y, G_xy; not a number where the method finds no plate.
-    misses : (n_modes,) array
-        ln predicted - ln measured of every reading, by full solves at its constants; not a number where these are no
-        plate's.
-    sd : dict of float, Pa
-        Empty where the method gives none.
-    interval : dict of (float, float), Pa
-        The middle 90 % of a posterior, otherwise empty.
-    condition_number : float or None
-        Of a method of least squares.
-    n_subsets : int or None
-        Of the percentile method.
-    """
+    """Constants of a board by one method, Pa."""
 
     name: str
-    mean: Mapping[str, float]
-    misses: Floats
-    sd: Mapping[str, float] = field(default_factory=dict)
-    interval: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    condition_number: float | None = None
-    n_subsets: int | None = None
+    mean: Mapping[str, float]  # E_x, E_y, G_xy; nan where the method finds no plate
+    misses: Floats  # (n_modes,), ln predicted - ln measured by full solves at these; nan if they are no plate's
+    sd: Mapping[str, float] = field(default_factory=dict)  # empty where the method gives none
+    interval: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # middle 90 % of a posterior, or empty
+    condition_number: float | None = None  # of least squares
+    n_subsets: int | None = None  # of the percentile method
 
 
 def point_methods(problem: PosedProblem, system: PaperSystem, expected_sd: Mapping[str, float]) -> list[Method]:
     """The methods without sampling: the paper's least squares, weighted least squares, percentile.
 
-    Parameters
-    ----------
-    expected_sd : dict of float
-        Relative standard deviation of the weighted estimate of each modulus.
-
-    Returns
-    -------
-    list of Method
-        Without the percentile method where there are too many modes, or none of its estimates is positive.
+    The last is left out where there are too many modes, or none of its estimates is positive. `expected_sd` is the
+    relative standard deviation of the weighted estimate of each modulus.
     """
-    nominal = problem.board.nominal()
-    paper = system.solve()
-    estimate = problem.estimate
+    nominal, estimate, paper = problem.board.nominal(), problem.estimate, system.solve()
     D_x, D_y, D_s = estimate.rigidities
     weighted = _named(moduli(D_x, D_y, D_s, estimate.values["thickness"], estimate.values["poisson_xy"]))
     methods = [
         Method(
             "paper_least_squares",
             _named(system.moduli(paper)),
-            misses(problem, {**nominal, **_rigidities(paper)}),
+            misses(problem, nominal | dict(zip(RIGIDITIES, paper, strict=True))),
             condition_number=system.condition_number,
         ),
         Method(
@@ -87,12 +59,12 @@ def point_methods(problem: PosedProblem, system: PaperSystem, expected_sd: Mappi
     percentile = percentile_estimate(system)
     if percentile is not None and all(np.isfinite(percentile.mean[name]) for name in MODULI):
         E_x, E_y, G_xy = (percentile.mean[name] for name in MODULI)
-        constants = np.array(rigidities(E_x, E_y, G_xy, nominal["thickness"], nominal["poisson_xy"]))
+        constants = rigidities(E_x, E_y, G_xy, nominal["thickness"], nominal["poisson_xy"])
         methods.append(
             Method(
                 "percentile",
                 percentile.mean,
-                misses(problem, {**nominal, **_rigidities(constants)}),
+                misses(problem, nominal | constants._asdict()),
                 sd=percentile.sd,
                 n_subsets=percentile.n_subsets,
             )
@@ -101,13 +73,7 @@ def point_methods(problem: PosedProblem, system: PaperSystem, expected_sd: Mappi
 
 
 def posterior_method(name: str, problem: PosedProblem, draws: Draws, weights: Floats) -> Method:
-    """A posterior as a method, from weighted draws.
-
-    Parameters
-    ----------
-    weights : (n_chains * n_draws,) array
-        Sum to 1.
-    """
+    """A posterior as a method, from draws with (n_chains * n_draws,) weights that sum to 1."""
     mean, sd, interval = {}, {}, {}
     for modulus, by_chain in draws.moduli.items():
         values = by_chain.ravel()
@@ -124,7 +90,7 @@ def posterior_method(name: str, problem: PosedProblem, draws: Draws, weights: Fl
 
 
 def misses(problem: PosedProblem, values: Values) -> Floats:
-    """ln predicted - ln measured of all readings, by full solves; not a number where the constants are no plate's."""
+    """ln predicted - ln measured of each reading, by full solves: (n_modes,); nan if the constants are no plate's."""
     if not all(float(values[name]) > 0 for name in RIGIDITIES):
         return np.full(log_measured(problem.board).size, np.nan)
     predicted = [full_log_frequencies(model, values) for model in problem.posterior.models]
@@ -133,7 +99,3 @@ def misses(problem: PosedProblem, values: Values) -> Floats:
 
 def _named(constants: tuple[Floats, ...]) -> dict[str, float]:
     return {name: float(value) for name, value in zip(MODULI, constants, strict=True)}
-
-
-def _rigidities(constants: Floats) -> dict[str, Floats]:
-    return {name: np.asarray(value) for name, value in zip(RIGIDITIES, constants, strict=True)}

@@ -1,4 +1,4 @@
-"""A mixture of Student distributions, fitted to draws: what independent proposals are drawn from.
+"""A mixture of Student distributions, fitted to draws: the distribution of independent proposals.
 
 A posterior of a plate is nearly normal given its noise, and the wider the larger the noise is: one ellipsoid fits it
 but roughly, a few of them fit it well. Proposals from a mixture of four are accepted seven times out of ten where those
@@ -16,9 +16,8 @@ from functools import cached_property
 from math import lgamma
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from bayesplate.arrays import Floats
 
 DEGREES_OF_FREEDOM = 6.0
 """Of each part: heavier tails than the posterior's, or walkers far out would stay there."""
@@ -32,35 +31,26 @@ _FLOOR = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Mixture:
-    """A mixture of Student distributions.
+    """A mixture of Student distributions."""
 
-    Attributes
-    ----------
-    weights : (n_parts,) array
-        Sum to one.
-    centres : (n_parts, n_dim) array
-    factors : (n_parts, n_dim, n_dim) array
-        Lower Cholesky factors of the scale matrices.
-    """
-
-    weights: FloatArray
-    centres: FloatArray
-    factors: FloatArray
+    weights: Floats  # (n_parts,), sum to one
+    centres: Floats  # (n_parts, n_dim)
+    factors: Floats  # (n_parts, n_dim, n_dim), lower Cholesky factors of the scale matrices
 
     @classmethod
-    def with_covariance(cls, centre: FloatArray, covariance: FloatArray) -> Mixture:
+    def with_covariance(cls, centre: Floats, covariance: Floats) -> Mixture:
         """One Student distribution of that mean and covariance."""
         shrink = (DEGREES_OF_FREEDOM - 2.0) / DEGREES_OF_FREEDOM
         return cls(np.ones(1), centre[None], _cholesky(shrink * covariance)[None])
 
     @classmethod
-    def one_fitted(cls, draws: FloatArray) -> Mixture:
+    def one_fitted(cls, draws: Floats) -> Mixture:
         """The Student distribution with the mean and covariance of (..., n_dim) draws."""
         flat = draws.reshape(-1, draws.shape[-1])
         return cls.with_covariance(flat.mean(axis=0), np.cov(flat.T).reshape(flat.shape[1], flat.shape[1]))
 
     @classmethod
-    def fitted(cls, draws: FloatArray) -> Mixture:
+    def fitted(cls, draws: Floats) -> Mixture:
         """The mixture of greatest likelihood, nearly, for (..., n_dim) draws; fewer parts where the draws are few.
 
         Started from the draws in order of their distance from the mean, in as many shells as there are parts: what one
@@ -87,7 +77,7 @@ class Mixture:
         return mixture
 
     @classmethod
-    def _of_shares(cls, flat: FloatArray, shares: FloatArray, pulls: FloatArray, floor: FloatArray) -> Mixture:
+    def _of_shares(cls, flat: Floats, shares: Floats, pulls: Floats, floor: Floats) -> Mixture:
         """The mixture of greatest likelihood given which part each draw belongs to, in (n_parts, n_draws) shares."""
         centres, factors = [], []
         for share, weight in zip(shares, shares * pulls, strict=True):
@@ -97,39 +87,39 @@ class Mixture:
         return cls(shares.mean(axis=1), np.stack(centres), np.stack(factors))
 
     def widened(self, factor: float) -> Mixture:
-        """The same, so many times as wide, beside itself: half and half."""
+        """The same and itself `factor` times as wide, half and half."""
         factors = np.concatenate([self.factors, factor * self.factors])
         return Mixture(np.tile(0.5 * self.weights, 2), np.tile(self.centres, (2, 1)), factors)
 
     @cached_property
-    def _whitenings(self) -> FloatArray:
+    def _whitenings(self) -> Floats:
         """Inverses of the factors, transposed: solving at each step would wake threads that cost ten steps."""
         return np.swapaxes(np.linalg.inv(self.factors), 1, 2)
 
     @cached_property
-    def _log_peaks(self) -> FloatArray:
+    def _log_peaks(self) -> Floats:
         """Logarithm of each part's density at its centre, times its weight: (n_parts,) array."""
         n_dim, nu = self.centres.shape[1], DEGREES_OF_FREEDOM
         log_volumes = np.log(np.diagonal(self.factors, axis1=1, axis2=2)).sum(axis=1)
         of_all = lgamma(0.5 * (nu + n_dim)) - lgamma(0.5 * nu) - 0.5 * n_dim * np.log(nu * np.pi)
         return np.log(self.weights) + of_all - log_volumes
 
-    def squared_distances(self, points: FloatArray) -> FloatArray:
+    def squared_distances(self, points: Floats) -> Floats:
         """Squared Mahalanobis distances in units of the scale matrices: (n_parts, n) array from (n, n_dim) points."""
         z = (points - self.centres[:, None]) @ self._whitenings
         return np.einsum("kni,kni->kn", z, z)
 
-    def _log_shares(self, distances: FloatArray) -> FloatArray:
+    def _log_shares(self, distances: Floats) -> Floats:
         """Logarithm of what each part has of the density, from squared distances: (n_parts, n) array."""
         power = 0.5 * (DEGREES_OF_FREEDOM + self.centres.shape[1])
         return np.asarray(self._log_peaks[:, None] - power * np.log1p(distances / DEGREES_OF_FREEDOM))
 
-    def log_density(self, points: FloatArray) -> FloatArray:
+    def log_density(self, points: Floats) -> Floats:
         """Logarithm of the density: (...) array from (..., n_dim) points."""
         logs = self._log_shares(self.squared_distances(points.reshape(-1, points.shape[-1])))
         return np.asarray(np.logaddexp.reduce(logs, axis=0)).reshape(points.shape[:-1])
 
-    def points(self, n_points: int, rng: np.random.Generator | np.random.RandomState) -> FloatArray:
+    def points(self, n_points: int, rng: np.random.Generator | np.random.RandomState) -> Floats:
         """Draws: (n_points, n_dim) array."""
         normal = rng.standard_normal((n_points, self.centres.shape[1]))
         normal *= np.sqrt(DEGREES_OF_FREEDOM / rng.chisquare(DEGREES_OF_FREEDOM, n_points))[:, None]
@@ -141,7 +131,7 @@ class Mixture:
         return result
 
 
-def _cholesky(scale_matrix: FloatArray) -> FloatArray:
+def _cholesky(scale_matrix: Floats) -> Floats:
     """Lower Cholesky factor of a scale matrix, whatever the units of the parameters: (n_dim, n_dim) array."""
     scale = np.sqrt(np.diagonal(scale_matrix))
     correlation = scale_matrix / np.outer(scale, scale)

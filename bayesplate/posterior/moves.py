@@ -17,11 +17,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Bools, Floats
 from bayesplate.posterior.mixture import Mixture
-
-Floats = NDArray[np.float64]
 
 _INDEPENDENT, _DIFFERENTIAL, _STRETCH = 0.76, 0.18, 0.06
 """Shares of the steps."""
@@ -36,7 +34,7 @@ class IndependentMove:
         self.mixture = mixture
         self._ahead: Iterator[tuple[Floats, Floats, Floats]] = iter(())
 
-    def propose(self, model: Any, state: Any) -> tuple[Any, NDArray[np.bool_]]:
+    def propose(self, model: Any, state: Any) -> tuple[Any, Bools]:
         """One step of emcee's chain."""
         points, log_prob, log_ratio = next(self._ahead, None) or self._drawn(model, len(state.coords))
         before = state.log_prob - self.mixture.log_density(state.coords)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board, Values
 from bayesplate.board.parameter import Parameter
 from bayesplate.estimates.refit import Bounds
@@ -25,12 +25,11 @@ class Parameters:
 
     @property
     def n_constants(self) -> int:
-        """Number of free rigidities: the first columns."""
+        """Number of free rigidities, which are the first columns."""
         return self.board.symmetry.n
 
     @property
     def n_setups(self) -> int:
-        """Number of setups."""
         return len(self.board.setups)
 
     @cached_property
@@ -45,12 +44,11 @@ class Parameters:
 
     @cached_property
     def inputs(self) -> tuple[str, ...]:
-        """Their names."""
+        """Names of the uncertain parameters."""
         return tuple(parameter.name for parameter in self.uncertain)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of all columns."""
         noises = [f"log_{noise.name}" for noise in self.noises]
         return (*(f"log_{name}" for name in self.board.symmetry.free), *noises, *(f"z[{name}]" for name in self.inputs))
 
@@ -61,11 +59,10 @@ class Parameters:
 
     @cached_property
     def n_dim(self) -> int:
-        """Number of columns."""
         return self.first_input + len(self.inputs)
 
     @cached_property
-    def fitted_columns(self) -> NDArray[np.intp]:
+    def fitted_columns(self) -> Indices:
         """Columns that frequencies depend on: all but the noise."""
         return np.r_[: self.n_constants, self.first_input : self.n_dim]
 
@@ -82,17 +79,18 @@ class Parameters:
             lower[i], upper[i] = parameter.prior.standard_bounds
         return Bounds(lower[self.fitted_columns], upper[self.fitted_columns])
 
+    def within_bounds(self, theta: Floats) -> Floats:
+        """(n_draws, n_dim) theta, its fitted columns moved within their limits."""
+        theta, columns, limits = theta.copy(), self.fitted_columns, self.fitted_bounds
+        theta[:, columns] = np.clip(theta[:, columns], limits.lower, limits.upper)
+        return theta
+
     @cached_property
-    def _exact(self) -> dict[str, NDArray[np.float64]]:
+    def _exact(self) -> dict[str, Floats]:
         return {name: np.asarray(prior.mean) for name, prior in self.board.inputs.items() if prior.is_exact}
 
-    def values(self, theta: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-        """Rigidities and inputs by name, SI; (n_draws,) arrays, or numbers for exact inputs.
-
-        Parameters
-        ----------
-        theta : (n_draws, n_dim) array
-        """
+    def values(self, theta: Floats) -> dict[str, Floats]:
+        """Rigidities and inputs by name, SI, from (n_draws, n_dim) theta: (n_draws,) arrays, numbers if exact."""
         values = dict(self._exact)
         for i, parameter in enumerate(self.uncertain, start=self.first_input):
             values[parameter.name] = parameter.prior.value(theta[:, i])
@@ -100,15 +98,20 @@ class Parameters:
         values.update(self.board.symmetry.rigidities(free, values["poisson_xy"]))
         return values
 
-    def values_at(self, theta: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    def values_at(self, theta: Floats) -> dict[str, Floats]:
         """Constants and inputs at one point, each a number, from its (n_dim,) columns."""
         return {name: np.asarray(np.ravel(value)[0]) for name, value in self.values(theta[None, :]).items()}
 
-    def log_noise(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    def log_noise(self, theta: Floats) -> Floats:
         """ln of the relative noise: (n_draws, n_setups) array."""
         return theta[:, self.n_constants : self.first_input]
 
-    def log_prior_inputs(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    def log_widening(self, theta: Floats) -> float:
+        """ln of the noise at one point over the median of its prior, in the setup where that is largest."""
+        medians = np.array([setup.noise.median for setup in self.board.setups])
+        return float(np.max(self.log_noise(theta[None])[0] - np.log(medians)))
+
+    def log_prior_inputs(self, theta: Floats) -> Floats:
         """Log density of the input columns: (n_draws,) array."""
         z = theta[:, self.first_input :]
         lower, upper, level = self._input_priors
@@ -116,22 +119,22 @@ class Parameters:
         return np.where(inside, level - 0.5 * np.einsum("ni,ni->n", z, z), -np.inf)
 
     @cached_property
-    def _input_priors(self) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-        """Bounds of the input columns, and what their log density is beside -z^2 / 2 between them."""
+    def _input_priors(self) -> tuple[Floats, Floats, float]:
+        """Bounds of the input columns, and the constant of their log density, which is that less z^2 / 2."""
         priors = [parameter.prior for parameter in self.uncertain]
         lower, upper = np.array([prior.standard_bounds for prior in priors]).reshape(-1, 2).T
         inside = np.clip(0.0, lower, upper)
         heights = [float(prior.log_prior(z)) + 0.5 * z**2 for prior, z in zip(priors, inside, strict=True)]
         return lower, upper, sum(heights)
 
-    def log_prior_noise(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    def log_prior_noise(self, theta: Floats) -> Floats:
         """Log density of the columns of noise: (n_draws,) array."""
         total = np.zeros(theta.shape[0])
         for log_noise, noise in zip(self.log_noise(theta).T, self.noises, strict=True):
             total += noise.prior.log_density_of_log(log_noise)
         return total
 
-    def theta(self, values: Values, noise: NDArray[np.float64]) -> NDArray[np.float64]:
+    def theta(self, values: Values, noise: Floats) -> Floats:
         """Columns of one point from rigidities, inputs and relative noises: (n_dim,) array; inverse of `values`."""
         inputs = [float(one.prior.standard(values[one.name])) for one in self.uncertain]
         return np.array([*np.log(self.board.symmetry.free_of(values)), *np.log(noise), *inputs])

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
-from bayesplate.board.material import RIGIDITIES
+from bayesplate.board.material import MODULI, RIGIDITIES, moduli
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.sessions import with_discrepancies
 from bayesplate.errors import InputError, NotIdentifiableError
@@ -23,55 +23,48 @@ from bayesplate.estimates.identifiability import (
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.unusual import unusual
 from bayesplate.frequencies.laws import LawName
-from bayesplate.posterior.contradictions import require_possible_noise, require_reachable
 from bayesplate.posterior.first_labels import Proposed, propose_labels
-from bayesplate.posterior.laplace import LaplaceApproximation, laplace_approximation, linearisation_errors
+from bayesplate.posterior.laplace import laplace_approximation, linearisation_errors
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.slips import Remarks, is_too_wide, noise_remarks, reading_remarks
 from bayesplate.posterior.target import Posterior, linear_suffices
 from bayesplate.posterior.veerings import with_doubts
 
-Floats = NDArray[np.float64]
-
 _N_CHECKS = 256
 _N_NAMED = 64
 """Of these checks, on which modes are named."""
+_N_TRIED = 1000
+_SPREAD = 3.0
+"""Standard errors of the draws on which a prior is tried, as of the sampler's starts."""
+_NOISE_SDS = 6.0
+"""The largest noise that a prior is taken to allow lies this many standard deviations of its logarithm above."""
+_IMPOSSIBLE_MISFIT = 1e4
+"""Chi^2 per degree of freedom at that noise from which it contradicts the readings: residuals a hundred times as
+large. An effect that the model lacks leaves less, and is for `diagnose` to find."""
+_UNITS = {**dict.fromkeys(MODULI, (1e9, "GPa")), **dict.fromkeys(RIGIDITIES, (1.0, "N m"))}
 
 
 @dataclass(frozen=True, eq=False)
 class PosedProblem:
-    """A board posed as a problem of inference: its estimate, both laws, and where the posterior lies.
-
-    Attributes
-    ----------
-    posterior : Posterior
-        Its models hold both laws.
-    centre, covariance : (n_dim,) and (n_dim, n_dim) arrays
-        Normal approximation of the posterior, for the starts.
-    is_forced : bool
-        Whether the law was asked for: then it is sampled itself, and no surrogate of it.
-    veerings : tuple of str
-        What is in doubt about labels near a veering, a sentence per setup.
-    """
+    """A board posed as a problem of inference: its estimate, both laws, and the place of the posterior."""
 
     board: Board
     prior: PriorCard
     estimate: Estimate
     identifiability: Identifiability
-    posterior: Posterior
-    centre: NDArray[np.float64]
-    covariance: NDArray[np.float64]
-    is_forced: bool = False
-    veerings: tuple[str, ...] = ()
+    posterior: Posterior  # its models hold both laws
+    centre: Floats  # (n_dim,), with the covariance a normal approximation of the posterior, for the starts
+    covariance: Floats  # (n_dim, n_dim)
+    is_forced: bool = False  # the law was asked for: it is sampled itself, and no surrogate of it
+    veerings: tuple[str, ...] = ()  # a sentence per setup about labels in doubt near a veering
 
     @property
     def parameters(self) -> Parameters:
-        """The sampled columns."""
         return self.posterior.parameters
 
     @cached_property
     def doubts(self) -> tuple[str, ...]:
-        """What is unusual about the constants and the readings, before anything is sampled: a sentence each."""
+        """A sentence each about unusual constants and readings, before anything is sampled."""
         # where the uncertain inputs have moved: at their nominal sizes a soft core looks like another board
         there = self.parameters.values_at(self.centre)
         constants = unusual(self.board, self.prior, np.array([there[name] for name in RIGIDITIES]))
@@ -79,7 +72,7 @@ class PosedProblem:
 
     @property
     def slips(self) -> tuple[str, ...]:
-        """Those of the doubts that name a reading or two as a slip."""
+        """The doubts that name a reading or two as a slip."""
         return self._readings.slips
 
     @cached_property
@@ -90,42 +83,22 @@ class PosedProblem:
 
     @property
     def log_widening(self) -> float:
-        """ln of the noise at the centre over the median of its prior, of the setup where that is most."""
-        medians = np.array([setup.noise.median for setup in self.board.setups])
-        return float(np.max(self.parameters.log_noise(self.centre[None])[0] - np.log(medians)))
+        """ln of the noise at the centre over the median of its prior, in the setup where that is largest."""
+        return self.parameters.log_widening(self.centre)
 
     def under(self, law: LawName) -> PosedProblem:
         """The same problem under the law of that name."""
-        return replace(self, posterior=replace_law(self.posterior, law))
-
-
-def replace_law(posterior: Posterior, law: LawName) -> Posterior:
-    """The same posterior under another law."""
-    return Posterior(posterior.board, posterior.prior, posterior.models, law, posterior.robust)
+        one = self.posterior
+        return replace(self, posterior=Posterior(one.board, one.prior, one.models, law, one.robust))
 
 
 def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: bool = False) -> PosedProblem:
     """Estimate by least squares, check that the constants are identifiable, build both laws and choose one.
 
-    Parameters
-    ----------
-    law : "linear" or "exact", optional
-        By default the linear law where its error over the normal approximation of the posterior, widened because the
-        noise is not known, stays below a quarter of the expected noise for every mode.
-    robust : bool
-        Student's distribution for the noise.
-
-    Returns
-    -------
-    PosedProblem
-        Of the board with labels in doubt that may name another mode near a veering (`bayesplate.posterior.veerings`).
-
-    Raises
-    ------
-    InputError
-        If a published table is not of its setup's edges, aspect ratio and labels.
-    NotIdentifiableError
-        If the labelled modes leave a constant open, the prior excludes what they tell, or the declared noise does.
+    By default the linear law serves where its error over the normal approximation of the posterior, widened because
+    the noise is not known, stays below a quarter of the expected noise for every mode. Labels that may name another
+    mode near a veering are in doubt (`bayesplate.posterior.veerings`). InputError if a published table is of another
+    setup; NotIdentifiableError if the labelled modes leave a constant open, or contradict the prior or the noise.
     """
     faults = coefficient_faults(board)
     if faults:
@@ -137,52 +110,27 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
 
 
 def _posed(proposed: Proposed, prior: PriorCard, law: LawName | None, robust: bool) -> PosedProblem:
-    """The problem as the labels are."""
-    located = _located(proposed, robust)
-    approximation, board = located.approximation, located.board
-    serving = _law_that_serves(board, approximation) if law is None else law
-    posterior = Posterior(board, prior, approximation.models, serving, robust)
-    centre, covariance = approximation.centre, approximation.covariance
-    require_reachable(posterior, centre, covariance)
-    require_possible_noise(posterior, centre)
-    return PosedProblem(
-        board, prior, located.estimate, located.identifiability, posterior, centre, covariance, law is not None
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class _Located:
-    """Where the posterior of a board lies."""
-
-    board: Board
-    estimate: Estimate
-    identifiability: Identifiability
-    approximation: LaplaceApproximation
-
-
-def _located(proposed: Proposed, robust: bool) -> _Located:
-    """The estimate, if the labelled modes determine the constants there and where the posterior lies.
-
-    Modes may stand there in another order than at the estimate.
-    """
+    """The problem with the labels as they are."""
     board = with_discrepancies(proposed.board)
     require_labels(board)
     estimate = weighted_least_squares(board, start=proposed.rigidities)
     found = identifiability(estimate.sensitivities, estimate.scales, board.symmetry)
     require_identifiable(board, found)
-    approximation = laplace_approximation(board, estimate, robust, proposed.spread)
-    there = Parameters(board).values_at(approximation.centre)
-    sensitivities = np.concatenate([model.sensitivities(there) for model in approximation.models])
+    centre, covariance, models = laplace_approximation(board, estimate, robust, proposed.spread)
+    there = Parameters(board).values_at(centre)
+    sensitivities = np.concatenate([model.sensitivities(there) for model in models])
+    # At the centre of the posterior modes may stand in another order than at the estimate.
     require_identifiable(board, identifiability(sensitivities, estimate.scales, board.symmetry))
-    return _Located(board, estimate, found, approximation)
-
-
-def _law_that_serves(board: Board, approximation: LaplaceApproximation) -> LawName:
-    draws = _plausible(board, approximation.centre, approximation.covariance)
-    errors = linearisation_errors(board, approximation.models, draws)
-    medians = [setup.noise.median for setup in board.setups]
-    n_every = [len(model.every_place) for model in approximation.models]
-    return "linear" if linear_suffices(n_every, errors, medians) else "exact"
+    serving = law
+    if serving is None:
+        errors = linearisation_errors(board, models, _plausible(board, centre, covariance))
+        medians = [setup.noise.median for setup in board.setups]
+        is_linear = linear_suffices([len(model.every_place) for model in models], errors, medians)
+        serving = "linear" if is_linear else "exact"
+    posterior = Posterior(board, prior, models, serving, robust)
+    _require_reachable(posterior, centre, covariance)
+    require_possible_noise(posterior, centre)
+    return PosedProblem(board, prior, estimate, found, posterior, centre, covariance, law is not None)
 
 
 def _with_doubts(problem: PosedProblem, law: LawName | None) -> PosedProblem:
@@ -203,20 +151,59 @@ def _with_doubts(problem: PosedProblem, law: LawName | None) -> PosedProblem:
 
 def _plausible(board: Board, centre: Floats, covariance: Floats) -> Floats:
     """Draws of the normal approximation, wider because the noise is not known, within the limits of the inputs."""
+    parameters = Parameters(board)
     draws = np.random.default_rng(0).multivariate_normal(centre, covariance, _N_CHECKS)
-    parameters, columns = Parameters(board), Parameters(board).fitted_columns
-    constants = slice(parameters.n_constants)
-    draws[:, constants] += (_widening(board) - 1.0) * (draws - centre)[:, constants]
-    limits = parameters.fitted_bounds
-    draws[:, columns] = np.clip(draws[:, columns], limits.lower, limits.upper)
-    return np.asarray(draws)
-
-
-def _widening(board: Board) -> float:
-    """How much wider the constants spread because the noise is not known: root mean square of noise over its median.
-
-    The prior of ln noise and two for each reading to spare add up to its precision.
-    """
     spare = max(sum(len(setup.readings) for setup in board.setups) - board.symmetry.n, 0)
     log_sd = max(setup.noise.log_sd for setup in board.setups)
-    return float(np.exp(1.0 / (1.0 / log_sd**2 + 2.0 * spare)))
+    # Root mean square of the noise over its median: the precision of its ln is the prior's and two per spare reading.
+    widening = float(np.exp(1.0 / (1.0 / log_sd**2 + 2.0 * spare)))
+    constants = slice(parameters.n_constants)
+    draws[:, constants] += (widening - 1.0) * (draws - centre)[:, constants]
+    return parameters.within_bounds(draws)
+
+
+def _require_reachable(posterior: Posterior, centre: Floats, covariance: Floats) -> None:
+    """Refuse a prior that is zero at all draws three times as wide as the normal approximation of the readings."""
+    draws = np.random.default_rng(0).multivariate_normal(centre, _SPREAD**2 * covariance, _N_TRIED)
+    if np.isfinite(posterior.log_prior_constants(posterior.parameters.within_bounds(draws))).any():
+        return
+    values = posterior.parameters.values_at(centre)
+    elastic = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
+    by_name = values | elastic._asdict()
+    outside = []
+    for name, density in posterior.priors.items():
+        value = float(by_name[name])
+        if not density.lower <= value <= density.upper:
+            factor, unit = _UNITS[name]
+            low, high = density.lower / factor, density.upper / factor
+            outside.append(f"{name} is about {value / factor:.3g} {unit}, the prior wants {low:g} to {high:g}")
+    where = f" ({'; '.join(outside)})" if outside else ""
+    raise NotIdentifiableError(
+        f"{posterior.board.name}: the prior {posterior.prior.name} excludes the data: 0 of {_N_TRIED} draws around the "
+        f"least-squares estimate have a density under it{where}; nothing was sampled: "
+        "check the prior, the labels and the units"
+    )
+
+
+def require_possible_noise(posterior: Posterior, centre: Floats) -> None:
+    """Refuse a noise so small that no draw from its prior comes near the residuals at the centre, by the exact law."""
+    board, values = posterior.board, posterior.parameters.values(centre[None, :])
+    largest = [setup.noise.median * np.exp(_NOISE_SDS * setup.noise.log_sd) for setup in board.setups]
+    squares, n_modes = 0.0, 0
+    for readings, model, noise in zip(posterior.readings, posterior.models, largest, strict=True):
+        predicted = model.log_frequencies(values, "exact")[0]
+        gaps = np.maximum(np.maximum(readings.log_low - predicted, predicted - readings.log_high), 0.0)
+        squares += float(np.sum((gaps / np.hypot(noise, readings.own_sd)) ** 2))
+        n_modes += gaps.size
+    misfit = squares / max(n_modes - board.symmetry.n, 1)
+    if not misfit > _IMPOSSIBLE_MISFIT:
+        return
+    levels = ", ".join(
+        f"{100.0 * noise:.2g} %" + (f" in setup {setup.name}" if len(board.setups) > 1 else "")
+        for setup, noise in zip(board.setups, largest, strict=True)
+    )
+    raise NotIdentifiableError(
+        f"{board.name}: the declared noise contradicts the data: chi^2 / dof = {misfit:.2g} at a noise of {levels}, "
+        "the most that its prior allows; nothing was sampled: look for a reading that is a decimal place off, or has "
+        "another's label, or state noise_percent as large as repeated readings differ"
+    )

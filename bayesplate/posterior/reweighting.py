@@ -3,49 +3,32 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.statistics import effective_draws, smoothed
 from bayesplate.posterior.target import linear_suffices
 
-Floats = NDArray[np.float64]
-
 FEWEST_WEIGHTED_DRAWS = 200
 """With fewer effective draws left by the weights, one law cannot stand for the other."""
-
 _N_LINEARISATION = 2000
 
 
-def means_under(
-    inference: Inference, draws: Draws, law: LawName, errors: Floats | None = None
-) -> tuple[dict[str, float], float]:
+def means_under(inference: Inference, draws: Draws, law: LawName, errors: Floats) -> tuple[dict[str, float], float]:
     """Posterior means of the constants under a law, by weighting the draws of the fit.
 
     The exact law is dear: draws of the linear one are weighted at those draws only at which `linearisation` compared
-    the two, and the shift of their mean is added to the mean of all. Where these leave few, all are weighted.
-
-    Parameters
-    ----------
-    errors : (n_some, n_every) array, cents, optional
-        Those of `linearisation`, where they are known already.
-
-    Returns
-    -------
-    means : dict of float
-        E_x, E_y, G_xy (Pa), D_x, D_y, D_s (N m).
-    effective_draws : float
-        How many draws of equal weight the weights are worth; all of them under the law of the fit.
+    the two, with these `errors`, and the shift of their mean is added to the mean of all. Where these leave
+    few, all are weighted. Means of E_x, E_y, G_xy (Pa), D_x, D_y, D_s (N m), and the effective number of draws.
     """
     constants = {name: values.ravel() for name, values in {**draws.moduli, **draws.rigidities}.items()}
     if law == "exact" != inference.problem.posterior.law:
-        every = _every(draws)
-        errors = linearisation(inference, draws) if errors is None else errors
-        linear = [each.reshape(-1, each.shape[-1])[::every] for each in draws.every_log_frequency]
-        exact = np.concatenate(linear, axis=1) - errors / cents(np.ones(1))
-        weights = _weights(_log_likelihood(inference, draws.flat[::every], exact), draws, every)
+        every, posterior = _every(draws), inference.problem.posterior
+        exact = np.concatenate(draws.flat_log_frequency, axis=1)[::every] - errors / cents(np.ones(1))
+        log_likelihood = posterior.log_likelihood_of(posterior.by_setup(exact), draws.flat[::every])
+        weights = _weights(log_likelihood, draws, every)
         if effective_draws(weights) >= FEWEST_WEIGHTED_DRAWS:
             means = {
                 name: float(np.mean(values)) + weighted_mean(values[::every] - np.mean(values[::every]), weights)
@@ -64,15 +47,9 @@ def law_weights(inference: Inference, draws: Draws, law: LawName) -> Floats:
 
 
 def _weights(log_likelihood: Floats, draws: Draws, every: int = 1) -> Floats:
-    """Smoothed weights of every so many draws from what another law says of them: (n_some, n_modes) to (n_some,)."""
+    """Smoothed weights (n_some,) of every so many draws from their (n_some, n_factors) likelihood under another law."""
     own = draws.log_likelihood.sum(axis=-1).ravel()[::every]
     return smoothed(log_likelihood.sum(axis=1) - own)[0]
-
-
-def _log_likelihood(inference: Inference, theta: Floats, every_log_frequency: Floats) -> Floats:
-    """Log probability of every factor of the likelihood where the frequencies are known: (n_some, n) arrays."""
-    posterior = inference.problem.posterior
-    return posterior.log_likelihood_of(posterior.by_setup(every_log_frequency), theta)
 
 
 def weighted_mean(values: Floats, weights: Floats) -> float:
@@ -85,24 +62,19 @@ def linearisation(inference: Inference, draws: Draws) -> Floats:
 
     The draws know what their own law gives; the other one is evaluated.
     """
-    every, law = _every(draws), inference.problem.posterior.law
-    own = [each.reshape(-1, each.shape[-1])[::every] for each in draws.every_log_frequency]
-    other: LawName = "linear" if law == "exact" else "exact"
+    every = _every(draws)
+    other: LawName = "linear" if inference.problem.posterior.law == "exact" else "exact"
     there = inference.problem.under(other).posterior.every_log_frequency(draws.flat[::every])
-    apart = np.concatenate(there, axis=1) - np.concatenate(own, axis=1)
+    apart = np.concatenate(there, axis=1) - np.concatenate(draws.flat_log_frequency, axis=1)[::every]
     return cents(apart if other == "linear" else -apart)
 
 
 def _every(draws: Draws) -> int:
-    """Draws from one at which the laws are compared to the next."""
+    """Step between the draws at which the laws are compared."""
     return max(1, len(draws.flat) // _N_LINEARISATION)
 
 
 def linear_is_enough(inference: Inference, draws: Draws, errors: Floats | None = None) -> bool:
-    """Whether the linear law's error over the posterior stays below its share of the posterior's own noise.
-
-    `errors` are those of `linearisation`, where they are known already.
-    """
-    noise = np.median(draws.noise.reshape(-1, draws.noise.shape[-1]), axis=0)
-    n_every = inference.problem.posterior.n_every
-    return linear_suffices(n_every, linearisation(inference, draws) if errors is None else errors, list(noise))
+    """Whether the linear law's `errors` over the posterior stay below their share of the posterior's own noise."""
+    errors = linearisation(inference, draws) if errors is None else errors
+    return linear_suffices(inference.problem.posterior.n_every, errors, draws.median_noise)

@@ -1,4 +1,4 @@
-"""Where Student's likelihood is highest: at constants that most readings agree on, whatever one of them says.
+"""The highest point of Student's likelihood: constants that most readings agree on, whatever one of them is.
 
 Under normal errors one wrong reading pulls the constants after it. Under Student's they have a second peak, where the
 noise is small and that reading lies far off; a sampler that starts at the first one does not find it. Both are sought
@@ -8,31 +8,20 @@ to first order, from the constants of all readings and from those of all but one
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.estimates.least_squares import Estimate
 from bayesplate.frequencies.reading_errors import STUDENT, reading_sd
-
-Floats = NDArray[np.float64]
 
 _NOISE_SDS = np.linspace(-1.0, 10.0, 23)
 _N_STEPS = 60
 
 
 def highest_student(board: Board, estimate: Estimate) -> tuple[Floats, Floats]:
-    """Rigidities and noise where the readings are most probable under Student's errors, to first order.
+    """Rigidities (3,), N m, and relative noise (n_setups,) most probable under Student's errors, to first order.
 
-    Parameters
-    ----------
-    estimate : Estimate
-        By weighted least squares of all readings.
-
-    Returns
-    -------
-    rigidities : (3,) array, N m
-    noise : (n_setups,) array
-        Relative.
+    `estimate` is by weighted least squares of all readings.
     """
     residuals, slopes = estimate.residuals, board.symmetry.along(estimate.sensitivities)
     noises = np.stack([setup.noise.median * np.exp(setup.noise.log_sd * _NOISE_SDS) for setup in board.setups], axis=1)

@@ -11,22 +11,19 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.errors import Fault, InputError
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.convergence import (
     Convergence,
     Gate,
-    acceptance_by_walker,
     assess,
     burn_in_steps,
     length_in_taus,
 )
 from bayesplate.posterior.ensembles import Ensembles
 from bayesplate.posterior.starts import LogDensity, cholesky_factor, guarded
-
-Floats = NDArray[np.float64]
 
 _FIRST_LOOK, _LOOK_AGAIN = 200, 1.15
 _LONG_ENOUGH = 4.0
@@ -35,39 +32,17 @@ _LONG_ENOUGH = 4.0
 
 @dataclass(frozen=True)
 class SamplerSettings:
-    """How to sample.
-
-    Attributes
-    ----------
-    seed : int
-        Everything random follows from it.
-    n_ensembles : int
-        Independent ensembles, at least two.
-    n_walkers : int, optional
-        Walkers of each, even and at least twice the number of parameters; by default at least 32.
-    chunk_steps : int
-        Steps between two reports of progress.
-    max_steps : int
-        Where to stop without convergence; rounded up to whole chunks. Sooner where twice as many would not suffice.
-    gate : Gate
-        When to stop with it.
-    """
+    """How to sample; everything random follows from the seed."""
 
     seed: int
-    n_ensembles: int = 4
-    n_walkers: int | None = None
-    chunk_steps: int = 50
-    max_steps: int = 20_000
+    n_ensembles: int = 4  # at least two
+    n_walkers: int | None = None  # of each: even, at least twice the number of parameters; by default at least 32
+    chunk_steps: int = 50  # between two reports of progress
+    max_steps: int = 20_000  # where to stop without convergence, rounded up to whole chunks
     gate: Gate = field(default_factory=Gate)
 
     def walkers(self, n_dim: int) -> int:
-        """Return the number of walkers for `n_dim` parameters.
-
-        Raises
-        ------
-        InputError
-            If the settings cannot be used.
-        """
+        """Number of walkers for `n_dim` parameters; InputError if the settings cannot be used."""
         n_walkers = max(32, 2 * n_dim + 2) if self.n_walkers is None else self.n_walkers
         faults = []
         if n_walkers < 2 * n_dim or n_walkers % 2:
@@ -86,19 +61,11 @@ class SamplerSettings:
 
 @dataclass(frozen=True)
 class Chains:
-    """Every draw of a run, burn-in included.
+    """Every draw of a run, burn-in included."""
 
-    Attributes
-    ----------
-    draws : (n_ensembles, n_steps, n_walkers, n_dim) array
-    log_prob : (n_ensembles, n_steps, n_walkers) array
-    burn_in : int
-        Steps to discard.
-    """
-
-    draws: Floats
-    log_prob: Floats
-    burn_in: int
+    draws: Floats  # (n_ensembles, n_steps, n_walkers, n_dim)
+    log_prob: Floats  # (n_ensembles, n_steps, n_walkers)
+    burn_in: int  # steps to discard
 
     @property
     def kept(self) -> Floats:
@@ -110,33 +77,16 @@ class Chains:
         """Draws after burn-in of all ensembles together, (n_draws, n_dim)."""
         return self.kept.reshape(-1, self.draws.shape[-1])
 
-    @property
-    def accepted(self) -> Floats:
-        """Accepted fraction of every walker's kept steps, (n_ensembles, n_walkers)."""
-        return acceptance_by_walker(self.kept)
-
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a run stands, told after every chunk.
-
-    Attributes
-    ----------
-    n_steps, max_steps : int
-        Steps done and allowed.
-    n_taus : float or None
-        Length of the shortest ensemble in autocorrelation times when it was last looked at; None before.
-    stage : str
-        What of a longer run is being done; empty if it is nothing but this sampling.
-    done : float or None
-        Share of that run, 0 to 1; None where nobody knows.
-    """
+    """Progress of a run, reported after every chunk."""
 
     n_steps: int
     max_steps: int
-    n_taus: float | None = None
-    stage: str = ""
-    done: float | None = None
+    n_taus: float | None = None  # autocorrelation times in the shortest ensemble at the last look; None before
+    stage: str = ""  # of a longer run; empty if this sampling is all of it
+    done: float | None = None  # share of that run, 0 to 1; None where it is not known
 
     @property
     def sampled(self) -> float:
@@ -162,38 +112,8 @@ def sample(
 
     The draws depend on the seed alone: a run that was killed and continued from its checkpoint gives the same bytes.
 
-    Parameters
-    ----------
-    log_density : callable, (n_points, n_dim) -> (n_points,) array
-        Vectorised; minus infinity outside the support, otherwise finite.
-    centre : (n_dim,) array
-        The estimate.
-    covariance : (n_dim, n_dim) array
-        Its covariance; the walkers start three times as wide.
-    names : sequence of str, optional
-        Parameter names for messages.
-    near : (n_draws, n_dim) array, optional
-        Draws of a density that is nearly this one: the walkers start at some of them, and not around the estimate.
-    checkpoint : Checkpoint, optional
-        Where the chains are saved every few seconds, and where an unfinished run is continued from.
-    progress : callable, optional
-        Told after every chunk.
-
-    Returns
-    -------
-    convergence : Convergence
-        `passed` is False if the steps did not suffice, or never would: then nothing may be printed from the chains.
-
-    Raises
-    ------
-    BayesplateError
-        If the log density is not a number or plus infinity somewhere: a fault of the program, never accepted.
-    NotConvergedError
-        If no start with a finite log density is found.
-    NotIdentifiableError
-        If the covariance is not positive definite.
-    CheckpointError
-        If the checkpoint belongs to another run or cannot be used.
+    The walkers start around the (n_dim,) estimate, three times as wide as its covariance, or at some of the `near`
+    draws (n_draws, n_dim) of nearly the same density. Unless `passed`, nothing may be printed from the chains.
     """
     n_walkers = settings.walkers(n_dim := len(centre))
     names = tuple(names) or tuple(f"parameter {dim + 1}" for dim in range(n_dim))
@@ -227,23 +147,16 @@ def sample(
 
 
 def is_hopeless(n_taus: float, n_kept: int, settings: SamplerSettings) -> bool:
-    """Whether not even twice the steps allowed would hold the autocorrelation times that are wanted.
+    """Whether twice the steps allowed would hold too few autocorrelation times, from those in `n_kept` steps.
 
-    Draws of fewer steps than an autocorrelation time show less of it, never more, so that it is not said too early;
-    nor is it said while a walker has not moved yet, which is no length at all.
-
-    Parameters
-    ----------
-    n_taus : float
-        Length of the draws that are kept, in autocorrelation times of the slowest parameter.
-    n_kept : int
-        The same in steps.
+    Draws of fewer steps than an autocorrelation time show less of it, never more, so that this never comes too early;
+    while a walker has not moved yet, `n_taus` is 0.
     """
     return 0.0 < n_taus * 2 * settings.max_steps < settings.gate.tau_count_min * n_kept
 
 
 def _is_due(n_steps: int, chunk_steps: int) -> bool:
-    """Return True at steps that grow by 15 %: judging costs, and depends on the count only, so resuming repeats it."""
+    """Whether to judge now, at steps that grow by 15 %; by the count alone, so that resuming repeats it."""
     due = -(-_FIRST_LOOK // chunk_steps) * chunk_steps
     while due < n_steps:
         due = -(-int(_LOOK_AGAIN * due) // chunk_steps) * chunk_steps

@@ -1,7 +1,7 @@
-"""What to doubt about readings before anything is sampled: an octave, a decimal place, exchanged labels, much scatter.
+"""Doubts about readings before anything is sampled: an octave, a decimal place, exchanged labels, much scatter.
 
 A reading is compared with what the others predict for it, a Student distribution: the plate is fitted without it, and
-the scatter of the others tells the noise, to which the prior of the noise adds no more than one reading would, because
+the scatter of the others gives the noise, to which the prior of the noise adds no more than one reading would, because
 an effect that the plate lacks looks like noise. A slip is a hypothesis about one reading, or two that stand for each
 other; its odds are the predictive density of what would have been read, over that of what was.
 
@@ -18,8 +18,8 @@ from itertools import combinations, pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.estimates.refit import most_likely, normal_misfit, sensitivities
@@ -31,21 +31,19 @@ from bayesplate.frequencies.system import system_of
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.target import Posterior
 
-Floats = NDArray[np.float64]
-
 RARITY = 1000.0
-"""A slip is told where the readings are this many times as probable with it as without."""
+"""A slip is reported where the readings are this many times as probable with it as without."""
 FEWEST_TO_SPARE = 2
 """Readings beyond as many as there are constants that it takes to see a slip in one of them."""
 LARGE_NOISE, LARGE_NOISE_SDS = 3.0, 3.0
-"""Noise that the residuals want, over the median of its prior, and in standard deviations of its logarithm, beyond
-which the reader is told."""
+"""Noise of the residuals over the median of its prior, and in standard deviations of its logarithm, beyond which a
+remark is made."""
 
 OCTAVES, DECIMALS = (2.0, 0.5), (10.0, 0.1)
 _ANYWHERE = np.log(16.0)
 """Width in ln f over which a reading of something else may lie: two octaves either way."""
 _READINGS_OF_PRIOR = 1.0
-"""How many readings the prior of the noise counts for."""
+"""Number of readings that the prior of the noise counts for."""
 _OPEN = 1e-6
 """Sensitivity of ln f to the logarithm of a constant, in its best combination of readings, below which it is open."""
 _STEPS, _NEAR = 15, 0.01
@@ -55,77 +53,35 @@ _LOG_MILLION = np.log(1e6)
 
 @dataclass(frozen=True)
 class Slip:
-    """A slip, and how much better the readings fit with it.
+    """A slip, and how much better the readings fit with it."""
 
-    Attributes
-    ----------
-    readings : tuple of int
-        Position of the reading, or of the two that are exchanged.
-    factor : float
-        What the reading is, over what it should be; 1 where it is of something else, or two are exchanged.
-    log_odds : float
-        ln of how many times as probable the readings are with it.
-    gap : float
-        ln of the reading over what the others predict for it.
-    """
-
-    readings: tuple[int, ...]
-    factor: float = 1.0
-    log_odds: float = 0.0
-    gap: float = 0.0
-
-    @property
-    def is_exchange(self) -> bool:
-        """Whether two readings stand for each other."""
-        return len(self.readings) == 2
+    readings: tuple[int, ...]  # position of the reading, or of the two that are exchanged
+    factor: float = 1.0  # of the reading over its right value; 1 where it is of something else, or two are exchanged
+    log_odds: float = 0.0  # ln of the probability of the readings with the slip over that without
+    gap: float = 0.0  # ln of the reading over the prediction of the others
 
 
 class Remarks(NamedTuple):
-    """What a reader of the constants must know of the readings, a sentence each.
+    """Sentences about the readings that a reader of the constants needs."""
 
-    Attributes
-    ----------
-    slips : tuple of str
-        The likeliest slip, if one explains the readings.
-    others : tuple of str
-        Otherwise the two readings whose order is least like the plate's, unless no plate fits; and whether the noise
-        that the residuals want is far above its prior.
-    """
-
-    slips: tuple[str, ...]
-    others: tuple[str, ...]
+    slips: tuple[str, ...]  # the likeliest slip, if one explains the readings
+    others: tuple[str, ...]  # otherwise two readings in the wrong order, if a plate fits; a noise far above its prior
 
 
 def reading_remarks(posterior: Posterior, centre: Floats) -> Remarks:
-    """What is to be said of the readings of a posterior.
-
-    Parameters
-    ----------
-    posterior : Posterior
-        Its models hold the exact law.
-    centre : (n_dim,) array
-        Where the readings are most likely.
-    """
+    """Remarks on the readings of a posterior, whose models hold the exact law, at its (n_dim,) centre."""
     readings = Readings(posterior, centre)
     is_lost = is_too_wide(posterior.board, readings.log_widening)
     noise = noise_remarks(posterior.board, readings.log_widening)
     slip = readings.likeliest(anywhere=is_lost)
     if slip is not None:
-        return Remarks((_exchange(readings, slip) if slip.is_exchange else _stray(readings, slip),), noise)
+        return Remarks((_exchange(readings, slip) if len(slip.readings) == 2 else _stray(readings, slip),), noise)
     pair = None if is_lost else readings.disordered()
     return Remarks((), noise if pair is None else (_disorder(readings, pair), *noise))
 
 
 class Readings:
-    """The readings of a posterior, and what some of them lead to expect of the others.
-
-    Parameters
-    ----------
-    posterior : Posterior
-        Its models hold the exact law.
-    centre : (n_dim,) array
-        Where they are most likely.
-    """
+    """The readings of a posterior, and the predictions of some of them for the others."""
 
     def __init__(self, posterior: Posterior, centre: Floats) -> None:
         self.board, self.is_robust = posterior.board, posterior.robust
@@ -139,23 +95,15 @@ class Readings:
             self._whole = self._refitted(self._whole, ())
         self._starts = [self._whole]
         self.log_widening = 0.5 * float(np.log(self._whole.variance(())[0]))
-        """ln of the noise that the residuals want, over the median of its prior."""
-        if self.is_robust:  # which a reading far off does not widen
-            self.log_widening = float(np.max(self._parameters.log_noise(centre[None])[0] - np.log(self._medians)))
-
-    @property
-    def rms_cents(self) -> float:
-        """Of the residuals of all readings."""
-        return _rms_cents(self._whole.residuals)
+        """ln of the noise of the residuals over the median of its prior."""
+        if self.is_robust:  # a reading far off does not widen it
+            self.log_widening = self._parameters.log_widening(centre)
 
     def likeliest(self, anywhere: bool = False) -> Slip | None:
         """The slip that explains the readings best, if it does so far better than noise.
 
-        Parameters
-        ----------
-        anywhere : bool
-            Whether the plate may be quite another one than the readings as they are lead to: then fits begin as well
-            where least squares without each reading lead.
+        `anywhere` if the plate may be quite another one than that of all readings: then fits begin as well where least
+        squares without each reading lead.
         """
         n = self.target.size
         if n < self._parameters.n_constants + FEWEST_TO_SPARE:
@@ -170,14 +118,13 @@ class Readings:
     def disordered(self) -> Slip | None:
         """The two readings in the other order than the modes of the fitted plate that are likeliest exchanged."""
         predicted = self.target - self._whole.residuals
-        pairs = [
-            (i, j) for i, j in self._pairs() if (self.target[i] - self.target[j]) * (predicted[i] - predicted[j]) < 0.0
-        ]
+        apart = np.subtract.outer(self.target, self.target) * np.subtract.outer(predicted, predicted)
+        pairs = [pair for pair in self._pairs() if apart[pair] < 0.0]
         return max(self._of_pairs(pairs), key=lambda one: one.log_odds, default=None)
 
-    def exchanged_rms_cents(self, slip: Slip) -> float:
-        """Of the residuals once two readings have each other's label."""
-        one, other = slip.readings
+    def rms_cents(self, exchange: Slip) -> tuple[float, float]:
+        """Root mean square of the residuals, before and after two readings exchange their labels."""
+        one, other = exchange.readings
         frequencies = [reading.frequency for setup in self.board.setups for reading in setup.readings]
         frequencies[one], frequencies[other] = frequencies[other], frequencies[one]
         rest = iter(frequencies)
@@ -185,7 +132,9 @@ class Readings:
             replace(setup, readings=tuple(replace(one, frequency=next(rest)) for one in setup.readings))
             for setup in self.board.setups
         )
-        return _rms_cents(weighted_least_squares(replace(self.board, setups=setups)).residuals)
+        after = weighted_least_squares(replace(self.board, setups=setups)).residuals
+        before, after = (np.sqrt(np.mean(residuals**2)) for residuals in (self._whole.residuals, after))
+        return float(cents(before)), float(cents(after))
 
     def _pairs(self) -> list[tuple[int, int]]:
         """Two readings of one setup each."""
@@ -193,18 +142,17 @@ class Readings:
         return [pair for first, last in pairwise(ends.tolist()) for pair in combinations(range(first, last), 2)]
 
     def _of_one(self, i: int) -> list[Slip]:
-        """What may be wrong with one reading."""
-        fit = self._without((i,))
+        """Possible slips of one reading."""
+        fit, factors = self._without((i,)), (*OCTAVES, *DECIMALS)
         if fit is None:
             return []
         gap = float(fit.residuals[i])
-        factors = (*OCTAVES, *DECIMALS)
         as_read, *off = fit.log_predictive((i,), np.array([[gap], *([gap - np.log(factor)] for factor in factors)]))
         stray = Slip((i,), 1.0, -np.log(_ANYWHERE) - as_read, gap)
         return [stray, *(Slip((i,), factor, one - as_read, gap) for factor, one in zip(factors, off, strict=True))]
 
     def _of_pairs(self, pairs: Sequence[tuple[int, int]]) -> list[Slip]:
-        """Exchanges, with their odds."""
+        """Exchanges of two readings each."""
         found = []
         for i, j in pairs:
             fit = self._without((i, j))
@@ -227,7 +175,7 @@ class Readings:
         return _Fit(start.predict, x, self.target, self._scales)
 
     def _elsewhere(self, left_out: int) -> _Fit | None:
-        """Where least squares without a reading lead from a start of their own; None if to no plate at all."""
+        """Fit by least squares without a reading, from a start of their own; None if it is no plate."""
         at, setups = 0, []
         for setup in self.board.setups:
             kept = tuple(one for i, one in enumerate(setup.readings, start=at) if i != left_out)
@@ -281,17 +229,10 @@ class _Fit:
         return np.atleast_1d(multivariate_t(np.zeros(len(here)), variance * spread, df=spare).logpdf(gaps))
 
 
-def _rms_cents(residuals: Floats) -> float:
-    return float(cents(np.sqrt(np.mean(residuals**2))))
-
-
 def noise_remarks(board: Board, log_widening: float) -> tuple[str, ...]:
-    """That the readings scatter far more than the prior of the noise lets expect, if they do; a sentence.
+    """A sentence if the readings scatter far more than the prior of the noise expects.
 
-    Parameters
-    ----------
-    log_widening : float
-        ln of the noise that the residuals want, over the median of its prior.
+    `log_widening` is ln of the noise of the residuals over the median of its prior.
     """
     if not is_too_wide(board, log_widening):
         return ()
@@ -326,7 +267,7 @@ def _stray(readings: Readings, slip: Slip) -> str:
 
 
 def _exchange(readings: Readings, slip: Slip) -> str:
-    before, after = readings.rms_cents, readings.exchanged_rms_cents(slip)
+    before, after = readings.rms_cents(slip)
     return (
         f"{_pair(readings, slip)} fit far better exchanged, {after:.1f} cents rms in place of {before:.1f} "
         f"({times(slip.log_odds)} as probable): have they each other's label?"
@@ -342,7 +283,7 @@ def _disorder(readings: Readings, slip: Slip) -> str:
 
 
 def times(log_odds: float) -> str:
-    """How many times as probable, in words; from the logarithm."""
+    """A ratio of probabilities in words, from its logarithm."""
     if log_odds > _LOG_MILLION:
         return "more than a million times"
     odds = float(np.exp(log_odds))

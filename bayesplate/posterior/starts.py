@@ -1,4 +1,4 @@
-"""Where the walkers start: three standard errors around the estimate, on points that the posterior allows.
+"""Starts of the walkers: three standard errors around the estimate, on points that the posterior allows.
 
 Ensembles that agree after starting so far apart have forgotten where they came from.
 """
@@ -8,11 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats
 from bayesplate.errors import BayesplateError, NotConvergedError, NotIdentifiableError
 
-Floats = NDArray[np.float64]
 LogDensity = Callable[[Floats], Floats]
 """Vectorised: (n_points, n_dim) to (n_points,); minus infinity outside the support."""
 
@@ -21,13 +20,7 @@ _TRIES = 1000
 
 
 def guarded(log_density: LogDensity, names: Sequence[str]) -> LogDensity:
-    """A log density that refuses every value which would be accepted without being one; `names` for the message.
-
-    Raises
-    ------
-    BayesplateError
-        Where it is called, if a value is not a number or plus infinity.
-    """
+    """A log density that raises BayesplateError where its value is nan or plus infinity; `names` for the message."""
 
     def checked(points: Floats) -> Floats:
         values = np.asarray(log_density(points), dtype=np.float64)
@@ -49,10 +42,7 @@ def guarded(log_density: LogDensity, names: Sequence[str]) -> LogDensity:
 def cholesky_factor(covariance: Floats) -> Floats:
     """Lower Cholesky factor of the estimate's covariance, whatever the units of the parameters.
 
-    Raises
-    ------
-    NotIdentifiableError
-        If it is not positive definite.
+    NotIdentifiableError if it is not positive definite.
     """
     covariance = np.asarray(covariance, dtype=np.float64)
     scale = np.sqrt(np.diag(covariance))
@@ -68,18 +58,12 @@ def cholesky_factor(covariance: Floats) -> Floats:
 
 
 def around_estimate(centre: Floats, factor: Floats, rng: np.random.Generator) -> Callable[[int], Floats]:
-    """So many points three standard errors around the estimate, from the Cholesky factor of its covariance."""
+    """Draws of points three standard errors around the estimate, from the Cholesky factor of its covariance."""
     return lambda n: centre + _SPREAD * rng.standard_normal((n, len(centre))) @ factor.T
 
 
 def finite_starts(log_density: LogDensity, drawn: Callable[[int], Floats], n_walkers: int) -> tuple[Floats, Floats]:
-    """Points, drawn again and again those outside the support, and their log densities.
-
-    Raises
-    ------
-    NotConvergedError
-        If there are too few points of finite log density.
-    """
+    """Points of finite log density, and these densities; NotConvergedError where too few are found."""
     points = drawn(n_walkers)
     log_prob = np.asarray(log_density(points))
     for _ in range(_TRIES):

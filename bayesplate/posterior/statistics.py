@@ -1,4 +1,4 @@
-"""Statistics of draws by ArviZ, 0.23 and 1.x alike: plain arrays in, plain arrays out."""
+"""Draws of ensembles as chains (chain = ensemble), and their statistics by ArviZ, 0.23 and 1.x alike."""
 
 from __future__ import annotations
 
@@ -6,16 +6,40 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Floats, Indices
 from bayesplate.libraries import load_arviz
-
-Floats = NDArray[np.float64]
 
 LARGEST_K = 0.7
 """Pareto k-hat beyond which draws of one density do not stand for another."""
 _ALIKE = 2.0
 """Largest weight over the mean up to which they do, whatever k-hat is: then it is the shape of next to nothing."""
+
+
+def thinning(tau_max: float) -> int:
+    """Steps from one draw that is kept to the next: half the largest autocorrelation time."""
+    return max(1, int(tau_max / 2.0)) if np.isfinite(tau_max) else 1
+
+
+def walker_major(draws: Floats) -> Floats:
+    """(n_ensembles, n_steps, n_walkers, ...) draws as (n_ensembles, n_draws, ...): one walker after the other.
+
+    So neighbours are steps of one walker, and ArviZ's effective sizes see the true autocorrelation; step by step it
+    would take the walkers of a step for consecutive draws.
+    """
+    return np.swapaxes(draws, 1, 2).reshape(len(draws), -1, *draws.shape[3:])
+
+
+def thin_walker_major(draws: Floats, burn_in: int, tau_max: float, *, n_draws_max: int | None = None) -> Floats:
+    """Draws after burn-in, thinned to half an autocorrelation time, (n_ensembles, n_draws, ...) as `walker_major`.
+
+    Thinned further until a chain holds at most `n_draws_max` draws (but at least one per walker).
+    """
+    n_steps, n_walkers = draws.shape[1:3]
+    every = thinning(tau_max)
+    if n_draws_max is not None:
+        every = max(every, -(-(n_steps - burn_in) // max(1, n_draws_max // n_walkers)))
+    return walker_major(draws[:, burn_in::every])
 
 
 def rhat(chains: Floats) -> Floats:
@@ -25,18 +49,12 @@ def rhat(chains: Floats) -> Floats:
 
 def effective_sizes(chains: Floats) -> Floats:
     """The smaller of bulk and tail effective size of (n_chains, n_draws, n_dim) draws: (n_dim,) array."""
-    tails = (0.05, 0.95)  # which 1.x wants to be told
+    tails = (0.05, 0.95)  # 1.x needs them as an argument
     return _of_each(chains, lambda arviz, one: min(arviz.ess(one), arviz.ess(one, method="tail", prob=tails)))
 
 
 def smoothed(log_weights: Floats) -> tuple[Floats, float]:
-    """Pareto-smoothed importance weights that sum to 1, and the k-hat of their tail.
-
-    Parameters
-    ----------
-    log_weights : (n,) array
-        Minus infinity where a draw has none.
-    """
+    """Pareto-smoothed importance weights that sum to 1, and the k-hat of their tail; -inf for a draw without weight."""
     arviz = load_arviz()
     if hasattr(arviz, "psislw"):
         log_smoothed, k = arviz.psislw(log_weights)
@@ -52,7 +70,7 @@ def may_stand(weights: Floats, pareto_k: float) -> bool:
 
 
 def effective_draws(weights: Floats) -> float:
-    """How many draws of equal weight are worth as much, from weights that sum to 1."""
+    """Number of draws of equal weight that are worth as much, from weights that sum to 1."""
     return float(1.0 / np.sum(weights**2))
 
 
@@ -61,7 +79,7 @@ def effective_share(weights: Floats) -> float:
     return effective_draws(weights) / weights.size
 
 
-def resampled(weights: Floats, n: int, rng: np.random.Generator) -> NDArray[np.intp]:
+def resampled(weights: Floats, n: int, rng: np.random.Generator) -> Indices:
     """Indices drawn by weight with the least scatter (systematic), in order: (n,) array."""
     places = (np.arange(n) + rng.random()) / n * weights.sum()
     return np.asarray(np.minimum(np.searchsorted(np.cumsum(weights), places), len(weights) - 1), dtype=np.intp)

@@ -16,8 +16,8 @@ from itertools import combinations_with_replacement
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Bools, Floats, Indices
 from bayesplate.board.board import Values
 from bayesplate.posterior.ensembles import pilot
 from bayesplate.posterior.mixture import Mixture
@@ -26,8 +26,6 @@ from bayesplate.posterior.statistics import effective_share, may_stand, smoothed
 from bayesplate.posterior.tails import TailCoordinates
 from bayesplate.posterior.target import Posterior
 from bayesplate.streams import stream
-
-Floats = NDArray[np.float64]
 
 _WIDER = 1.5
 """Than the normal approximation: the first points, so that the posterior's shoulders are among them."""
@@ -55,7 +53,7 @@ class Solved(NamedTuple):
     log_frequency: Floats
     log_density: Floats
 
-    def where(self, kept: NDArray[np.bool_]) -> Solved:
+    def where(self, kept: Bools) -> Solved:
         """Some of the points."""
         return Solved(*(part[kept] for part in self))
 
@@ -65,48 +63,27 @@ class Solved(NamedTuple):
 
     @property
     def weights(self) -> Floats:
-        """What each point counts for in a fit: the density, tempered, so that far ones hardly matter; (n,) array."""
+        """Weight of each point in a fit, (n,): the density, tempered, so that far ones hardly matter."""
         below = self.log_density - self.log_density.max()
         return np.asarray(np.exp(np.maximum(below, _LOWEST) / _TEMPERATURE))
 
 
 @dataclass(frozen=True, eq=False)
 class Surrogate:
-    """Polynomials for the frequencies of all modes that the likelihood looks at.
+    """Polynomials for the frequencies of all modes in the likelihood."""
 
-    Attributes
-    ----------
-    columns : (n_fitted,) array of int
-        The parameters that frequencies depend on.
-    centre : (n_fitted,) array
-    whitening : (n_fitted, n_fitted) array
-        Takes parameters less the centre to coordinates u of unit spread.
-    bent : dict of (n_bent, n_fitted) array
-        For each order above the second directions of u, the one first along which ln f is bent most.
-    coefficients : (n_terms, n_modes) array
-        Of 1, u_i, u_i u_j, and of the products of so many coordinates along `bent`.
-    points : Solved
-        That it was fitted to.
-    """
-
-    columns: NDArray[np.intp]
-    centre: Floats
-    whitening: Floats
-    bent: Mapping[int, Floats]
-    coefficients: Floats
-    points: Solved
+    columns: Indices  # (n_fitted,), the parameters that frequencies depend on
+    centre: Floats  # (n_fitted,)
+    whitening: Floats  # (n_fitted, n_fitted), from parameters less the centre to coordinates u of unit spread
+    bent: Mapping[int, Floats]  # by order above the second (n_bent, n_fitted) directions of u, the most bent first
+    coefficients: Floats  # (n_terms, n_modes), of 1, u_i, u_i u_j, and of the products of coordinates along `bent`
+    points: Solved  # it was fitted to these
 
     @classmethod
-    def fitted(cls, points: Solved, columns: NDArray[np.intp], along_bent: Mapping[int, int] = ALONG_BENT) -> Surrogate:
-        """By weighted least squares, to the points that are plates: first of second order, which tells what is bent.
+    def fitted(cls, points: Solved, columns: Indices, along_bent: Mapping[int, int] = ALONG_BENT) -> Surrogate:
+        """By weighted least squares, to the points that are plates: first of second order, which shows what is bent.
 
-        Where the points count for too few by their weights it stays at that.
-
-        Parameters
-        ----------
-        columns : (n_fitted,) array of int
-        along_bent : dict of int
-            Orders above the second, and along how many of the directions in which ln f is bent most.
+        It stays at that order where the points count for too few by their weights. `along_bent` is as `ALONG_BENT`.
         """
         points = points.where(np.isfinite(points.log_frequency).all(axis=1) & np.isfinite(points.log_density))
         x, weights = points.theta[:, columns], points.weights
@@ -161,23 +138,20 @@ class Surrogate:
 
 
 @lru_cache(maxsize=64)
-def _factors(order: int, n: int) -> NDArray[np.intp]:
+def _factors(order: int, n: int) -> Indices:
     """Which of n coordinates each product of so many of them has: (n_products, order) array."""
     return np.array(list(combinations_with_replacement(range(n), order)), dtype=np.intp)
 
 
 def n_terms(n_parameters: int, along_bent: Mapping[int, int] = ALONG_BENT) -> int:
-    """How many coefficients a surrogate has for each mode."""
+    """Number of coefficients of a surrogate for each mode."""
     orders = {0: n_parameters, 1: n_parameters, 2: n_parameters, **along_bent}
     return sum(len(_factors(order, min(n, n_parameters))) for order, n in orders.items())
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SurrogatePosterior(Posterior):
-    """The posterior with frequencies from a surrogate of its law, and an end where that knows nothing.
-
-    Priors and likelihood are the same.
-    """
+    """The posterior with frequencies from a surrogate of its law, and an end beyond the points of that."""
 
     surrogate: Surrogate
 
@@ -204,19 +178,8 @@ def find_surrogate(
     """Fit a surrogate to the law of a posterior, or find that none serves.
 
     Each round fits it anew, walks on it, weights the draws to the law, and looks around them for probability that it
-    lacks. All points of a round join those of the next.
-
-    Parameters
-    ----------
-    centre, covariance : (n_dim,) and (n_dim, n_dim) arrays
-        Normal approximation.
-    coordinates : TailCoordinates
-        In which the walkers walk.
-
-    Returns
-    -------
-    Surrogate or None
-        None if after a few rounds too few draws of it would count under the law, or it lacks a part of the posterior.
+    lacks. All points of a round join those of the next. None if after a few rounds too few draws of it would count
+    under the law, or it lacks a part of the posterior. The walkers walk in `coordinates`.
     """
     columns, bounds = posterior.parameters.fitted_columns, posterior.parameters.fitted_bounds
     n_points = max(_FEWEST_POINTS, _POINTS_PER_TERM * n_terms(columns.size))
@@ -245,12 +208,8 @@ def find_surrogate(
 def share_lacking(log_law: Floats, log_surrogate: Floats, log_proposal: Floats) -> float:
     """Share of the probability under a law that lies where a surrogate has less than half of it.
 
-    Draws of the surrogate do not tell, for none comes there: draws of a wider density do.
-
-    Parameters
-    ----------
-    log_law, log_surrogate, log_proposal : (n_draws,) arrays
-        ln of the densities at draws of the proposal; the first two but for a constant each.
+    Draws of the surrogate do not show it, for none comes there: (n_draws,) log densities are at draws of a wider
+    proposal, the first two up to a constant.
     """
     weights, of_surrogate = (
         np.exp(log - np.logaddexp.reduce(log)) for log in (log_law - log_proposal, log_surrogate - log_proposal)

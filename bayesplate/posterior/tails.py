@@ -15,11 +15,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Bools, Floats, Indices
 from bayesplate.posterior.starts import LogDensity
-
-Floats = NDArray[np.float64]
 
 _SCALE_IN_SDS = 1.5
 _EFFECT_SCALE_IN_SDS = 0.8
@@ -32,23 +30,12 @@ _FARTHEST = 60.0
 
 @dataclass(frozen=True, eq=False)
 class TailCoordinates:
-    """Map between theta and the coordinates y that are sampled.
+    """Map between theta and the coordinates y that are sampled."""
 
-    Attributes
-    ----------
-    centre : (n_dim,) array
-        theta of the estimate.
-    scale : (n_changed,) array
-    columns : (n_changed,) array of int
-        The columns that change; all others are the same in theta and y.
-    shrink : (n_changed,) array
-        Standard deviation in y of the starts over that in theta: 1 / scale to first order.
-    """
-
-    centre: Floats
-    scale: Floats
-    columns: NDArray[np.intp]
-    shrink: Floats
+    centre: Floats  # (n_dim,), theta of the estimate
+    scale: Floats  # (n_changed,)
+    columns: Indices  # (n_changed,); all others are the same in theta and y
+    shrink: Floats  # (n_changed,), standard deviation of the starts in y over that in theta: 1 / scale to first order
 
     @classmethod
     def around(
@@ -93,7 +80,7 @@ class TailCoordinates:
         """ln |d theta / d y| of (..., n_dim) y: (...) array."""
         return np.asarray(np.log(self.scale * np.cosh(y[..., self.columns])).sum(axis=-1))
 
-    def is_near(self, y: Floats) -> NDArray[np.bool_]:
+    def is_near(self, y: Floats) -> Bools:
         """Whether (n_draws, n_dim) y are so near that the map does not overflow; beyond is outside every prior."""
         return np.asarray(np.all(np.abs(y[:, self.columns]) < np.arcsinh(_FARTHEST / self.scale), axis=1))
 

@@ -8,17 +8,18 @@ is one that may be wrong, with the share of plausible plates in which it names a
 other doubtful one (`bayesplate.frequencies.peaks`).
 
 Where something is wrong, the posterior may move on to where the modes of those ranks plainly have each other's figures:
-then it contradicts the labels that it rests on, and that is told.
+then it contradicts the labels that it rests on, and the report says so.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesplate.arrays import Indices
 from bayesplate.board.board import Board, Values
 from bayesplate.board.setup import Setup
 from bayesplate.frequencies.model import SetupModel
@@ -31,21 +32,10 @@ _CONTRADICTED = 0.95
 
 
 def with_doubts(board: Board, models: Sequence[SetupModel], values: Values) -> tuple[Board, tuple[str, ...]]:
-    """The board, where each sure label that may be another mode's is as sure as plausible plates agree on its mode.
+    """The board with doubtful labels as sure as plausible plates agree on their modes, and a sentence per such setup.
 
-    Parameters
-    ----------
-    models : sequence of SetupModel
-        Of its setups, with the exact law.
-    values : dict of (n_draws,) array
-        D_x, D_y, D_s (N m), the board's inputs and the effects' parameters: of the estimate, then of plausible plates.
-
-    Returns
-    -------
-    board : Board
-        The same one where no label may.
-    remarks : tuple of str
-        A sentence per setup with such labels: which two shapes mix, and how sure the label is.
+    `values`, (n_draws,) each, are of the estimate, then of plausible plates; the models have the exact law. Where no
+    label may be another mode's the board is the same object.
     """
     doubts = [_doubts(model, values) for model in models]
     if not any(doubts):
@@ -56,8 +46,8 @@ def with_doubts(board: Board, models: Sequence[SetupModel], values: Values) -> t
             replace(one, confidence=own[one.beams].confidence) if one.beams in own else one for one in setup.readings
         )
         setups.append(replace(setup, readings=tuple(readings)))
-    told = (_remark(setup, own) for setup, own in zip(board.setups, doubts, strict=True) if own)
-    return replace(board, setups=tuple(setups)), tuple(told)
+    remarks = (_remark(setup, own) for setup, own in zip(board.setups, doubts, strict=True) if own)
+    return replace(board, setups=tuple(setups)), tuple(remarks)
 
 
 def _remark(setup: Setup, doubts: Mapping[Beams, _Doubt]) -> str:
@@ -80,12 +70,7 @@ def _label(setup: Setup, beams: Beams) -> Label:
 def contradicted_labels(models: Sequence[SetupModel], values: Values) -> tuple[str, ...]:
     """A sentence per setup with sure labels that a fit contradicts: which figures its modes have instead.
 
-    Parameters
-    ----------
-    models : sequence of SetupModel
-        With the exact law.
-    values : dict of (n_draws,) array
-        D_x, D_y, D_s (N m), the board's inputs and the effects' parameters: draws of the posterior under that law.
+    `values`, (n_draws,) each, are draws of the posterior under the exact law, which the models have.
     """
     sentences = []
     for model in models:
@@ -105,7 +90,7 @@ def contradicted_labels(models: Sequence[SetupModel], values: Values) -> tuple[s
 
 
 def _named_otherwise(model: SetupModel, values: Values) -> dict[int, Beams]:
-    """By reading whose label is sure: what its mode is certainly called instead on nearly all draws."""
+    """By position of a reading whose label is sure: the certain name of its mode on nearly all draws, if another."""
     found: dict[int, Beams] = {}
     every = _ranks(model, values, CERTAIN)
     if not next(iter(every.values())).size:  # no draw is a plate
@@ -118,7 +103,7 @@ def _named_otherwise(model: SetupModel, values: Values) -> dict[int, Beams]:
     return found
 
 
-def _ranks(model: SetupModel, values: Values, least: float = 0.0) -> dict[Beams, NDArray[np.intp]]:
+def _ranks(model: SetupModel, values: Values, least: float = 0.0) -> dict[Beams, Indices]:
     """Rank in its class of the mode that each product of beam functions names, at those draws that are a plate."""
     assert model.exact is not None
     every = model.exact.reduced.ranks(model.system.weights(values), least)
@@ -126,16 +111,13 @@ def _ranks(model: SetupModel, values: Values, least: float = 0.0) -> dict[Beams,
     return {beams: one[is_plate] for beams, one in every.items()}
 
 
-@dataclass(frozen=True)
-class _Doubt:
-    """How sure a label is, the share of plates that agree with the estimate, and whose shapes its mode may have."""
-
-    confidence: float
-    others: tuple[Beams, ...]
+class _Doubt(NamedTuple):
+    confidence: float  # of a label: the share of plates that agree with the estimate
+    others: tuple[Beams, ...]  # whose shapes its mode may have
 
 
 def _doubts(model: SetupModel, values: Values) -> dict[Beams, _Doubt]:
-    """By label those that may be another mode's."""
+    """Labels that may be another mode's."""
     sure = {one.beams: one.frequency.mean for one in model.setup.readings if one.is_sure}
     if not sure:
         return {}

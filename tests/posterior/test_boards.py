@@ -22,10 +22,10 @@ from bayesplate.estimates.paper import paper_system
 from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.estimates.refit import normal_misfit
 from bayesplate.frequencies.laws import cents
+from bayesplate.posterior.assessment import mode_errors
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.laplace import predictor
-from bayesplate.posterior.mode_errors import mode_errors
 from bayesplate.posterior.posing import pose
 from bayesplate.posterior.sampling import SamplerSettings
 

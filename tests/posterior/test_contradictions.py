@@ -14,8 +14,7 @@ from bayesplate.board.shelf import shelf_folder
 from bayesplate.commands.prepare import prepare
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.least_squares import weighted_least_squares
-from bayesplate.posterior.contradictions import require_possible_noise
-from bayesplate.posterior.posing import pose
+from bayesplate.posterior.posing import pose, require_possible_noise
 
 BOARD = "fiemme-spruce-clamped"
 ALMOST_EXACT = 1.000_01

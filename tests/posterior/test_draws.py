@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayesplate.posterior.thinning import thin_walker_major
+from bayesplate.posterior.statistics import thin_walker_major
 
 
 def test_thinned_draws_are_walker_major():

@@ -51,7 +51,7 @@ def test_a_normal_posterior_is_recovered(known):
 
 
 def test_the_thinned_draws_are_of_the_same_posterior(known):
-    from bayesplate.posterior.thinning import thin_walker_major
+    from bayesplate.posterior.statistics import thin_walker_major
 
     inference, _, mean, covariance = known
     every_second = max(4.0, inference.convergence.tau_max)  # half of it is the step; walkers forget in 3 or 4 steps

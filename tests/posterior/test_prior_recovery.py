@@ -16,8 +16,8 @@ from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import pose
 from bayesplate.posterior.sampling import SamplerSettings
+from bayesplate.posterior.statistics import thin_walker_major
 from bayesplate.posterior.target import Posterior
-from bayesplate.posterior.thinning import thin_walker_major
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -25,8 +25,8 @@ from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.posing import pose
 from bayesplate.posterior.reweighting import linearisation
 from bayesplate.posterior.sampling import Chains
+from bayesplate.posterior.statistics import walker_major
 from bayesplate.posterior.target import linear_suffices
-from bayesplate.posterior.thinning import walker_major
 from bayesplate.results.budget import input_remarks, prior_remarks
 from bayesplate.results.summarise import summarise
 

@@ -17,6 +17,7 @@ from bayesplate.posterior.inference import infer
 from bayesplate.posterior.mixture import Mixture
 from bayesplate.posterior.posing import pose
 from bayesplate.posterior.sampling import SamplerSettings
+from bayesplate.posterior.statistics import thin_walker_major
 from bayesplate.posterior.surrogate import (
     Solved,
     Surrogate,
@@ -27,7 +28,6 @@ from bayesplate.posterior.surrogate import (
 )
 from bayesplate.posterior.tails import TailCoordinates
 from bayesplate.posterior.target import LINEAR_SHARE
-from bayesplate.posterior.thinning import thin_walker_major
 
 BOARD = "finnish-spruce-cantilever"
 FURTHEST = furthest(18)  # six shares or means of three constants
