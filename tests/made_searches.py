@@ -97,12 +97,7 @@ def exchanged(base: Baseline, swap: Swap, residuals: np.ndarray) -> np.ndarray:
 
 
 def table(
-    rng: np.random.Generator,
-    n_modes: int = 6,
-    n_cells: int = 3,
-    n_tangents: int = 1,
-    *,
-    size: float = 0.01,
+    rng: np.random.Generator, n_modes: int = 6, n_cells: int = 3, n_tangents: int = 1, *, size: float = 0.01
 ) -> Cells:
     """Cells with random shifts and tangents."""
     weights = rng.dirichlet(np.full(n_cells, 3.0))

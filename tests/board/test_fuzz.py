@@ -51,7 +51,7 @@ def check(faults: tuple[Fault, ...]) -> None:
 
 @settings(max_examples=300, deadline=None)
 @given(st.binary(max_size=200))
-def test_random_bytes(data: bytes) -> None:
+def test_random_bytes(data):
     try:
         table = read_table(data, "fuzz.toml")
     except InputError as error:
@@ -62,7 +62,7 @@ def test_random_bytes(data: bytes) -> None:
 
 @settings(max_examples=400, deadline=None)
 @given(st.integers(0, len(SEED)), st.integers(0, 40), st.lists(st.sampled_from(PIECES), max_size=4))
-def test_mutated_text(start: int, length: int, pieces: list[str]) -> None:
+def test_mutated_text(start, length, pieces):
     text = SEED[:start] + "".join(pieces) + SEED[start + length :]
     try:
         card = Board.from_text(text, "finnish-spruce-cantilever")
@@ -94,7 +94,7 @@ def mutated_tables(draw: st.DrawFn) -> dict[str, Any]:
 
 @settings(max_examples=600, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(mutated_tables())
-def test_mutated_tables(table: dict[str, Any]) -> None:
+def test_mutated_tables(table):
     try:
         card = Board.from_card(CardFile(table, f"{table.get('name')}.toml"))
     except InputError as error:

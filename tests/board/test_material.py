@@ -36,13 +36,13 @@ def test_fields_carry_the_names_of_the_constants():
     assert SPRUCE._fields == MODULI
 
 
-@pytest.mark.parametrize("nu", [-0.5, 0.0, 0.3, 0.5])
-def test_isotropic_plate_has_twist_rigidity_of_twice_one_minus_nu(nu):
-    E = 70e9
-    D_x, D_y, D_s = rigidities(E, E, E / (2.0 * (1.0 + nu)), THICKNESS, nu)
+def test_isotropic_plate_has_twist_rigidity_of_twice_one_minus_nu():
+    for nu in [-0.5, 0.0, 0.3, 0.5]:
+        E = 70e9
+        D_x, D_y, D_s = rigidities(E, E, E / (2.0 * (1.0 + nu)), THICKNESS, nu)
 
-    assert D_x == D_y == pytest.approx(E * THICKNESS**3 / (12.0 * (1.0 - nu**2)))
-    assert D_s / D_x == pytest.approx(2.0 * (1.0 - nu), rel=1e-14)
+        assert D_x == D_y == pytest.approx(E * THICKNESS**3 / (12.0 * (1.0 - nu**2)))
+        assert D_s / D_x == pytest.approx(2.0 * (1.0 - nu), rel=1e-14)
 
 
 def test_rigidities_are_those_of_the_independent_solver():
@@ -68,17 +68,15 @@ def test_map_of_logarithms_keeps_volumes(nu):
     assert (abs(columns[0][1]) > 1e-3) == (nu != 0.0), "the map is no plain shift unless nu is zero"
 
 
-@pytest.mark.parametrize(
-    ("nu", "is_real"), [(0.0, True), (1.9, True), (-1.9, True), (2.0, False), (2.1, False), (-3, False)]
-)
-def test_impossible_poisson_ratio_gives_not_a_number(nu, is_real):
+def test_impossible_poisson_ratio_gives_not_a_number():
     """E_x / E_y = 4, so that nu_xy nu_yx = nu^2 / 4 must stay below one; D_s does not depend on it."""
-    there = rigidities(4.0, 1.0, 1.0, 1.0, nu)
-    back = moduli(4.0, 1.0, 1.0, 1.0, nu)
+    for nu, is_real in [(0.0, True), (1.9, True), (-1.9, True), (2.0, False), (2.1, False), (-3, False)]:
+        there = rigidities(4.0, 1.0, 1.0, 1.0, nu)
+        back = moduli(4.0, 1.0, 1.0, 1.0, nu)
 
-    for constants in (there, back):
-        assert np.isfinite(constants[0]) == np.isfinite(constants[1]) == is_real
-        assert np.isfinite(constants[2])
+        for constants in (there, back):
+            assert np.isfinite(constants[0]) == np.isfinite(constants[1]) == is_real
+            assert np.isfinite(constants[2])
 
 
 def test_only_the_impossible_draws_are_not_numbers():

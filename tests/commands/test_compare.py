@@ -45,10 +45,7 @@ def comparisons(cantilever, tmp_path_factory):
     result = CliRunner().invoke(main, ["compare", "fiemme-spruce-clamped", "--json", "--out", str(folder / "out")])
     assert result.exit_code == 0, result.stderr
     assert runs.files_in(folder) == {"out/compare.json": result.stdout.encode()}
-    return {
-        "finnish-spruce-cantilever": as_json(cantilever),
-        "fiemme-spruce-clamped": runs.read_json(result.stdout),
-    }
+    return {"finnish-spruce-cantilever": as_json(cantilever), "fiemme-spruce-clamped": runs.read_json(result.stdout)}
 
 
 def method(theory, name):

@@ -216,13 +216,7 @@ def test_what_somebody_else_keeps_in_before_stays(tmp_path, has_notes):
     assert files_in(tmp_path) == {"summary.json": b"new"} | ({"before/notes.txt": b"mine"} if has_notes else {})
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code"),
-    [
-        (("no-such-board",), 3),
-        ((CALM, "--force", "--resume"), 2),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "code"), [(("no-such-board",), 3), ((CALM, "--force", "--resume"), 2)])
 def test_refused_input_leaves_no_folder(tmp_path, arguments, code):
     run = diagnose(tmp_path / "out", *arguments)
     assert run.exit_code == code

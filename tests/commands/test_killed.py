@@ -86,12 +86,7 @@ def moments(n: int, n_of: int, seed: int) -> list[int]:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "n"),
-    [
-        ("fit and report", 20),
-        ("diagnose", 20),
-        ("batch", 20),
-        ("campaign", 20),
-    ],
+    [("fit and report", 20), ("diagnose", 20), ("batch", 20), ("campaign", 20)],
     indirect=["arguments"],
 )
 def test_killed_at_any_moment_and_resumed_the_files_are_the_same(tmp_path, arguments, n):

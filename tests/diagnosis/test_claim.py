@@ -9,13 +9,7 @@ import numpy as np
 import pytest
 from made_searches import bare, baseline, candidate, decided, ground_of, visible_of
 
-from bayesplate.diagnosis.claim import (
-    Claim,
-    Condition,
-    judge_claim,
-    nested_of,
-    score_gain,
-)
+from bayesplate.diagnosis.claim import Claim, Condition, judge_claim, nested_of, score_gain
 from bayesplate.diagnosis.folds import Nested, log_score, log_score_gains
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.null_control import NullControl, made_to_choose, null_control

@@ -12,13 +12,7 @@ from scipy.stats import binom
 from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.folds import ALWAYS, nested
 from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.null_control import (
-    FALSE_ALARMS,
-    NullControl,
-    _share,
-    made_to_choose,
-    null_control,
-)
+from bayesplate.diagnosis.null_control import FALSE_ALARMS, NullControl, _share, made_to_choose, null_control
 from bayesplate.diagnosis.search import Found, noise_of_board, search
 from bayesplate.diagnosis.sensitivity import draw_constants, under_exact_law, variants, varied
 from bayesplate.diagnosis.terms import noise_grid
