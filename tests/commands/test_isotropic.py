@@ -58,6 +58,7 @@ def test_the_modulus_of_steel_and_its_misses_are_those_of_an_independent_solver(
     assert "in all directions, so that the shear modulus is 77.7" in summary_sentences(flexible)[0]
 
 
+@pytest.mark.usefixtures("quickly")
 def test_moduli_belong_together_draw_by_draw():
     board = sheet(
         sheet_hz(70e9, 0.25),

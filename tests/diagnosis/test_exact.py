@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from made_searches import bare, baseline, candidate, ground_of, one_level, with_modes
+from made_searches import baseline, candidate, ground_of, one_level, singles, with_modes
 
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.diagnosis import sensitivity
@@ -63,7 +63,7 @@ def found():
         direction = 0.02 * rng.standard_normal(6)
         one = candidate(base, name, direction)
         candidates[name] = replace(one, laws=(BentLaw(one.laws[0].form, base, direction),))
-    every = [bare(base, levels), *(Hypothesis((n,), 0.2, one.fine, levels, base) for n, one in candidates.items())]
+    every = singles(base, candidates, levels, 0.2)
     return search(ground_of(base, *every, candidates=candidates), 0.015 * rng.standard_normal(6))
 
 
