@@ -121,12 +121,12 @@ def test_the_card_is_sound_before_it_is_spoiled():
     assert invoke("check", "my-board.toml").exit_code == 0
 
 
-@pytest.mark.parametrize("fault", BAD_CARDS)
-def test_a_bad_card_is_refused_with_all_its_faults(fault):
-    changes, wanted = BAD_CARDS[fault]
-    Path("my-board.toml").write_text(spoiled(*changes), encoding="utf-8")
+def test_a_bad_card_is_refused_with_all_its_faults():
+    for fault in BAD_CARDS:
+        changes, wanted = BAD_CARDS[fault]
+        Path("my-board.toml").write_text(spoiled(*changes), encoding="utf-8")
 
-    assert_refused("check", "my-board.toml", wanted)
+        assert_refused("check", "my-board.toml", wanted)
 
 
 def test_a_fit_refuses_what_a_check_refuses():
@@ -180,29 +180,28 @@ def test_an_output_folder_that_cannot_be_one():
     assert files_in(Path()) == {"taken": b"mine"}
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["chek", "fiemme-spruce-clamped"], "No such command 'chek'. Did you mean 'check'?"),
-        (["zzzz"], "No such command 'zzzz'."),
-        (["fit", "fiemme-spruce-clamped", "--linar"], "No such option '--linar'. Did you mean '--linear'?"),
-        (["fit", "fiemme-spruce-clamped", "--seed", "-1"], "-1 is not in the range x>=0"),
-        (["fit", "fiemme-spruce-clamped", "--seed", "one"], "'one' is not a valid integer"),
-        (["fit", "fiemme-spruce-clamped", "--force", "--resume"], "force starts anew and resume continues"),
-        (["fit", "fiemme-spruce-clamped", "--linear", "--exact"], "--linear and --exact force different laws"),
-        (["check", "fiemme-spruce-clamped", "--effects", "none,fluid_loading"], "--effects none declares nothing"),
-        (["fit"], "Missing argument 'CARD'"),
-        (["fit", "one", "two"], "unexpected extra argument (two)"),
-    ],
-    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
-)
-def test_a_mistyped_command_line_is_a_usage_error(arguments, said):
-    result = invoke(*arguments)
+MISTYPED = [
+    (["chek", "fiemme-spruce-clamped"], "No such command 'chek'. Did you mean 'check'?"),
+    (["zzzz"], "No such command 'zzzz'."),
+    (["fit", "fiemme-spruce-clamped", "--linar"], "No such option '--linar'. Did you mean '--linear'?"),
+    (["fit", "fiemme-spruce-clamped", "--seed", "-1"], "-1 is not in the range x>=0"),
+    (["fit", "fiemme-spruce-clamped", "--seed", "one"], "'one' is not a valid integer"),
+    (["fit", "fiemme-spruce-clamped", "--force", "--resume"], "force starts anew and resume continues"),
+    (["fit", "fiemme-spruce-clamped", "--linear", "--exact"], "--linear and --exact force different laws"),
+    (["check", "fiemme-spruce-clamped", "--effects", "none,fluid_loading"], "--effects none declares nothing"),
+    (["fit"], "Missing argument 'CARD'"),
+    (["fit", "one", "two"], "unexpected extra argument (two)"),
+]
 
-    assert result.exit_code == 2
-    assert said in result.stderr.replace("No such option: --linar ", "No such option '--linar'. ")
-    assert "Traceback" not in result.stderr
-    assert files_in(Path()) == {}
+
+def test_a_mistyped_command_line_is_a_usage_error():
+    for arguments, said in MISTYPED:
+        result = invoke(*arguments)
+
+        assert result.exit_code == 2
+        assert said in result.stderr.replace("No such option: --linar ", "No such option '--linar'. ")
+        assert "Traceback" not in result.stderr
+        assert files_in(Path()) == {}
 
 
 def test_what_each_command_does_is_told_in_a_whole_sentence():
@@ -249,28 +248,28 @@ LONG = "d" * 300
 """A name that no file system takes; a place that may not be looked into ends in the same way."""
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("fit", "fiemme-spruce-clamped", "--out", LONG),
-        ("fit", "fiemme-spruce-clamped", "--out", LONG, "--resume"),
-        ("fit", "spruce-half-tops", "--out", LONG),
-        ("compare", "fiemme-spruce-clamped", "--out", LONG),
-        ("modes", "fiemme-spruce-clamped", "--out", LONG),
-        ("plan", "fiemme-spruce-clamped", "--out", LONG),
-        ("batch", LONG),
-        ("batch", ".", "--out", LONG),
-        ("pick", f"{LONG}.wav"),
-        ("new", LONG, "--mass", "41"),
-    ],
-)
-def test_a_place_that_cannot_be_looked_at_is_refused(arguments):
-    Path("my-board.toml").touch()
-    result = invoke(*arguments)
+PLACES = [
+    ("fit", "fiemme-spruce-clamped", "--out", LONG),
+    ("fit", "fiemme-spruce-clamped", "--out", LONG, "--resume"),
+    ("fit", "spruce-half-tops", "--out", LONG),
+    ("compare", "fiemme-spruce-clamped", "--out", LONG),
+    ("modes", "fiemme-spruce-clamped", "--out", LONG),
+    ("plan", "fiemme-spruce-clamped", "--out", LONG),
+    ("batch", LONG),
+    ("batch", ".", "--out", LONG),
+    ("pick", f"{LONG}.wav"),
+    ("new", LONG, "--mass", "41"),
+]
 
-    assert result.exit_code == 3, result.output
-    assert "internal error" not in result.stderr
-    assert [path.name for path in Path.cwd().iterdir()] == ["my-board.toml"]
+
+def test_a_place_that_cannot_be_looked_at_is_refused():
+    for arguments in PLACES:
+        Path("my-board.toml").touch()
+        result = invoke(*arguments)
+
+        assert result.exit_code == 3, result.output
+        assert "internal error" not in result.stderr
+        assert [path.name for path in Path.cwd().iterdir()] == ["my-board.toml"]
 
 
 def test_the_commands_and_exit_codes_of_a_real_process():

@@ -63,11 +63,7 @@ FAULTS = [
     ("./my-board.toml", "spruce-free-2L", "my-campaign.toml boards: wanted each board once"),
     ("./my-board.toml", "my board", "my-campaign.toml boards 2: wanted A-Z, a-z"),
     ('effect = "attached_mass"', 'effect = "attached_mas"', 'my-campaign.toml [[shared]] 1 effect: wanted "transv'),
-    (
-        'as = "ratio"',
-        "scatter_percent = 400",
-        "my-campaign.toml [[shared]] 2 scatter_percent: wanted a number from",
-    ),
+    ('as = "ratio"', "scatter_percent = 400", "my-campaign.toml [[shared]] 2 scatter_percent: wanted a number from"),
     ('as = "ratio"', 'scatter_percent = "a little"', "[[shared]] 2 scatter_percent: wanted a number"),
     ("transverse_shear", "attached_mass", "my-campaign.toml [[shared]] 2 effect: wanted each effect once"),
     ('as = "ratio"', 'as = "rate"', 'my-campaign.toml [[shared]] 2 as: wanted "value" or "ratio"'),

@@ -93,7 +93,6 @@ def test_numbers_are_exact_arrays_are_readings_and_quantities_stay():
 
 
 def test_what_is_not_said_is_what_a_card_assumes():
-    """The prior's Poisson ratio where it states one; the noise of the edges, or of the prior."""
     assert board().inputs["poisson_xy"] == load_prior("spruce").poisson_xy
     assert board(prior="weakly-informative").inputs["poisson_xy"] == Q.from_mean(0.4, 0.08, "normal")
     edges = {"x0": "clamped", "x1": "free", "y0": "free", "y1": "free"}
@@ -106,7 +105,6 @@ def test_what_is_not_said_is_what_a_card_assumes():
 
 
 def test_what_nobody_stated_is_that_of_the_prior_which_is_given_in_the_end():
-    """However the board was made and varied; what was stated stays, the usual numbers among it."""
     noise, ratio = Q.from_median(0.02, 1.3), Q.from_mean(0.3, 0.01, "normal")
     mine = prior(noise=noise, poisson_xy=ratio)
     fewer = replace(board(), setups=tuple(replace(one, readings=one.readings[:3]) for one in board().setups))
@@ -188,9 +186,11 @@ def test_the_prior_of_a_board_is_named_by_a_path_too(tmp_path):
         assert (found.prior.name, found.board.setups[0].noise.median) == ("mine", pytest.approx(0.02))
 
 
-PLACES = [("my-board.toml", False, r"wanted a new file, got one that exists \(force=True replaces it\)"),
- ("other.toml", True, "wanted my-board.toml, the name of the card, got other.toml"),
- ("nowhere/my-board.toml", True, "wanted a place for the card, got No such file")]  # fmt: skip
+PLACES = [
+    ("my-board.toml", False, r"wanted a new file, got one that exists \(force=True replaces it\)"),
+    ("other.toml", True, "wanted my-board.toml, the name of the card, got other.toml"),
+    ("nowhere/my-board.toml", True, "wanted a place for the card, got No such file"),
+]
 
 
 def test_a_card_is_not_written_over_another_one(tmp_path):

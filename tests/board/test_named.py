@@ -53,7 +53,6 @@ def test_they_are_found_beside_the_board(board_file, spoiled, board_text):
 @pytest.mark.parametrize("end", ["\n", "\r\n"], ids=["unix", "windows"])
 @pytest.mark.parametrize("mark", ["", "\ufeff"], ids=["plain", "byte order mark"])
 def test_the_text_of_a_card_is_what_its_hash_is_of(board_file, board_text, end, mark):
-    """Also when the file is changed or taken away after it was read."""
     board_file.write_text(mark + board_text, encoding="utf-8", newline=end)
     card = Board.from_toml(board_file)
     board_file.unlink()

@@ -138,7 +138,6 @@ def test_too_many_peaks(board_text):
 
 
 def test_a_table_that_says_the_same_again_is_refused(board_text):
-    """With the remedy; a peak that only lies where another or a label does is accepted."""
     first = TABLES[: TABLES.rindex("[[setup.peaks]]")]
     remedy = "(repeated readings of one peak are a list: hz = [.., ..])"
     assert refusals(board_text + TABLES + first + first) == [

@@ -27,12 +27,7 @@ TOLD = [
     (NOISE, "{ median = 19.9, factor = 2 }", (), []),
     ("{ mean = 310, sd = 2 }", "{ mean = 310, sd = 63 }", (), ["say next to nothing: (2,0)"]),
     ("{ mean = 310, sd = 2 }", "{ mean = 310, sd = 61 }", (), []),
-    (
-        "resolution_hz = 1\n",
-        "resolution_hz = 10\n",
-        (),
-        ["rounded to multiples of 10 Hz, and 52 of (1,0)", "are none"],
-    ),
+    ("resolution_hz = 1\n", "resolution_hz = 10\n", (), ["rounded to multiples of 10 Hz, and 52 of (1,0)", "are none"]),
     ("resolution_hz = 1\n", "resolution_hz = 0.73\n", (), []),
     ("[448.8, 594.1]", "[448.8, 52]", (), ["the peak without a label at 52 Hz is where (1,0) is"]),
 ]

@@ -88,7 +88,6 @@ def test_whatever_was_written_with_commas_is_refused(furthest, tenths, shares):
 @example(FURTHEST_SIZES, 2, [0.0, 1.0])
 @example(FURTHEST_SIZES, 250, [0.0, 0.01])
 def test_whole_numbers_that_agree_are_never_refused(furthest, smallest, shares):
-    """Up to a factor 1.5 apart, [2, 3, 2] and [250, 251] among them."""
     assert comma_complaint([math.floor(smallest * (1 + 0.5 * share)) for share in shares], furthest) is None
 
 

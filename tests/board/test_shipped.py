@@ -158,7 +158,6 @@ def test_the_bounce_of_the_free_boards_is_one_of_two_peaks():
 
 
 def test_the_panels():
-    """Ratios of the steel's frequencies in air and in water, the even modes of the others, the exciter's parts."""
     air, water = Board.from_toml("steel-air-water").setups
     added = [(frequencies(air)[label].mean / frequencies(water)[label].mean) ** 2 - 1 for label in air.labels]
     assert [round(share, 3) for share in added] == [0.663, 0.533, 0.488, 0.573, 0.480]

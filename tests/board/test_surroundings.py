@@ -156,7 +156,6 @@ def test_from_numbers_takes_all_of_it():
 
 
 def test_the_former_name_of_an_effect_is_accepted_wherever_one_is_named(spoiled, tmp_path):
-    """And resolved at once: nothing that was read holds it."""
     assert "air_loading" not in EFFECT_NAMES
     assert read(spoiled('["transverse_shear"]', '["air_loading"]')).effects == ("fluid_loading",)
     (fault,) = told(spoiled('["transverse_shear"]', '["air_loading", "fluid_loading"]'))

@@ -57,13 +57,13 @@ FUNCTIONS = {
 }
 
 
-@pytest.mark.parametrize(("given", "said"), BAD)
-def test_what_cannot_be_used_is_refused(given, said):
-    function = next(one for name, one in TAKEN_BY.items() if name in given)
-    with pytest.raises(InputError, match=re.escape(said)) as caught:
-        function(**{"card": BOARD, **given})
-    assert len(caught.value.faults) == 1
-    assert caught.value.exit_code == 3
+def test_what_cannot_be_used_is_refused():
+    for given, said in BAD:
+        function = next(one for name, one in TAKEN_BY.items() if name in given)
+        with pytest.raises(InputError, match=re.escape(said)) as caught:
+            function(**{"card": BOARD, **given})
+        assert len(caught.value.faults) == 1
+        assert caught.value.exit_code == 3
 
 
 def test_what_can_be_used_is_let_through():

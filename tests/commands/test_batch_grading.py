@@ -37,7 +37,6 @@ def test_everything_that_cannot_be_read_is_said_at_once():
 
 
 def test_what_is_said_twice_is_refused_and_no_tolerance_is_nothing():
-    """The last one won."""
     with pytest.raises(InputError) as refused:
         grading_request("E_x=10,E_x=20", ["E_x=11:", "density=:450", "E_x=:12"], None)
 

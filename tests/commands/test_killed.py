@@ -185,7 +185,6 @@ def test_force_lays_aside_what_a_campaign_left_of_each_board_and_nothing_else(tm
 
 
 def test_a_board_of_a_campaign_may_have_the_name_of_a_file_of_the_checkpoint(monkeypatch):
-    """Each board has a place for its chunks among those of boards alone."""
     kept = []
     monkeypatch.setattr(Run, "fit", lambda run, problem, place, *others, **told: kept.append(place))
     problems = [SimpleNamespace(board=SimpleNamespace(name=name)) for name in ("lock", "earlier", "before")]

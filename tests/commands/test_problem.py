@@ -90,7 +90,6 @@ def test_what_sessions_share_is_among_the_columns(clamped):
 
 
 def test_predict_and_the_likelihood_are_those_of_the_fit(clamped, fiemme):
-    """At the draws of a fit: the frequencies, the density up to its constant, and the likelihood of every reading."""
     draws = fiemme.draws
     flat = draws.flat[:50]
     np.testing.assert_allclose(np.log(clamped.predict(flat)), draws.log_frequency.reshape(-1, 6)[:50], rtol=1e-12)

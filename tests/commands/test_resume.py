@@ -151,7 +151,6 @@ def test_a_damaged_checkpoint_is_refused_and_stays(stopped):
     ],
 )
 def test_another_run_is_not_continued(stopped, own_card, old, new, options, what):
-    """Exit 6, the difference named, and what the first run left stays as it was."""
     before = stopped.files
     text = own_card.read_text(encoding="utf-8")
     assert text.count(old) == 1 or not old
@@ -209,7 +208,6 @@ def test_force_replaces_the_results_the_report_and_the_checkpoint_and_nothing_el
 
 @pytest.mark.usefixtures("quickly")
 def test_force_that_is_interrupted_before_sampling_leaves_the_old_results(tmp_path, monkeypatch):
-    """They were laid aside, and come back."""
     (tmp_path / "figures").mkdir()
     for name in ("summary.json", "posterior.nc", "figures/modes.png"):
         (tmp_path / name).write_bytes(b"old")

@@ -104,7 +104,6 @@ def test_draws_and_evidence_are_those_of_the_bent_law(found, index):
 
 
 def test_odds_are_those_of_the_bent_law(found):
-    """Of the effect against none: the grid's, to the error of 128 draws."""
     exact = under_exact_law(found)
     none, effect = (quadrature(found, law)[2] for law in (None, found.ground.candidates["a"].laws[0]))
     wanted = effect - none
@@ -158,7 +157,6 @@ def test_where_the_law_is_straight_nothing_changes(found):
 
 
 def test_two_effects_add_at_the_constants_of_a_draw(found):
-    """The shift of one beside the shift of the other, both by their own law."""
     one, other = (found.ground.candidates[name] for name in ("a", "b"))
     pair = Hypothesis(
         ("a", "b"), 0.1, together(one.coarse, other.coarse), found.ground.hypotheses[0].noise, found.ground.baseline

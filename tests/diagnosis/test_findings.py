@@ -455,7 +455,6 @@ def test_a_board_that_declares_every_effect_has_no_odds():
 
 
 def test_two_effects_that_are_one_alternative_stay_together():
-    """Neither of a pair explains the readings by itself: it is not told as two alternatives."""
     found = made({}, residual=np.zeros(6))
     ground = found.ground
     tables = [ground.candidates[name].coarse for name in (SHEAR, AIR)]

@@ -121,7 +121,6 @@ TOGETHER = [
 
 
 def test_two_effects_that_work_only_together_are_told_so():
-    """Both together lower the error, and either alone raises it."""
     words = (
         "Transverse shear and fluid loading work only together: transverse shear alone takes the left-out error from "
         "16.0 to 20.0 cents, fluid loading alone to 43.0, both to 4.0."

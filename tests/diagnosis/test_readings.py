@@ -18,7 +18,6 @@ def found_of(residual, n_modes=8, noise=(NOISE,)) -> Found:
 
 
 def test_the_reading_that_is_wrong_is_named():
-    """Noise of half a per cent, one reading a fifth off: whatever reading it is."""
     for mode, size in [(0, 0.2), (5, -0.2)]:
         noise = 0.3 * NOISE * np.random.default_rng(2).standard_normal(8)
         found = found_of(noise + size * np.eye(8)[mode])

@@ -245,7 +245,6 @@ def test_a_name_that_another_assumption_changes_is_a_group_with_what_it_turned_i
 
 
 def test_a_name_that_has_no_support_at_all_there_is_turned_by_the_three_best(base):
-    """Of four rivals the three that are most probable there are told."""
     found = found_with(base, {("a",): 0.9, ("b",): 0.04, ("c",): 0.06})
     told = decided(found, others=[turned(base, {("b",): 0.06, ("c",): 0.30, SWAPPED: 0.33, PAIR: 0.31})])
     assert [one.members for one in told.stands_for] == [("a",), SWAPPED, PAIR, ("c",)]

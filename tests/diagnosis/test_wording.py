@@ -301,7 +301,6 @@ def test_candidates_stand_in_the_order_of_their_probability():
 
 
 def test_an_exchange_of_labels_that_is_out_of_the_question_is_not_shown():
-    """Any two neighbours are a candidate: from one per cent on they are shown."""
     for share, shown in ((0.0099, False), (0.01, True)):
         one = replace(NAMED, candidates=(TENSION, replace(EXCHANGE, inclusion_probability=share)))
         assert (len(candidates_table(one).texts) == 2) is shown
