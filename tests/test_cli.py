@@ -122,8 +122,7 @@ def test_the_card_is_sound_before_it_is_spoiled():
 
 
 def test_a_bad_card_is_refused_with_all_its_faults():
-    for fault in BAD_CARDS:
-        changes, wanted = BAD_CARDS[fault]
+    for changes, wanted in BAD_CARDS.values():
         Path("my-board.toml").write_text(spoiled(*changes), encoding="utf-8")
 
         assert_refused("check", "my-board.toml", wanted)

@@ -259,8 +259,7 @@ BAD = {
 
 
 def test_what_cannot_be_used_is_refused_with_all_faults():
-    for fault in BAD:
-        make, wanted = BAD[fault]
+    for make, wanted in BAD.values():
         with pytest.raises(bayesplate.InputError) as refused:
             make()
         assert [passage for passage in wanted if passage not in str(refused.value)] == []
@@ -291,7 +290,7 @@ def test_a_prior_from_quantities_holds_them_and_becomes_a_card(tmp_path):
 
 
 def test_a_shipped_prior_comes_back():
-    for name in ["spruce", "weakly-informative"]:
+    for name in ("spruce", "weakly-informative"):
         card = load_prior(name)
         further = {"noise": None if card.noise_percent is None else card.noise_percent.scaled(0.01)}
         isotropic = {} if card.E is None else {"E": card.E}

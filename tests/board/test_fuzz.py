@@ -49,17 +49,6 @@ def check(faults: tuple[Fault, ...]) -> None:
         assert str(fault).isprintable()
 
 
-@settings(max_examples=300, deadline=None)
-@given(st.binary(max_size=200))
-def test_random_bytes(data):
-    try:
-        table = read_table(data, "fuzz.toml")
-    except InputError as error:
-        check(error.faults)
-    else:
-        assert isinstance(table, dict)
-
-
 @settings(max_examples=400, deadline=None)
 @given(st.integers(0, len(SEED)), st.integers(0, 40), st.lists(st.sampled_from(PIECES), max_size=4))
 def test_mutated_text(start, length, pieces):
@@ -92,7 +81,7 @@ def mutated_tables(draw: st.DrawFn) -> dict[str, Any]:
     return table if isinstance(table, dict) else {"plate": table}
 
 
-@settings(max_examples=600, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(mutated_tables())
 def test_mutated_tables(table):
     try:

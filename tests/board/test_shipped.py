@@ -61,8 +61,7 @@ def test_what_a_shipped_board_declares_by_what_it_states():
 
 
 def test_the_boards_of_the_paper():
-    for name in PAPER:
-        labels, hertz, (length, width, thickness, density) = PAPER[name]
+    for name, (labels, hertz, (length, width, thickness, density)) in PAPER.items():
         card = Board.from_toml(name)
         (setup,) = card.setups
 

@@ -75,9 +75,9 @@ WARPS = {
 
 
 def test_what_no_board_is_warped_by(spoiled):
-    for warp in WARPS:
+    for warp, wanted in WARPS.items():
         (fault,) = told(spoiled(PLATE, f"{PLATE}\nwarp_mm = {{ {warp} }}"))
-        assert fault.startswith("my-board.toml [plate] warp_mm." + WARPS[warp])
+        assert fault.startswith("my-board.toml [plate] warp_mm." + wanted)
 
 
 def test_readings_of_a_warp_that_are_all_alike_are_rounded_to_a_feeler_gauge(spoiled):

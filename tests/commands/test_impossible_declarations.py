@@ -86,8 +86,7 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_refused_with_the_reason():
-    for case in CASES:
-        changes, lines = CASES[case]
+    for changes, lines in CASES.values():
         Path("my-board.toml").write_text(spoiled(*changes), encoding="utf-8")
         result = invoke("fit", "my-board.toml")
 

@@ -177,14 +177,11 @@ BAD_FRAGMENTS = {
 
 
 def test_a_fragment_that_cannot_be_used_is_refused_with_its_place(tmp_path):
-    for name in BAD_FRAGMENTS:
-        text, said = BAD_FRAGMENTS[name]
-        (tmp_path / "planted.toml").write_text(CARD)
-        (tmp_path / "fragment.toml").write_text(text)
-        result = CliRunner().invoke(
-            main, ["check", str(tmp_path / "planted.toml"), "--setup", str(tmp_path / "fragment.toml")]
-        )
-
+    card, fragment = tmp_path / "planted.toml", tmp_path / "fragment.toml"
+    card.write_text(CARD)
+    for text, said in BAD_FRAGMENTS.values():
+        fragment.write_text(text)
+        result = CliRunner().invoke(main, ["check", str(card), "--setup", str(fragment)])
         assert result.exit_code == 3
         assert said in result.stderr
 

@@ -36,7 +36,6 @@ from bayesplate.diagnosis.null_control import NullControl, null_control
 from bayesplate.diagnosis.result import Diagnosis, EffectEntry, diagnosis_json
 from bayesplate.diagnosis.search import Found, search
 from bayesplate.diagnosis.shifts import nothing, together
-from bayesplate.diagnosis.signatures import cosine
 from bayesplate.diagnosis.terms import Terms, noise_grid
 from bayesplate.diagnosis.verdict import NOTHING_LEFT, Answer, answers
 from bayesplate.diagnosis.words import verdict_sentence, verdict_sentences, warnings
@@ -260,19 +259,6 @@ def test_an_entry_by_hand():
     assert shear.q05 < 1.0 < shear.q95  # the readings are those of a size of one
     assert shear.q95 - shear.q05 < 1.0  # its prior alone has 1.9
     assert (shear.parameter, shear.form, shear.unit) == ("size", "", "1")
-
-
-def test_look_alikes_are_effects_of_one_direction():
-    found = made(NAMED)
-    ground = found.ground
-    shear = ground.candidates[SHEAR]
-    twin = replace(shear, name=AIR, signature=replace(shear.signature, effect=AIR))
-    alike = {**ground.candidates, AIR: twin}
-    twins = replace(found, ground=replace(ground, candidates=alike))
-    assert [entries(found)[name].look_alikes for name in NAMES] == [()] * 3
-    assert [entries(twins)[name].look_alikes for name in NAMES] == [(AIR,), (SHEAR,), ()]
-    others = (ground.candidates[name].signature for name in (AIR, GRAIN))
-    assert all(0.01 < abs(cosine(shear.signature, other)) < 0.95 for other in others)  # they are not orthogonal
 
 
 def test_what_the_width_of_a_prior_costs():

@@ -17,7 +17,6 @@ from bayesplate.diagnosis.sizes import at_limit, size_posterior
 from bayesplate.diagnosis.terms import noise_grid
 from bayesplate.diagnosis.verdict import NOTHING_LEFT, alternatives, answers
 
-WORDS = {"none needed", "named", "indistinguishable group", "unexplained", "undetectable"}
 NAMES = ("a", "b", "c")
 PAIR = ("a", "b")
 SWAPPED = (RELABELLING,)
@@ -261,13 +260,3 @@ def test_the_searches_that_a_name_has_to_survive_are_made_only_for_a_name(base):
 
     group = found_with(base, {("a",): 0.5, ("b",): 0.5})
     assert decided(group, others=refused()).word == "indistinguishable group"
-
-
-def test_only_the_five_words(base):
-    rng = np.random.default_rng(3)
-    for _ in range(12):
-        shares = rng.dirichlet(np.full(6, 0.3))
-        members = [(), ("a",), ("b",), ("c",), SWAPPED, PAIR]
-        verdict = decided(found_with(base, dict(zip(members, shares, strict=True))))
-        assert verdict.word in WORDS
-        assert bool(verdict.effects) == (verdict.word in ("named", "indistinguishable group")) == bool(verdict.index)
