@@ -39,7 +39,12 @@ def test_the_shelf():
     assert card_names("coefficients") == ("paper-cantilever", "paper-clamped")
 
 
-def test_a_shipped_board_is_sound_and_names_no_effect():
+PROFILES = ("support_stiffness", "thickness_profile", "outline_profile")
+DECLARED = dict.fromkeys(FREE, PROFILES) | {"spruce-free-2R": PROFILES[:2], "foam-panel-exciter": ("fluid_loading",)}
+"""Effects by what a card states: the free boards their support and shape, the foam its air."""
+
+
+def test_a_shipped_board_is_sound_and_declares_effects_by_what_it_states_alone():
     for name in card_names("boards"):
         card = Board.from_toml(name)
 
@@ -47,15 +52,6 @@ def test_a_shipped_board_is_sound_and_names_no_effect():
         assert card.effects == ()
         assert card.prior == "weakly-informative"
         assert card.source
-
-
-PROFILES = ("support_stiffness", "thickness_profile", "outline_profile")
-DECLARED = dict.fromkeys(FREE, PROFILES) | {"spruce-free-2R": PROFILES[:2], "foam-panel-exciter": ("fluid_loading",)}
-
-
-def test_what_a_shipped_board_declares_by_what_it_states():
-    """The free boards their support and shape, the foam its air; an empty list of effects keeps the rest undeclared."""
-    for name in card_names("boards"):
         declared = prepare(name).board.effects
         assert tuple(one for one in declared if one != "exciter") == DECLARED.get(name, ())
 
@@ -80,27 +76,29 @@ def test_the_boards_of_the_paper():
 
 
 FREE_BOARDS = [
-    ("spruce-free-1L", 236.0, 8, 11, {(0, 2): 133.28, (2, 2): 263.02}, 0.7),
-    ("spruce-free-1R", 248.0, 6, 10, {(1, 1): 55.08, (2, 2): 290.29}, 0.9),
-    ("spruce-free-2L", 256.0, 9, 7, {(0, 2): 163.29, (4, 1): 455.26}, 0.98),
-    ("spruce-free-2R", 256.8, 9, 7, {(0, 2): 159.14, (4, 1): 448.79}, 0.98),
-    ("spruce-free-3L", 235.2, 7, 10, {(1, 2): 178.89, (2, 2): 265.41}, 0.7),
-    ("spruce-free-3R", 253.2, 6, 11, {(1, 1): 60.35, (2, 2): 292.24}, 0.9),
-    ("spruce-free-4L", 225.6, 8, 9, {(0, 2): 159.72, (2, 2): 283.93}, 0.98),
-    ("spruce-free-4R", 211.2, 7, 9, {(1, 2): 198.36, (2, 2): 283.49}, 0.9),
-    ("spruce-free-5L", 272.8, 8, 10, {(0, 2): 162.87, (2, 2): 292.36}, 0.98),
-    ("spruce-free-5R", 269.2, 8, 8, {(0, 2): 163.75, (2, 2): 291.12}, 0.98),
+    ("spruce-free-1L", 236.0, 8, 11, {(0, 2): 133.28, (2, 2): 263.02}, 0.7, (3.5, 5.0)),
+    ("spruce-free-1R", 248.0, 6, 10, {(1, 1): 55.08, (2, 2): 290.29}, 0.9, (3.5, 5.0)),
+    ("spruce-free-2L", 256.0, 9, 7, {(0, 2): 163.29, (4, 1): 455.26}, 0.98, (3.5, 4.5)),
+    ("spruce-free-2R", 256.8, 9, 7, {(0, 2): 159.14, (4, 1): 448.79}, 0.98, (3.0, 5.0)),
+    ("spruce-free-3L", 235.2, 7, 10, {(1, 2): 178.89, (2, 2): 265.41}, 0.7, (3.5, 5.0)),
+    ("spruce-free-3R", 253.2, 6, 11, {(1, 1): 60.35, (2, 2): 292.24}, 0.9, (3.5, 5.0)),
+    ("spruce-free-4L", 225.6, 8, 9, {(0, 2): 159.72, (2, 2): 283.93}, 0.98, (3.5, 5.5)),
+    ("spruce-free-4R", 211.2, 7, 9, {(1, 2): 198.36, (2, 2): 283.49}, 0.9, (3.0, 6.0)),
+    ("spruce-free-5L", 272.8, 8, 10, {(0, 2): 162.87, (2, 2): 292.36}, 0.98, (3.0, 5.0)),
+    ("spruce-free-5R", 269.2, 8, 8, {(0, 2): 163.75, (2, 2): 291.12}, 0.98, (3.5, 4.5)),
 ]
+"""Mass (g), numbers of labels and of other peaks, some modes (Hz), confidence, two peaks below the first mode (Hz)."""
 
 
 def test_the_free_boards():
-    for name, mass, labelled, unlabelled, some, confidence in FREE_BOARDS:
+    for name, mass, labelled, unlabelled, some, confidence, rigid in FREE_BOARDS:
         card = Board.from_toml(name)
         (setup,) = card.setups
 
         assert 1e3 * board_mass(card) == pytest.approx(mass)
         assert (len(setup.readings), len(setup.peaks)) == (labelled, unlabelled)
         assert {reading.confidence for reading in setup.readings} == {confidence}
+        assert (setup.bounce.mean - setup.bounce.sd, setup.bounce.mean + setup.bounce.sd) == rigid
         assert {label: frequencies(setup)[Label(*label)].mean for label in some} == some
         assert setup.resolution == 0
         assert edge_letters(setup.edges) == "FFFF"
@@ -139,21 +137,6 @@ def test_peaks_of_the_free_boards():
         assert list(read) == sorted(read)
         assert min(sd for sd, _, _ in read.values()) >= 0.1
         assert not {*setup.measured} & set(read)
-
-
-RIGID = {
-    "1L": (3.5, 5.0), "1R": (3.5, 5.0), "2L": (3.5, 4.5), "2R": (3.0, 5.0), "3L": (3.5, 5.0), "3R": (3.5, 5.0),
-    "4L": (3.5, 5.5), "4R": (3.0, 6.0), "5L": (3.0, 5.0), "5R": (3.5, 4.5),
-}  # fmt: skip
-"""Peaks of the record below the first mode, Hz."""
-
-
-def test_the_bounce_of_the_free_boards_is_one_of_two_peaks():
-    for name in FREE:
-        (setup,) = Board.from_toml(name).setups
-        bounce = setup.bounce
-        assert bounce is not None
-        assert (bounce.mean - bounce.sd, bounce.mean + bounce.sd) == RIGID[name[-2:]]
 
 
 def test_the_panels():
