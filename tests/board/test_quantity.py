@@ -46,15 +46,6 @@ def test_exact_has_one_value():
     assert seven.median == 7
 
 
-def test_readings_join_standard_error_and_rounding():
-    readings = [3.0, 3.1, 2.9, 3.2]
-    rounded = Quantity.from_readings(readings, resolution=0.1)
-
-    assert rounded.mean == pytest.approx(3.05)
-    assert rounded.sd**2 == pytest.approx(np.var(readings, ddof=1) / 4 + 0.01 / 12)
-    assert not rounded.has_profile
-
-
 def test_readings_at_different_places_are_rounded_each_on_its_own():
     readings = [3.0, 3.1, 2.9, 3.2]
     apart = Quantity.from_readings(readings, resolution=0.1, at_x=[0, 1, 2, 3], place_sd=5)
@@ -62,19 +53,18 @@ def test_readings_at_different_places_are_rounded_each_on_its_own():
 
     assert apart.sd**2 == pytest.approx(np.var(readings, ddof=1) / 4 + 0.01 / 12 / 4)
     assert together.sd**2 == pytest.approx(np.var(readings, ddof=1) / 4 + 0.01 / 12)
+    assert together.mean == pytest.approx(3.05)
     assert apart.has_profile
+    assert not Quantity.from_readings(readings, resolution=0.1).has_profile
     assert apart.scaled(1e-3).place_sd == 5
     assert apart.scaled(1.0, 1e-3).place_sd == pytest.approx(0.005)
 
 
-def test_rounding_is_not_averaged_away():
+def test_rounding_is_not_averaged_away_and_equal_readings_without_it_are_exact():
     many = Quantity.from_readings([256.0] * 1000, resolution=2)
 
     assert many.sd == pytest.approx(2 / math.sqrt(12), rel=1e-12)
     assert Quantity.from_readings([256.0], resolution=2).sd == many.sd
-
-
-def test_equal_readings_without_rounding_are_exact():
     assert Quantity.from_readings([0.1, 0.1, 0.1]).is_exact
 
 
