@@ -77,11 +77,6 @@ class Page:
             raise AssertionError(answer["exceptionDetails"])
         return answer["result"].get("value")
 
-    def screenshot(self, path: Path) -> None:
-        """The whole page as a PNG."""
-        answer = self.ask("Page.captureScreenshot", format="png", captureBeyondViewport=True)
-        path.write_bytes(b64decode(answer["data"]))
-
     def prefer(self, scheme: str) -> None:
         """Let the reader prefer a light or a dark page."""
         self.ask("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])

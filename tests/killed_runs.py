@@ -30,17 +30,17 @@ SAMPLING = ("compare", "fitting", "campaign_fit")
 
 def quickly() -> None:
     """A sampler whose first judgement passes and that saves every chunk, and a search among two candidates."""
+    from runs import LOOSE_GATE
+
     from bayesplate.commands import diagnose
     from bayesplate.diagnosis.joint import full_search
     from bayesplate.posterior import checkpoint
-    from bayesplate.posterior.convergence import Gate
     from bayesplate.posterior.sampling import SamplerSettings
 
     checkpoint.EVERY_SECONDS = checkpoint._LEAST_PAUSE = 0.0
-    loose = Gate(rhat_max=10.0, tau_count_min=1.0, ess_min=1.0)
     for name in SAMPLING:
         command = import_module(f"bayesplate.commands.{name}")
-        command.SamplerSettings = partial(SamplerSettings, gate=loose)  # type: ignore[attr-defined]
+        command.SamplerSettings = partial(SamplerSettings, gate=LOOSE_GATE)  # type: ignore[attr-defined]
     diagnose.full_search = partial(full_search, tried=TRIED)  # type: ignore[assignment]
 
 

@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import pytest
+from runs import sample_loosely
 
 from bayesplate.board.board import Board
 from bayesplate.commands.fit import fit
 from bayesplate.commands.prepare import prepare
 from bayesplate.diagnosis.result import Diagnosis
-from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
-from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.report.page import fit_page, write_report
 from bayesplate.results.summary import Summary
-
-LOOSE_GATE = Gate(rhat_max=10.0, tau_count_min=1.0, ess_min=1.0)
-"""Passes at its first judgement: these are tests of a page, not of constants."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +43,6 @@ class Fit:
 def fitted(card: str) -> Fit:
     """Fit a board as far as the loose gate lets it, in memory."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("bayesplate.commands.fitting.SamplerSettings", partial(SamplerSettings, gate=LOOSE_GATE))
+        sample_loosely(patched)
         result = fit(card)
     return Fit(prepare(card).card, result.inference, result.draws, result.summary)

@@ -21,7 +21,7 @@ from bayesplate.diagnosis.null_control import NullControl
 from bayesplate.diagnosis.search import Candidate, Found, Ground
 from bayesplate.diagnosis.shifts import Cells, nothing
 from bayesplate.diagnosis.signatures import signature
-from bayesplate.diagnosis.terms import NoiseGrid
+from bayesplate.diagnosis.terms import NoiseGrid, noise_grid
 from bayesplate.diagnosis.verdict import Verdict, decide
 from bayesplate.frequencies.laws import cents
 from bayesplate.labels import Label
@@ -97,12 +97,7 @@ def exchanged(base: Baseline, swap: Swap, residuals: np.ndarray) -> np.ndarray:
 
 
 def table(
-    rng: np.random.Generator,
-    n_modes: int = 6,
-    n_cells: int = 3,
-    n_tangents: int = 1,
-    *,
-    size: float = 0.01,
+    rng: np.random.Generator, n_modes: int = 6, n_cells: int = 3, n_tangents: int = 1, *, size: float = 0.01
 ) -> Cells:
     """Cells with random shifts and tangents."""
     weights = rng.dirichlet(np.full(n_cells, 3.0))
@@ -131,6 +126,26 @@ def ground_of(base: Baseline, *found: Hypothesis, candidates: Mapping[str, Candi
 def bare(base: Baseline, noise: NoiseGrid, prior: float = 0.5) -> Hypothesis:
     """The hypothesis that nothing is lacking."""
     return Hypothesis((), prior, nothing(base.n_modes), noise, base)
+
+
+def singles(
+    base: Baseline, effects: Mapping[str, Candidate], levels: NoiseGrid | None = None, prior: float = 0.1
+) -> list[Hypothesis]:
+    """The hypotheses of no effect, and of each effect alone."""
+    levels = noise_grid(base.board) if levels is None else levels
+    return [bare(base, levels), *(Hypothesis((name,), prior, one.fine, levels, base) for name, one in effects.items())]
+
+
+def found_among(
+    base: Baseline,
+    effects: Mapping[str, Candidate],
+    hypotheses: Sequence[Hypothesis],
+    probability: Sequence[float],
+    residual: np.ndarray,
+) -> Found:
+    """A search that found given probabilities of its hypotheses."""
+    shares = np.asarray(probability)
+    return Found(ground_of(base, *hypotheses, candidates=effects), residual, np.log(shares + 1e-300), shares)
 
 
 def left_out(ground: Ground, index: int, residual: np.ndarray) -> np.ndarray:

@@ -4,12 +4,24 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import pytest
 from click.testing import CliRunner
 
 from bayesplate.cli import main
+from bayesplate.posterior.convergence import Gate
+from bayesplate.posterior.sampling import SamplerSettings
+
+LOOSE_GATE = Gate(rhat_max=10.0, tau_count_min=1.0, ess_min=1.0)
+"""Passes at its first judgement: for tests of files, pages and options, not of constants."""
+
+
+def sample_loosely(patch: pytest.MonkeyPatch, module: str = "fitting") -> None:
+    """Let the sampler of a module of commands pass its first judgement."""
+    patch.setattr(f"bayesplate.commands.{module}.SamplerSettings", partial(SamplerSettings, gate=LOOSE_GATE))
 
 
 @dataclass(frozen=True)

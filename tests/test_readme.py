@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import re
-from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
-from runs import files_in
+from runs import files_in, sample_loosely
 
 from bayesplate.commands.shown import show_fit
-from bayesplate.posterior.convergence import Gate
-from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.terminal import print_shown
 
 ROOT = Path(__file__).parents[1]
@@ -76,8 +73,7 @@ def test_the_page_on_arviz_runs(used):
 
 def test_the_page_on_python_runs(used, monkeypatch, capsys):
     """With a gate that passes at once: what it shows are names and types."""
-    loose = Gate(rhat_max=10.0, tau_count_min=1.0, ess_min=1.0)
-    monkeypatch.setattr("bayesplate.commands.fitting.SamplerSettings", partial(SamplerSettings, gate=loose))
+    sample_loosely(monkeypatch)
     found = run_all(PAGE)
 
     assert files_in(used).keys() == {*USED, "constants.png"}

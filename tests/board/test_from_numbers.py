@@ -93,7 +93,6 @@ def test_numbers_are_exact_arrays_are_readings_and_quantities_stay():
 
 
 def test_what_is_not_said_is_what_a_card_assumes():
-    """The prior's Poisson ratio where it states one; the noise of the edges, or of the prior."""
     assert board().inputs["poisson_xy"] == load_prior("spruce").poisson_xy
     assert board(prior="weakly-informative").inputs["poisson_xy"] == Q.from_mean(0.4, 0.08, "normal")
     edges = {"x0": "clamped", "x1": "free", "y0": "free", "y1": "free"}
@@ -106,7 +105,6 @@ def test_what_is_not_said_is_what_a_card_assumes():
 
 
 def test_what_nobody_stated_is_that_of_the_prior_which_is_given_in_the_end():
-    """However the board was made and varied; what was stated stays, the usual numbers among it."""
     noise, ratio = Q.from_median(0.02, 1.3), Q.from_mean(0.3, 0.01, "normal")
     mine = prior(noise=noise, poisson_xy=ratio)
     fewer = replace(board(), setups=tuple(replace(one, readings=one.readings[:3]) for one in board().setups))
@@ -188,19 +186,21 @@ def test_the_prior_of_a_board_is_named_by_a_path_too(tmp_path):
         assert (found.prior.name, found.board.setups[0].noise.median) == ("mine", pytest.approx(0.02))
 
 
-@pytest.mark.parametrize(
-    ("place", "force", "said"),
-    [("my-board.toml", False, r"wanted a new file, got one that exists \(force=True replaces it\)"),
-     ("other.toml", True, "wanted my-board.toml, the name of the card, got other.toml"),
-     ("nowhere/my-board.toml", True, "wanted a place for the card, got No such file")],
-)  # fmt: skip
-def test_a_card_is_not_written_over_another_one(tmp_path, place, force, said):
-    (tmp_path / "my-board.toml").write_text("mine", encoding="utf-8")
-    with pytest.raises(bayesplate.InputError, match=said):
-        board().to_toml(tmp_path / place, force=force)
-    assert [path.read_text(encoding="utf-8") for path in tmp_path.iterdir()] == ["mine"]
-    board().to_toml(tmp_path / "my-board.toml", force=True)
-    assert (tmp_path / "my-board.toml").read_text(encoding="utf-8") == board().to_toml()
+PLACES = [
+    ("my-board.toml", False, r"wanted a new file, got one that exists \(force=True replaces it\)"),
+    ("other.toml", True, "wanted my-board.toml, the name of the card, got other.toml"),
+    ("nowhere/my-board.toml", True, "wanted a place for the card, got No such file"),
+]
+
+
+def test_a_card_is_not_written_over_another_one(tmp_path):
+    for place, force, said in PLACES:
+        (tmp_path / "my-board.toml").write_text("mine", encoding="utf-8")
+        with pytest.raises(bayesplate.InputError, match=said):
+            board().to_toml(tmp_path / place, force=force)
+        assert [path.read_text(encoding="utf-8") for path in tmp_path.iterdir()] == ["mine"]
+        board().to_toml(tmp_path / "my-board.toml", force=True)
+        assert (tmp_path / "my-board.toml").read_text(encoding="utf-8") == board().to_toml()
 
 
 BAD = {
@@ -258,12 +258,11 @@ BAD = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("fault", BAD)
-def test_what_cannot_be_used_is_refused_with_all_faults(fault):
-    make, wanted = BAD[fault]
-    with pytest.raises(bayesplate.InputError) as refused:
-        make()
-    assert [passage for passage in wanted if passage not in str(refused.value)] == []
+def test_what_cannot_be_used_is_refused_with_all_faults():
+    for make, wanted in BAD.values():
+        with pytest.raises(bayesplate.InputError) as refused:
+            make()
+        assert [passage for passage in wanted if passage not in str(refused.value)] == []
 
 
 CONSTANTS = {"E_x": Q.from_median(12e9, 1.3), "E_y": Q.from_range(0.4e9, 2e9), "G_xy": Q.from_median(0.7e9, 1.4)}
@@ -290,44 +289,44 @@ def test_a_prior_from_quantities_holds_them_and_becomes_a_card(tmp_path):
     assert again.to_toml() == one.to_toml()
 
 
-@pytest.mark.parametrize("name", ["spruce", "weakly-informative"])
-def test_a_shipped_prior_comes_back(name):
-    card = load_prior(name)
-    further = {"noise": None if card.noise_percent is None else card.noise_percent.scaled(0.01)}
-    isotropic = {} if card.E is None else {"E": card.E}
-    made = bayesplate.PriorCard.from_quantities(
-        name,
-        card.constants | {key: one.quantity for key, one in isotropic.items()},
-        source=card.sources | {key: one.source for key, one in isotropic.items()},
-        poisson_xy=card.poisson_xy,
-        density=card.density,
-        title=card.title,
-        **further,
-    )
-    assert made == card
+def test_a_shipped_prior_comes_back():
+    for name in ("spruce", "weakly-informative"):
+        card = load_prior(name)
+        further = {"noise": None if card.noise_percent is None else card.noise_percent.scaled(0.01)}
+        isotropic = {} if card.E is None else {"E": card.E}
+        made = bayesplate.PriorCard.from_quantities(
+            name,
+            card.constants | {key: one.quantity for key, one in isotropic.items()},
+            source=card.sources | {key: one.source for key, one in isotropic.items()},
+            poisson_xy=card.poisson_xy,
+            density=card.density,
+            title=card.title,
+            **further,
+        )
+        assert made == card
 
 
-@pytest.mark.parametrize(
-    ("constants", "more", "said"),
-    [
-        ({"E_x": CONSTANTS["E_x"]}, {}, "wanted all of E_x, E_y, G_xy or all of D_x, D_y, D_s, got E_x"),
-        (CONSTANTS | {"E_z": CONSTANTS["E_x"]}, {}, "mine E_z: wanted one of E_x, E_y, G_xy, D_x, D_y, D_s"),
-        (CONSTANTS | {"E_x": Q.exact(1e10)}, {}, "mine E_x: wanted Quantity.from_median or Quantity.from_range"),
-        (CONSTANTS | {"E_x": Q.from_mean(1e10, 1e9, "normal")}, {}, "mine E_x: wanted Quantity.from_median"),
-        (CONSTANTS | {"E_x": Q.from_median(12.0, 1.3)}, {}, r"mine.toml \[E_x\] median_gpa: wanted a number from"),
-        (CONSTANTS, {"noise": Q.from_range(0.001, 0.01)}, "mine noise: wanted Quantity.from_median"),
-        (CONSTANTS, {"density": Q.exact(430.0)}, r"mine density: wanted Quantity.from_mean\(430, 60\)"),
-        (CONSTANTS, {"density": Q.from_mean(430, 60, lower=300.0)}, "mine density: wanted .* without bounds"),
-        (CONSTANTS, {"poisson_xy": Q.from_mean(0.4, 0.1, "normal", 0.0)}, "mine poisson_xy: wanted .* without bounds"),
-        (CONSTANTS, {"poisson_xy": 0.4, "noise": 0.01}, "mine noise: wanted .*\nmine poisson_xy: wanted "),
-        (CONSTANTS | {"E_x": 12e9}, {}, "mine E_x: wanted Quantity.from_median or .*, got 12000000000.0"),
-        (None, {"source": None, "title": 1}, "mine title: wanted .*\nmine constants: wanted .*\nmine source: wanted a"),
-        (CONSTANTS, {"source": " "}, "mine source: wanted where the numbers come from, got an empty text"),
-        (CONSTANTS, {"source": {"E_x": "a", "E_y": "", "Gxy": "b"}},
-         "mine source Gxy: wanted one of E_x, .* mean G_xy.*\nmine source E_y: wanted .*\nmine source G_xy: wanted "),
-        (CONSTANTS, {"poisson_xy": Q.exact(0.4)}, r'mine poisson_xy: wanted Quantity.from_mean\(0.4, 0.08, "normal"\)'),
-    ],
-)  # fmt: skip
-def test_what_is_no_prior_is_refused(constants, more, said):
-    with pytest.raises(bayesplate.InputError, match=said):
-        bayesplate.PriorCard.from_quantities("mine", constants, **{"source": "my shop"} | more)
+NO_PRIORS = [
+    ({"E_x": CONSTANTS["E_x"]}, {}, "wanted all of E_x, E_y, G_xy or all of D_x, D_y, D_s, got E_x"),
+    (CONSTANTS | {"E_z": CONSTANTS["E_x"]}, {}, "mine E_z: wanted one of E_x, E_y, G_xy, D_x, D_y, D_s"),
+    (CONSTANTS | {"E_x": Q.exact(1e10)}, {}, "mine E_x: wanted Quantity.from_median or Quantity.from_range"),
+    (CONSTANTS | {"E_x": Q.from_mean(1e10, 1e9, "normal")}, {}, "mine E_x: wanted Quantity.from_median"),
+    (CONSTANTS | {"E_x": Q.from_median(12.0, 1.3)}, {}, r"mine.toml \[E_x\] median_gpa: wanted a number from"),
+    (CONSTANTS, {"noise": Q.from_range(0.001, 0.01)}, "mine noise: wanted Quantity.from_median"),
+    (CONSTANTS, {"density": Q.exact(430.0)}, r"mine density: wanted Quantity.from_mean\(430, 60\)"),
+    (CONSTANTS, {"density": Q.from_mean(430, 60, lower=300.0)}, "mine density: wanted .* without bounds"),
+    (CONSTANTS, {"poisson_xy": Q.from_mean(0.4, 0.1, "normal", 0.0)}, "mine poisson_xy: wanted .* without bounds"),
+    (CONSTANTS, {"poisson_xy": 0.4, "noise": 0.01}, "mine noise: wanted .*\nmine poisson_xy: wanted "),
+    (CONSTANTS | {"E_x": 12e9}, {}, "mine E_x: wanted Quantity.from_median or .*, got 12000000000.0"),
+    (None, {"source": None, "title": 1}, "mine title: wanted .*\nmine constants: wanted .*\nmine source: wanted a"),
+    (CONSTANTS, {"source": " "}, "mine source: wanted where the numbers come from, got an empty text"),
+    (CONSTANTS, {"source": {"E_x": "a", "E_y": "", "Gxy": "b"}},
+     "mine source Gxy: wanted one of E_x, .* mean G_xy.*\nmine source E_y: wanted .*\nmine source G_xy: wanted "),
+    (CONSTANTS, {"poisson_xy": Q.exact(0.4)}, r'mine poisson_xy: wanted Quantity.from_mean\(0.4, 0.08, "normal"\)'),
+]  # fmt: skip
+
+
+def test_what_is_no_prior_is_refused():
+    for constants, more, said in NO_PRIORS:
+        with pytest.raises(bayesplate.InputError, match=said):
+            bayesplate.PriorCard.from_quantities("mine", constants, **{"source": "my shop"} | more)

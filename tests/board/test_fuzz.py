@@ -1,79 +1,119 @@
-"""Whatever stands in a file, it is read or refused with faults; nothing else is ever raised."""
+"""Cards, fragments, campaigns and tables of boards with anything in them: read or refused with faults, nothing else."""
 
 from __future__ import annotations
 
+import errno
 import math
+import os
+from pathlib import Path
 from typing import Any
 
-from hypothesis import HealthCheck, given, settings
+import pytest
+from fuzzing import accepted_or_refused, fuzzed, stopped_if_it_hangs
 from hypothesis import strategies as st
 
 from bayesplate.board.board import Board
+from bayesplate.board.campaign import load_campaign
 from bayesplate.board.checks import physical_faults
+from bayesplate.board.fragment import merged
 from bayesplate.board.shelf import CardFile, shelf_folder
 from bayesplate.board.toml import read_table
+from bayesplate.board.writing import toml_text, write_card
+from bayesplate.commands.batch_boards import boards_of
 from bayesplate.errors import Fault, InputError
 
-SEED = (shelf_folder("boards") / "finnish-spruce-cantilever.toml").read_text(encoding="utf-8")
-PIECES = [*'[]{}=,."#-\n\t\0\'', "[[", "]]", '"""', "1e999", "nan", "0x", "true", "\\u0000", "\ufeff", "\u202e", "é",
-          "[setup]", "[[setup]]", "(1,0)", "x0", "readings", "9" * 400]  # fmt: skip
-
+BOARD = "finnish-spruce-cantilever"
+CARD = (shelf_folder("boards") / f"{BOARD}.toml").read_text(encoding="utf-8")
+TEMPLATE = CARD.partition("[setup.frequencies_hz]")[0].replace(BOARD, "template")
+CAMPAIGN = """\
+format = 1
+name = "together"
+title = "Two boards"
+boards = ["spruce-free-2L", "./my-board.toml"]
+[[shared]]
+effect = "attached_mass"
+[[shared]]
+effect = "transverse_shear"
+as = "ratio"
+[population]
+prior = "spruce"
+"""
+FRAGMENT = """\
+# Picked from hit1.wav
+[setup]
+spurious_probability = 0.02
+[setup.frequencies_hz]
+"(1,0)" = { mean = 52.1, sd = 0.1 }
+[setup.label_confidence]
+"(1,0)" = 0.99
+[setup.signs]
+"(1,0)" = "+"
+[[setup.peaks]]  # (2,1) 80 %
+hz = { mean = 404.0, sd = 0.2 }
+amplitude = 0.2
+[setup.hammer]
+at_mm = [20, 20]
+[[setup.attached]]
+kind = "accelerometer"
+at_mm = [200, 20]
+"""
+PIECES = [
+    *'[]{}=,."#-\n\t\0\'', "[[", "]]", '"""', "1e999", "nan", "-inf", "true", "\\u0000", "\\u007F", "\ufeff", "\u202e",
+    "é", "\x1b", "[setup]", "[[setup]]", "[[setup.peaks]]", "[shared]", "name", 'name = "free"\n', "(1,0)", "edges",
+    "readings", "9" * 400, "0x" + "f" * 5000, "1979-05-27T07:32:00Z", "07:32:00", "boards", '"../../x.toml"', '"CON"',
+]  # fmt: skip
+WORDS = ["clamped", "free", "+", "log-normal", "accelerometer", "exciter", "held", "", "\x7f", "../x.toml", "my-board"]
 LEAVES = st.one_of(
     st.booleans(),
     st.integers(-(10**400), 10**400),
     st.floats(),
+    st.sampled_from(WORDS),
     st.text(max_size=20),
-    st.just(""),
+    st.datetimes().map(lambda one: one.replace(fold=0)),
     st.dates(),
-    st.sampled_from(["clamped", "free", "+", "my-board", "log-normal", "accelerometer", "exciter", "held"]),
 )
 CARD_KEYS = [
-    *("mean", "sd", "readings", "resolution", "at_x_mm", "at_y_mm", "median", "factor", "x0", "y1", "name"),
-    *("(1,0)", "( 1,0)", "(0,0)", "edges", "kind", "at_mm", "mass_g"),
+    *("mean", "sd", "readings", "resolution", "at_x_mm", "at_y_mm", "median", "factor", "x0", "y1", "name", "setup"),
+    *("(1,0)", "( 1,0)", "(0,0)", "edges", "kind", "at_mm", "mass_g", "a.b", "\x7f"),
     *("peaks", "hz", "sign", "label_confidence", "missed_probability"),
     *("warp_mm", "cup", "bow", "twist", "support", "bounce_hz", "fluid", "air", "density_kg_m3", "baffle"),
     *("coil_mass_g", "suspension_n_per_m", "resonance_hz", "magnet"),
 ]
 KEYS = st.one_of(st.text(max_size=8), st.sampled_from(CARD_KEYS))
 TREES = st.recursive(LEAVES, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(KEYS, inner, max_size=4))
-SOUND: dict[str, Any] = read_table(SEED.encode(), "seed.toml")
+SOUND: dict[str, Any] = read_table(CARD.encode(), "board.toml")
+BENCH: dict[str, Path] = {}
 
 
-def check(faults: tuple[Fault, ...]) -> None:
-    """A refusal lists faults that say something, in characters that cannot steer a terminal."""
-    assert faults
-    for fault in faults:
-        assert fault.place
-        assert fault.wanted
-        assert fault.got
-        assert str(fault).isprintable()
+@pytest.fixture(scope="module", autouse=True)
+def folder(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Where the files lie."""
+    BENCH["folder"] = tmp_path_factory.mktemp("fuzz")
+    (BENCH["folder"] / "template.toml").write_text(TEMPLATE, encoding="utf-8")
 
 
-@settings(max_examples=300, deadline=None)
-@given(st.binary(max_size=200))
-def test_random_bytes(data: bytes) -> None:
-    try:
-        table = read_table(data, "fuzz.toml")
-    except InputError as error:
-        check(error.faults)
-    else:
-        assert isinstance(table, dict)
+def spliced(text: str) -> st.SearchStrategy[str]:
+    """A text with some of it taken out and pieces put in."""
+    part = st.tuples(st.integers(0, len(text)), st.integers(0, 30), st.lists(st.sampled_from(PIECES), max_size=3))
+
+    def put(parts: list[tuple[int, int, list[str]]]) -> str:
+        found = text
+        for at, length, pieces in parts:
+            found = found[:at] + "".join(pieces) + found[at + length :]
+        return found
+
+    return st.lists(part, min_size=1, max_size=3).map(put)
 
 
-@settings(max_examples=400, deadline=None)
-@given(st.integers(0, len(SEED)), st.integers(0, 40), st.lists(st.sampled_from(PIECES), max_size=4))
-def test_mutated_text(start: int, length: int, pieces: list[str]) -> None:
-    text = SEED[:start] + "".join(pieces) + SEED[start + length :]
-    try:
-        card = Board.from_text(text, "finnish-spruce-cantilever")
-    except InputError as error:
-        check(error.faults)
-    else:
-        check_means_something(card)
+def written(name: str, content: str | bytes) -> Path:
+    """A file with a text."""
+    path = BENCH["folder"] / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8", "replace"))
+    return path
 
 
 @st.composite
-def mutated_tables(draw: st.DrawFn) -> dict[str, Any]:
+def mutated_cards(draw: st.DrawFn) -> dict[str, Any]:
     """The sound card with one node replaced, added or removed, at any depth."""
 
     def mutate(node: Any) -> Any:
@@ -83,29 +123,173 @@ def mutated_tables(draw: st.DrawFn) -> dict[str, Any]:
             action = draw(st.integers(0, 5))
             if action == 0:
                 return kept
-            if action == 1:
-                return {**node, draw(KEYS): draw(TREES)}
-            return {**kept, key: mutate(node[key])}
+            return {**node, draw(KEYS): draw(TREES)} if action == 1 else {**kept, key: mutate(node[key])}
         return draw(TREES)
 
     table = mutate(SOUND)
     return table if isinstance(table, dict) else {"plate": table}
 
 
-@settings(max_examples=600, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(mutated_tables())
-def test_mutated_tables(table: dict[str, Any]) -> None:
-    try:
-        card = Board.from_card(CardFile(table, f"{table.get('name')}.toml"))
-    except InputError as error:
-        check(error.faults)
-    else:
-        check_means_something(card)
+def read_card(card: str | dict[str, Any]) -> None:
+    """A card, which means something where it is read."""
 
+    def read() -> Board:
+        if isinstance(card, str):
+            return Board.from_text(card, BOARD)
+        return Board.from_card(CardFile(card, f"{card.get('name')}.toml"))
 
-def check_means_something(card: Board) -> None:
-    assert all(isinstance(fault, Fault) for fault in physical_faults(card))
-    for setup in card.setups:
-        for quantity in (one.frequency for one in (*setup.readings, *setup.peaks)):
+    if isinstance(found := accepted_or_refused(read), Board):
+        assert all(isinstance(fault, Fault) for fault in physical_faults(found))
+        for quantity in (one.frequency for setup in found.setups for one in (*setup.readings, *setup.peaks)):
             assert math.isfinite(float(quantity.value(1.0)))
             assert 0.1 <= quantity.mean <= 1e6
+
+
+def read_fragment(content: str | bytes) -> None:
+    """A file that may be a fragment, with a card that is sound."""
+    path = written("fragment.toml", content)
+
+    def read() -> Any:
+        return Board.from_card(CardFile(SOUND, f"{BOARD}.toml"), setup=path)
+
+    accepted_or_refused(read, BENCH["folder"])
+
+
+def read_any_fragment(tree: dict[str, Any]) -> None:
+    """A fragment with any tables: it is taken over as it is, and the card then says what is wrong with it."""
+    accepted_or_refused(lambda: read_fragment(toml_text({"setup": tree})))
+
+
+def read_campaign(content: str | bytes) -> None:
+    """A file that may be a campaign card."""
+    path = written("together.toml", content)
+    accepted_or_refused(lambda: load_campaign(path), BENCH["folder"])
+
+
+def read_boards(content: str | bytes) -> None:
+    """A file that may be a table of boards: a fault of one row is that row's alone."""
+    path = written("boards.csv", content)
+
+    def read() -> Any:
+        boards, _ = boards_of(path, BENCH["folder"] / "template.toml")
+        return [accepted_or_refused(board.card) for board in boards]
+
+    accepted_or_refused(read, BENCH["folder"])
+
+
+def read_folder(content: str | bytes) -> None:
+    """A folder of cards, one of them any file: a fault of a card is that card's alone."""
+    written("fragment.toml", content)
+
+    def read() -> Any:
+        return [accepted_or_refused(board.card) for board in boards_of(BENCH["folder"], None)[0]]
+
+    accepted_or_refused(read, BENCH["folder"])
+
+
+def written_and_read(tree: dict[str, Any]) -> None:
+    """What is written as TOML is read again as it was."""
+    found = read_table(toml_text({"tree": tree}).encode("utf-8"), "a.toml")
+    assert in_order(found) == in_order({"tree": tree})
+
+
+def in_order(node: Any) -> str:
+    """A tree with its keys sorted, as text: numbers that are none are then equal."""
+    if isinstance(node, dict):
+        return repr({key: in_order(node[key]) for key in sorted(node)})
+    return repr([in_order(one) for one in node]) if isinstance(node, list) else repr(node)
+
+
+ROWS = """name,thickness_mm,thickness_mm sd,mass_g,title,"(1,0)","(1,0) sd","(2,0)"
+a,3.1,0.1,300,first,52,0.5,310
+b,2.9;3.0;3.1,,,second,52,,310
+"""
+CELLS = [",", '"', "\n", "\r", ";", "nan", "inf", "1e999", "1_000", "=cmd()", "\0", "\x7f", "\x1b[2J", "../x", "a", "٣"]
+BYTES = st.binary(max_size=80)
+NAMED = st.dictionaries(KEYS, TREES, max_size=4)
+CARDS = [BYTES, spliced(CARD), NAMED.map(toml_text), spliced(CARD.replace("length_x_mm = 253", "length_x_mm = 1"))]
+
+
+@st.composite
+def rows(draw: st.DrawFn) -> str:
+    """A table with cells taken out and put in."""
+    text = ROWS
+    for _ in range(draw(st.integers(1, 3))):
+        at = draw(st.integers(0, len(text)))
+        put = "".join(draw(st.lists(st.sampled_from(CELLS), max_size=3)))
+        text = text[:at] + put + text[at + draw(st.integers(0, 12)) :]
+    return text
+
+
+test_cards, test_cards_at_length = fuzzed(read_card, 400, card=st.one_of(spliced(CARD), mutated_cards()))
+test_fragments, test_fragments_at_length = fuzzed(read_fragment, 60, content=st.one_of(BYTES, spliced(FRAGMENT)))
+test_any_fragment, test_any_fragment_at_length = fuzzed(read_any_fragment, 60, tree=NAMED)
+test_campaigns, test_campaigns_at_length = fuzzed(read_campaign, 100, content=st.one_of(BYTES, spliced(CAMPAIGN)))
+test_tables, test_tables_at_length = fuzzed(read_boards, 60, content=st.one_of(BYTES, rows()))
+test_folders, test_folders_at_length = fuzzed(read_folder, 60, content=st.one_of(*CARDS))
+test_toml, test_toml_at_length = fuzzed(written_and_read, 100, tree=NAMED)
+
+
+def test_what_is_spoilt_here_was_sound():
+    """The negative control."""
+    whole, _ = merged(SOUND, "board.toml", written("fragment.toml", FRAGMENT))
+    assert len(Board.from_text(toml_text(whole), BOARD).setups[0].readings) == 1
+    assert load_campaign(written("together.toml", CAMPAIGN)).name == "together"
+    boards, _ = boards_of(written("boards.csv", ROWS), BENCH["folder"] / "template.toml")
+    assert [board.card().name for board in boards] == ["a", "b"]
+
+
+HUGE = "0x" + "f" * 5000
+"""A whole number of 20,000 bits, which TOML may have and Python does not write in tens."""
+
+
+def test_a_huge_number_in_one_card_stops_no_batch(tmp_path):
+    """It was once an error of the arithmetic, before any board had its turn."""
+    for name, length in (("a", "253"), ("b", HUGE), ("c", "9" * 400)):
+        text = CARD.replace(BOARD, name).replace("length_x_mm = 253", f"length_x_mm = {length}")
+        (tmp_path / f"{name}.toml").write_text(text)
+    boards, _ = boards_of(tmp_path, None)
+    found = [accepted_or_refused(board.card) for board in boards]
+
+    assert [board.name for board in boards] == ["a", "b", "c"]
+    assert [isinstance(one, InputError) for one in found] == [False, True, True]
+
+
+def test_a_huge_number_beside_a_fragment_or_a_table_is_a_fault_of_its_key(tmp_path):
+    text = CARD.replace("length_x_mm = 253", f"length_x_mm = {HUGE}")
+    table = read_table(text.encode(), "board.toml")
+    (tmp_path / "fragment.toml").write_text(FRAGMENT)
+    (tmp_path / "template.toml").write_text(TEMPLATE.replace("length_x_mm = 253", f"length_x_mm = {HUGE}"))
+    (tmp_path / "boards.csv").write_text(ROWS)
+    boards, _ = boards_of(tmp_path / "boards.csv", tmp_path / "template.toml")
+
+    for read in (
+        lambda: Board.from_card(CardFile(table, f"{BOARD}.toml"), setup=tmp_path / "fragment.toml"),
+        lambda: boards[0].card(),
+    ):
+        with pytest.raises(InputError, match=r"length_x_mm: wanted a number from .*, got a whole number of 20000 bits"):
+            read()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs FIFOs in the file system")
+def test_a_table_that_is_a_fifo_is_refused_without_waiting(tmp_path):
+    os.mkfifo(tmp_path / "boards.csv")
+
+    with stopped_if_it_hangs(1.0), pytest.raises(InputError, match=r"boards\.csv: wanted a regular file"):
+        boards_of(tmp_path / "boards.csv", tmp_path / "template.toml")
+
+
+def test_a_card_that_cannot_be_replaced_stays_as_it_was(tmp_path, monkeypatch):
+    """Half of the new one in its place would be neither."""
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    path = tmp_path / "a.toml"
+    write_card(path, "a", "format = 1\n", force=False)
+    monkeypatch.setattr(os, "replace", full)
+
+    with pytest.raises(InputError, match="No space left on device"):
+        write_card(path, "a", "format = 2\n", force=True)
+    assert path.read_text() == "format = 1\n"
+    assert list(tmp_path.iterdir()) == [path]

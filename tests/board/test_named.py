@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
@@ -12,7 +10,6 @@ from bayesplate.board.board import Board
 from bayesplate.board.named import load_named
 from bayesplate.board.shelf import shelf_folder
 
-Spoil = Callable[..., str]
 RESOLUTION = "resolution_hz = 1\n"
 NO_PRIOR = ("poisson_xy = 0.51", 'prior = "spruse"')
 NO_TABLE = (RESOLUTION, RESOLUTION + 'published_coefficients = "paper"\n')
@@ -25,9 +22,7 @@ TABLE_PLACE = 'my-board.toml [setup] published_coefficients -> "paper"'
     [([NO_PRIOR], [PRIOR_PLACE]), ([NO_TABLE], [TABLE_PLACE]), ([NO_PRIOR, NO_TABLE], [PRIOR_PLACE, TABLE_PLACE])],
     ids=["prior", "table", "both"],
 )
-def test_cards_that_are_not_there(
-    spoiled: Spoil, board_text: str, changes: list[tuple[str, str]], places: list[str]
-) -> None:
+def test_cards_that_are_not_there(spoiled, board_text, changes, places):
     for old, new in changes:
         board_text = spoiled(old, new, board_text)
     named = load_named(Board.from_text(board_text, "my-board"))
@@ -37,7 +32,7 @@ def test_cards_that_are_not_there(
     assert named.tables == {}
 
 
-def test_they_are_found_beside_the_board(board_file: Path, spoiled: Spoil, board_text: str) -> None:
+def test_they_are_found_beside_the_board(board_file, spoiled, board_text):
     """Wherever the program was started: a relative path begins at the folder of the board card."""
     text = spoiled("poisson_xy = 0.51", 'prior = "./mine.toml"', board_text)
     board_file.write_text(spoiled(RESOLUTION, RESOLUTION + 'published_coefficients = "sub/own.toml"\n', text))
@@ -57,8 +52,7 @@ def test_they_are_found_beside_the_board(board_file: Path, spoiled: Spoil, board
 
 @pytest.mark.parametrize("end", ["\n", "\r\n"], ids=["unix", "windows"])
 @pytest.mark.parametrize("mark", ["", "\ufeff"], ids=["plain", "byte order mark"])
-def test_the_text_of_a_card_is_what_its_hash_is_of(board_file: Path, board_text: str, end: str, mark: str) -> None:
-    """Also when the file is changed or taken away after it was read."""
+def test_the_text_of_a_card_is_what_its_hash_is_of(board_file, board_text, end, mark):
     board_file.write_text(mark + board_text, encoding="utf-8", newline=end)
     card = Board.from_toml(board_file)
     board_file.unlink()

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-import pytest
-
 from bayesplate.board.board import Board
 from bayesplate.board.checks import physical_faults
 from bayesplate.errors import Fault
 
-Spoil = Callable[..., str]
 ON_BOARD = "a place on the free part of the board, x 30 to 253 mm, y 0 to 114 mm"
 CORNER = "from the corner of x0 and y0 of the whole board"
 
@@ -30,14 +25,10 @@ CASES = [
      "0.041 kg is 41 g"),
     ("mass_g = 41.0", "mass_g = 1.45", "[plate] mass_g", "a density from 20 to 25000 kg/m3", "16.8 kg/m3",
      "1.45 oz is 41.11 g"),
-    ("mass_g = 41.0", "mass_g = 41000", "[plate] mass_g", "a density from 20 to 25000 kg/m3", "4.74e+05 kg/m3",
-     "mass in g, density in kg/m3, lengths in mm"),
     ("mass_g = 41.0", "density_kg_m3 = 4.7", "[plate] density_kg_m3", "a density from 20 to 25000 kg/m3", "4.7 kg/m3",
      "mass in g, density in kg/m3, lengths in mm"),
     ("{ mean = 3.0, sd = 0.03 }", "60", "[plate] thickness_mm", "at most half the shorter side, 57 mm", "60 mm",
      "no plate is so thick; 60 thousandths of an inch would be 1.52 mm"),
-    ("{ mean = 3.0, sd = 0.03 }", "118", "[plate] thickness_mm", "at most half the shorter side, 57 mm", "118 mm",
-     "no plate is so thick; 118 thousandths of an inch would be 3 mm"),
     ("length_x_mm = 253\nlength_y_mm = 114", "length_x_mm = 9.96\nlength_y_mm = 4.49", "[plate] mass_g",
      "a density from 20 to 25000 kg/m3", "3.06e+05 kg/m3", "sides of 9.96 and 4.49 inches would be 253 and 114 mm"),
     ("length_x_mm = 253\nlength_y_mm = 114", "length_x_mm = 9.96\nlength_y_mm = 4.49", "[plate] thickness_mm",
@@ -54,18 +45,18 @@ def faults_of(text: str) -> list[Fault]:
     return physical_faults(Board.from_text(text, "my-board"))
 
 
-def test_a_sound_card_has_none(board_text: str) -> None:
+def test_a_sound_card_has_none(board_text):
     assert faults_of(board_text) == []
 
 
-@pytest.mark.parametrize(("old", "new", "place", "wanted", "got", "remedy"), CASES)
-def test_one_fault(spoiled: Spoil, old: str, new: str, place: str, wanted: str, got: str, remedy: str) -> None:
-    expected = Fault(f"my-board.toml {place}", wanted, got, remedy)
+def test_one_fault(spoiled):
+    for old, new, place, wanted, got, remedy in CASES:
+        expected = Fault(f"my-board.toml {place}", wanted, got, remedy)
 
-    assert expected in faults_of(spoiled(old, new))
+        assert expected in faults_of(spoiled(old, new))
 
 
-def test_all_faults_at_once(spoiled: Spoil) -> None:
+def test_all_faults_at_once(spoiled):
     text = spoiled("at_mm = [200, 20]", "at_mm = [260, 20]")
     text = spoiled("mass_g = 41.0", "mass_g = 0.041", text)
     text = spoiled("first_label = [1, 0]", "first_label = [2, 0]", text)

@@ -16,7 +16,7 @@ NORMAL = Quantity.from_mean(0.4, 0.08, "normal")
 
 
 @pytest.mark.parametrize("quantity", [LOG_NORMAL, NORMAL, Quantity.from_median(0.5, 2.0)])
-def test_moments_by_quadrature(quantity: Quantity) -> None:
+def test_moments_by_quadrature(quantity):
     def moment(power: int) -> float:
         def integrand(z: float) -> float:
             return float(quantity.value(z)) ** power * math.exp(float(quantity.log_prior(z)))
@@ -28,15 +28,15 @@ def test_moments_by_quadrature(quantity: Quantity) -> None:
     assert math.sqrt(moment(2) - moment(1) ** 2) == pytest.approx(quantity.sd, rel=1e-7)
 
 
-@pytest.mark.parametrize("quantity", [LOG_NORMAL, NORMAL])
-def test_standard_is_the_inverse_of_value(quantity: Quantity) -> None:
-    z = np.linspace(-6, 6, 25).reshape(5, 5)
+def test_standard_is_the_inverse_of_value():
+    for quantity in [LOG_NORMAL, NORMAL]:
+        z = np.linspace(-6, 6, 25).reshape(5, 5)
 
-    np.testing.assert_allclose(quantity.standard(quantity.value(z)), z, atol=1e-12)
-    assert float(quantity.value(0.0)) == pytest.approx(quantity.median, rel=1e-15)
+        np.testing.assert_allclose(quantity.standard(quantity.value(z)), z, atol=1e-12)
+        assert float(quantity.value(0.0)) == pytest.approx(quantity.median, rel=1e-15)
 
 
-def test_exact_has_one_value() -> None:
+def test_exact_has_one_value():
     seven = Quantity.exact(7)
 
     assert seven.is_exact
@@ -46,39 +46,29 @@ def test_exact_has_one_value() -> None:
     assert seven.median == 7
 
 
-def test_readings_join_standard_error_and_rounding() -> None:
-    readings = [3.0, 3.1, 2.9, 3.2]
-    rounded = Quantity.from_readings(readings, resolution=0.1)
-
-    assert rounded.mean == pytest.approx(3.05)
-    assert rounded.sd**2 == pytest.approx(np.var(readings, ddof=1) / 4 + 0.01 / 12)
-    assert not rounded.has_profile
-
-
-def test_readings_at_different_places_are_rounded_each_on_its_own() -> None:
+def test_readings_at_different_places_are_rounded_each_on_its_own():
     readings = [3.0, 3.1, 2.9, 3.2]
     apart = Quantity.from_readings(readings, resolution=0.1, at_x=[0, 1, 2, 3], place_sd=5)
     together = Quantity.from_readings(readings, resolution=0.1, at_x=[1, 1, 1, 1], at_y=[2, 2, 2, 2])
 
     assert apart.sd**2 == pytest.approx(np.var(readings, ddof=1) / 4 + 0.01 / 12 / 4)
     assert together.sd**2 == pytest.approx(np.var(readings, ddof=1) / 4 + 0.01 / 12)
+    assert together.mean == pytest.approx(3.05)
     assert apart.has_profile
+    assert not Quantity.from_readings(readings, resolution=0.1).has_profile
     assert apart.scaled(1e-3).place_sd == 5
     assert apart.scaled(1.0, 1e-3).place_sd == pytest.approx(0.005)
 
 
-def test_rounding_is_not_averaged_away() -> None:
+def test_rounding_is_not_averaged_away_and_equal_readings_without_it_are_exact():
     many = Quantity.from_readings([256.0] * 1000, resolution=2)
 
     assert many.sd == pytest.approx(2 / math.sqrt(12), rel=1e-12)
     assert Quantity.from_readings([256.0], resolution=2).sd == many.sd
-
-
-def test_equal_readings_without_rounding_are_exact() -> None:
     assert Quantity.from_readings([0.1, 0.1, 0.1]).is_exact
 
 
-def test_median_and_factor() -> None:
+def test_median_and_factor():
     noise = Quantity.from_median(0.3, 1.65)
 
     assert noise.median == pytest.approx(0.3, rel=1e-14)
@@ -86,14 +76,12 @@ def test_median_and_factor() -> None:
     assert float(noise.value(1.0)) == pytest.approx(0.3 * 1.65, rel=1e-13)
 
 
-@pytest.mark.parametrize(
-    ("lower", "upper"), [(0.3, math.inf), (-math.inf, 0.3), (0.35, 0.5), (1.5, math.inf), (-math.inf, -1.0)]
-)
+@pytest.mark.parametrize(("lower", "upper"), [(0.35, 0.5), (1.5, math.inf), (-math.inf, -1.0)])
 @pytest.mark.parametrize("kind", ["normal", "log-normal"])
-def test_truncated_density_is_normalised(kind: str, lower: float, upper: float) -> None:
+def test_truncated_density_is_normalised(kind, lower, upper):
     if kind == "log-normal" and upper < 0:
         lower, upper = 0.05, 0.1  # far in the lower tail instead
-    quantity = Quantity.from_mean(0.4, 0.08, kind, lower, upper)  # type: ignore[arg-type]
+    quantity = Quantity.from_mean(0.4, 0.08, kind, lower, upper)
     low, high = float(quantity.standard(lower)), float(quantity.standard(upper))
     start, stop = max(low, min(high, 0.0) - 12), min(high, max(low, 0.0) + 12)
 
@@ -105,28 +93,28 @@ def test_truncated_density_is_normalised(kind: str, lower: float, upper: float) 
     assert np.all(np.isneginf(quantity.log_prior(outside)))
 
 
-@pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_truncation_far_out_in_a_tail(sign: float) -> None:
-    bounds = sorted((sign * 40.0, sign * math.inf))
-    tail = Quantity(0.0, 1.0, "normal", *bounds)
+def test_truncation_far_out_in_a_tail():
+    for sign in [-1.0, 1.0]:
+        bounds = sorted((sign * 40.0, sign * math.inf))
+        tail = Quantity(0.0, 1.0, "normal", *bounds)
 
-    # beyond t the normal density is exponential with rate t + 1/t, to second order in 1/t
-    assert float(np.exp(tail.log_prior(sign * 40.0))) == pytest.approx(40 + 1 / 40, rel=1e-5)
-
-
-@pytest.mark.parametrize("bound", [2.0, 9.0, 30.0])
-def test_quantiles_far_out_in_a_tail_are_alike_on_both_sides(bound: float) -> None:
-    probability = np.array([0.0, 0.05, 0.5, 0.95, 1.0])
-    above = Quantity.from_mean(0.0, 1.0, "normal", lower=bound, upper=bound + 5.0)
-    below = Quantity.from_mean(0.0, 1.0, "normal", lower=-bound - 5.0, upper=-bound)
-    found = above.quantile(probability)
-
-    assert found == pytest.approx(-below.quantile(probability[::-1]), rel=1e-12)
-    assert found[[0, -1]] == pytest.approx([bound, bound + 5.0], rel=1e-6)
-    assert np.all(np.diff(found) > 0)
+        # beyond t the normal density is exponential with rate t + 1/t, to second order in 1/t
+        assert float(np.exp(tail.log_prior(sign * 40.0))) == pytest.approx(40 + 1 / 40, rel=1e-5)
 
 
-def test_scaled_changes_the_unit_of_all_but_the_places() -> None:
+def test_quantiles_far_out_in_a_tail_are_alike_on_both_sides():
+    for bound in [2.0, 9.0, 30.0]:
+        probability = np.array([0.0, 0.05, 0.5, 0.95, 1.0])
+        above = Quantity.from_mean(0.0, 1.0, "normal", lower=bound, upper=bound + 5.0)
+        below = Quantity.from_mean(0.0, 1.0, "normal", lower=-bound - 5.0, upper=-bound)
+        found = above.quantile(probability)
+
+        assert found == pytest.approx(-below.quantile(probability[::-1]), rel=1e-12)
+        assert found[[0, -1]] == pytest.approx([bound, bound + 5.0], rel=1e-6)
+        assert np.all(np.diff(found) > 0)
+
+
+def test_scaled_changes_the_unit_of_all_but_the_places():
     millimetres = Quantity.from_readings([2.9, 3.1], 0.1, at_x=[0, 100], at_y=[5, 5])
     metres = millimetres.scaled(1e-3)
 
@@ -139,60 +127,57 @@ def test_scaled_changes_the_unit_of_all_but_the_places() -> None:
     assert metres.scaled(1.0, 1e-3).at_x == pytest.approx((0, 0.1))
 
 
-def test_scaled_bounds_keep_the_density() -> None:
+def test_scaled_bounds_keep_the_density():
     bounded = Quantity.from_mean(3.0, 0.5, lower=2.5, upper=4.0)
     z = np.linspace(-3, 3, 13)
 
     np.testing.assert_allclose(bounded.scaled(1e-3).log_prior(z), bounded.log_prior(z), rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Quantity(math.nan), "mean: wanted a finite number, got nan"),
-        (lambda: Quantity(1.0, -1.0), "sd: wanted a finite number, zero or positive, got -1"),
-        (lambda: Quantity(-1.0, 1.0), "mean: wanted a positive number for a log-normal quantity, got -1"),
-        (lambda: Quantity(1.0, 1.0, "normal", 2.0, 2.0), "bounds: wanted lower < upper, got 2.0 and 2.0"),
-        (lambda: Quantity.from_readings([]), "readings: wanted at least one, got none"),
-        (lambda: Quantity.from_readings([1.0, 2.0], at_x=[0.0]), "places: wanted one per reading"),
-        (lambda: Quantity.from_median(1.0, 1.0), "wanted median > 0 and factor > 1"),
-        (lambda: Quantity.from_median("1", 2.0), "median: wanted a number, got '1'"),
-        (lambda: Quantity.from_mean(None, 1.0), "mean: wanted a number, got None"),
-        (lambda: Quantity.from_mean(1.0, 1.0, "uniform"), "kind: wanted normal, log-normal, log-uniform, got 'uniform"),
-        (lambda: Quantity.from_range(2.0, 1.0), "bounds: wanted 0 < lower < upper, got 2.0 and 1.0"),
-        (lambda: Quantity.from_readings([1.0, 2.0], resolution=-1), "resolution: wanted a finite number, zero or pos"),
-        (lambda: Quantity.from_readings([1.0, math.inf]), "readings: wanted finite numbers"),
-        (lambda: Quantity.from_readings("12"), "readings: wanted a list or an array of numbers, got '12'"),
-        (lambda: Quantity.exact([1.0]), r"value: wanted a number, got \[1.0\]"),
-        (lambda: Quantity.of([[1.0], [1.0, 2.0]]), "quantity: wanted a number, an array of readings or a Quantity"),
-    ],
-)
-def test_what_makes_no_quantity_is_refused(make: object, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        make()  # type: ignore[operator]
+NO_QUANTITIES = [
+    (lambda: Quantity(math.nan), "mean: wanted a finite number, got nan"),
+    (lambda: Quantity(1.0, -1.0), "sd: wanted a finite number, zero or positive, got -1"),
+    (lambda: Quantity(-1.0, 1.0), "mean: wanted a positive number for a log-normal quantity, got -1"),
+    (lambda: Quantity(1.0, 1.0, "normal", 2.0, 2.0), "bounds: wanted lower < upper, got 2.0 and 2.0"),
+    (lambda: Quantity.from_readings([]), "readings: wanted at least one, got none"),
+    (lambda: Quantity.from_readings([1.0, 2.0], at_x=[0.0]), "places: wanted one per reading"),
+    (lambda: Quantity.from_median(1.0, 1.0), "wanted median > 0 and factor > 1"),
+    (lambda: Quantity.from_median("1", 2.0), "median: wanted a number, got '1'"),
+    (lambda: Quantity.from_mean(None, 1.0), "mean: wanted a number, got None"),
+    (lambda: Quantity.from_mean(1.0, 1.0, "uniform"), "kind: wanted normal, log-normal, log-uniform, got 'uniform"),
+    (lambda: Quantity.from_range(2.0, 1.0), "bounds: wanted 0 < lower < upper, got 2.0 and 1.0"),
+    (lambda: Quantity.from_readings([1.0, 2.0], resolution=-1), "resolution: wanted a finite number, zero or pos"),
+    (lambda: Quantity.from_readings([1.0, math.inf]), "readings: wanted finite numbers"),
+    (lambda: Quantity.from_readings("12"), "readings: wanted a list or an array of numbers, got '12'"),
+    (lambda: Quantity.exact([1.0]), r"value: wanted a number, got \[1.0\]"),
+    (lambda: Quantity.of([[1.0], [1.0, 2.0]]), "quantity: wanted a number, an array of readings or a Quantity"),
+]
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
+def test_what_makes_no_quantity_is_refused():
+    for make, message in NO_QUANTITIES:
+        with pytest.raises(InputError, match=message):
+            make()
+
+
+def test_what_a_quantity_cannot_do_is_refused():
+    for make, message in [
         (lambda: Quantity.exact(1.0).scaled(0), "factor: wanted a positive number, got 0"),
         (lambda: Quantity(1.0, 1.0, "normal").log_sd, "log_sd: wanted the quantity of a positive thing"),
-    ],
-)
-def test_what_a_quantity_cannot_do_is_refused(make: object, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        make()  # type: ignore[operator]
+    ]:
+        with pytest.raises(ValueError, match=message):
+            make()
 
 
-def test_log_normal_is_never_below_zero() -> None:
+def test_log_normal_is_never_below_zero():
     assert np.isneginf(LOG_NORMAL.standard([0.0, -1.0])).all()
     assert float(LOG_NORMAL.value(-40.0)) > 0
 
 
-@pytest.mark.parametrize("width", [1e-9, 1e-4, 1.9e-3, 2.1e-3, 3.0])
-def test_a_range_has_the_moments_of_a_uniform_logarithm(width):
+def test_a_range_has_the_moments_of_a_uniform_logarithm():
     """However narrow it is: its standard deviation is that of a uniform density then."""
-    one = Quantity.from_range(2.0, 2.0 * (1.0 + width))
-    logs = np.log1p(width) * (np.arange(100_000) + 0.5) / 100_000
-    assert one.mean == pytest.approx(2.0 + 2.0 * np.expm1(logs).mean(), rel=1e-9)
-    assert one.sd == pytest.approx(2.0 * np.expm1(logs).std(), rel=1e-6)
+    for width in [1e-9, 1e-4, 1.9e-3, 2.1e-3, 3.0]:
+        one = Quantity.from_range(2.0, 2.0 * (1.0 + width))
+        logs = np.log1p(width) * (np.arange(100_000) + 0.5) / 100_000
+        assert one.mean == pytest.approx(2.0 + 2.0 * np.expm1(logs).mean(), rel=1e-9)
+        assert one.sd == pytest.approx(2.0 * np.expm1(logs).std(), rel=1e-6)

@@ -51,10 +51,10 @@ HEADERS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("header", "card", "said"), HEADERS)
-def test_a_header_that_would_mean_something_else_is_refused(tmp_path, header, card, said):
-    with pytest.raises(InputError, match=re.escape(said)):
-        columns(tmp_path, header, card)
+def test_a_header_that_would_mean_something_else_is_refused(tmp_path):
+    for header, card, said in HEADERS:
+        with pytest.raises(InputError, match=re.escape(said)):
+            columns(tmp_path, header, card)
 
 
 def test_a_template_may_have_readings_that_every_row_replaces(tmp_path):
@@ -65,10 +65,7 @@ def test_a_template_may_have_readings_that_every_row_replaces(tmp_path):
 
 
 ROWS = [
-    (
-        ["a", "", "0.5", "51.8"],
-        '"thickness_mm": wanted a value beside its standard deviation, got an empty cell',
-    ),
+    (["a", "", "0.5", "51.8"], '"thickness_mm": wanted a value beside its standard deviation, got an empty cell'),
     (["a", "4.4;4.5", "0.5", "51.8"], '"thickness_mm sd": wanted readings, or a value and its standard deviation'),
     (["a", "5_1.8", "", "51.8"], 'a.toml [plate] thickness_mm: wanted a number, got "5_1.8"'),
     (["", "4.5", "", "51.8"], "name: wanted a name, got an empty cell"),
@@ -77,12 +74,12 @@ ROWS = [
 ]
 
 
-@pytest.mark.parametrize(("row", "said"), ROWS)
-def test_a_row_that_would_mean_something_else_is_refused(tmp_path, row, said):
-    own = columns(tmp_path, 'name,thickness_mm,thickness_mm sd,"(1,1)",')
-    full = [*row[:4], "", row[4]] if "decimal" in said else row
-    with pytest.raises(InputError, match=re.escape(said)):
-        own.board(full)
+def test_a_row_that_would_mean_something_else_is_refused(tmp_path):
+    for row, said in ROWS:
+        own = columns(tmp_path, 'name,thickness_mm,thickness_mm sd,"(1,1)",')
+        full = [*row[:4], "", row[4]] if "decimal" in said else row
+        with pytest.raises(InputError, match=re.escape(said)):
+            own.board(full)
 
 
 def test_texts_stay_texts_and_what_is_empty_is_nothing(tmp_path):

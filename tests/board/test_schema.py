@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import FrozenInstanceError
 
 import pytest
@@ -12,8 +11,6 @@ from bayesplate.board.board import Board
 from bayesplate.board.setup_keys import edge_letters
 from bayesplate.errors import InputError
 from bayesplate.labels import Label
-
-Spoil = Callable[..., str]
 
 LENGTH = "length_x_mm = 253"
 MODE = '"(1,0)" = 52'
@@ -28,33 +25,20 @@ NUMBERS = [
     ("-3", "a positive number", "-3"),
     ("0", "a positive number", "0"),
     ("nan", "a finite number", "nan"),
-    ("inf", "a finite number", "inf"),
-    ("-inf", "a finite number", "-inf"),
     ("true", "a number", "true"),
     ('"52,5"', "a number", '"52,5" (a decimal point and no quotes: 52.5)'),
     ('"1,024"', "a number", '"1,024" (ambiguous: write 1.024 or 1024, whichever is meant)'),
-    ('"52 mm"', "a number", '"52 mm" (the unit stands in the key: write the number alone)'),
-    ('"9.96 in"', "a number", '"9.96 in" (9.96 in are 253 mm: write 253 alone, the unit stands in the key)'),
-    ('"118 thou"', "a number", '"118 thou" (118 thou are 2.997 mm: write 2.997 alone, the unit stands in the key)'),
-    ('"\u2212253"', "a number", '"\u2212253" (it holds a typographic minus: write the hyphen -'),
-    ('"2\u00a0530"', "a number", '"2\\xa0530" (it holds a non-breaking space: write a plain one, or none)'),
-    ('"253"', "a number", '"253" (no quotes around a number)'),
     ('"N/A"', "a number", '"N/A"'),
     ("2024-01-29", "a number", "a date or time"),
     ("1e300", "a number from 1 to 100000 mm", "1e+300"),
-    ("1e-300", "a number from 1 to 100000 mm", "1e-300"),
     ("0.253", "a number from 1 to 100000 mm", "0.253 (in mm: 1 m is 1000 mm, 1 cm is 10 mm)"),
-    ("0xf" + "f" * 5000, "a number from 1 to 100000 mm", "a whole number of 20004 bits"),
     ("[]", "at least one of readings", "an empty list"),
     ("{}", "{ mean, sd } or { readings, resolution }", "an empty table"),
     ("{ value = 3 }", "{ mean, sd } or { readings, resolution }", "a table with value"),
 ]
 PARTS = [
     ('[253, "x"]', " 2", "a number", '"x"'),
-    ("[253, [254]]", " 2", "a number", "a list of 1"),
     ("{ mean = 3 }", ".sd", "a value", "nothing"),
-    ("{ sd = 3 }", ".mean", "a value", "nothing"),
-    ("{ mean = 253, sd = -1 }", ".sd", "a positive number", "-1 (the number alone if it is exact"),
     ("{ mean = 253, sd = 0 }", ".sd", "a positive number", "0 (the number alone if it is exact"),
     ("{ mean = 253, sd = 254 }", ".sd", "a number from 2.53e-07 to 253 mm", "254"),
     ("{ mean = 253, sd = 1, std = 2 }", ".std", "one of mean, sd", UNKNOWN + " (did you mean sd?)"),
@@ -70,9 +54,6 @@ REST = [
     ('name = "my-board"', 'name = "../../x"', "name", NAME_RULE, '"../../x"'),
     ('name = "my-board"', 'name = "CON"', "name", "a name that no operating system reserves for a device", '"CON"'),
     ('name = "my-board"', 'name = "nul.txt"', "name", "a name that no operating system reserves", '"nul.txt"'),
-    ('name = "my-board"', 'name = ".."', "name", NAME_RULE, '".."'),
-    ('name = "my-board"', 'name = "a\\nb"', "name", NAME_RULE, '"a\\nb"'),
-    ('name = "my-board"', 'name = "a\\u0000b"', "name", NAME_RULE, '"a\\x00b"'),
     ('name = "my-board"', f'name = "{"a" * 300}"', "name", NAME_RULE, '"' + "a" * 60 + '..."'),
     ('name = "my-board"', 'name = "other"', "name", '"my-board", the name of the file', '"other"'),
     ('title = "A test board"', "title = 3", "title", "a text in quotes", "3"),
@@ -114,21 +95,17 @@ REST = [
     ("mass_g = 41.0", 'mass_g = 41.0\nnotes = "x"', "[plate] notes", "one of length_x_mm",
      UNKNOWN + " (it belongs above the first table)"),
     ("{ x0 = 30 }", "{ x1 = 30 }", SETUP + "clamped_mm.x1", "a clamped edge", "a free one"),
-    ("{ x0 = 30 }", "{ z0 = 30 }", SETUP + "clamped_mm.z0", "one of x0, x1, y0, y1", UNKNOWN),
     ("{ x0 = 30 }", "30", SETUP + "clamped_mm", "a table of clamped edges, { x0 = 30 }", "30"),
     ("first_label = [1, 0]", "first_label = [1]", SETUP + "first_label", "two whole numbers, [1, 0]", "a list of 1"),
     ("first_label = [1, 0]", "first_label = [1, -1]", SETUP + "first_label 2", "a whole number from 0 to 2", "-1"),
     ("first_label = [1, 0]", "first_label = [1.0, 0]", SETUP + "first_label 1", "a whole number from 0 to 2", "1.0"),
     ("resolution_hz = 1\n", "resolution_hz = 0\n", SETUP + "resolution_hz", "a positive number", "0"),
     ("[448.8, 594.1]", "448.8", SETUP + "unlabelled_hz", "a list of frequencies", "448.8"),
-    ("[448.8, 594.1]", "[448.8, 0.0]", SETUP + "unlabelled_hz 2", "a positive number", "0.0"),
     ("factor = 2 }", "factor = 1 }", SETUP + "noise_percent.factor", "a factor above 1", "1"),
-    ("median = 0.5,", "median = nan,", SETUP + "noise_percent.median", "a finite number", "nan"),
     ("{ median = 0.5, factor = 2 }", "0.5", SETUP + "noise_percent", "{ median = 0.5, factor = 2 }, in percent", "0.5"),
     (MODE, '"(1,0)" = 0.052', FREQUENCY, "a number from 0.1 to 1000000 Hz", "0.052 (in Hz: 1 kHz is 1000 Hz)"),
     (MODE, '"(1,0)" = 0', FREQUENCY, "a positive number",
      "0 (in Hz; the zero-frequency modes of a free board are not listed)"),
-    (MODE, '"(1,0)" = "52 Hz"', FREQUENCY, "a number", '"52 Hz" (the unit stands in the key'),
     (MODE, '"(1,0)" = { readings = [52], at_x_mm = [1] }', FREQUENCY + ".at_x_mm", "one of readings, resolution",
      UNKNOWN),
     (MODE, MODE + '\n"( 1, 0 )" = 53', SETUP + "frequencies_hz", "the label (1,0) once",
@@ -139,15 +116,13 @@ REST = [
      '"acelerometer" (did you mean accelerometer?)'),
     ("at_mm = [200, 20]", "at_mm = [[200, 20], [3]]", SETUP + "attached 1 at_mm 2", "a place [x, y] in mm",
      "a list of 1"),
-    ("mass_g = { mean = 0.6, sd = 0.1 }", "mass_g = -1", SETUP + "attached 1 mass_g", "a positive number", "-1"),
-    ("density_kg_m3 = 1.2", "density_kg_m3 = -1.2", SETUP + "fluid.density_kg_m3", "a positive number", "-1.2"),
     ('baffle = "none"', 'baffle = "half"', SETUP + "fluid.baffle", '"none" or "full"', '"half"'),
     ("[[setup.attached]]", "[setup.attached]", SETUP + "attached",
      "tables below [[setup.attached]], in double brackets",
      "a table with kind, mass_g, at_mm"),
     ('name = "cantilever"', 'name = "Board"', SETUP + "name", "another name", '"board"'),
 ]  # fmt: skip
-LABELS = ["10", "(1;0)", "(1.0,0)", "(-1,0)", "(12,0)", "resolution_hz"]
+LABELS = ["10", "(12,0)", "resolution_hz"]
 
 
 def assert_refused(text: str, place: str, wanted: str, got: str) -> None:
@@ -157,33 +132,27 @@ def assert_refused(text: str, place: str, wanted: str, got: str) -> None:
                for fault in caught.value.faults)  # fmt: skip
 
 
-@pytest.mark.parametrize(("value", "wanted", "got"), NUMBERS)
-def test_what_is_no_number_in_range(spoiled: Spoil, value: str, wanted: str, got: str) -> None:
-    assert_refused(spoiled(LENGTH, f"length_x_mm = {value}"), "[plate] length_x_mm", wanted, got)
+def test_what_is_no_number_in_range_and_parts_of_a_quantity(spoiled):
+    for value, wanted, got in NUMBERS:
+        assert_refused(spoiled(LENGTH, f"length_x_mm = {value}"), "[plate] length_x_mm", wanted, got)
+    for value, inside, wanted, got in PARTS:
+        assert_refused(spoiled(LENGTH, f"length_x_mm = {value}"), f"[plate] length_x_mm{inside}", wanted, got)
 
 
-@pytest.mark.parametrize(("value", "inside", "wanted", "got"), PARTS)
-def test_parts_of_a_quantity(spoiled: Spoil, value: str, inside: str, wanted: str, got: str) -> None:
-    assert_refused(spoiled(LENGTH, f"length_x_mm = {value}"), f"[plate] length_x_mm{inside}", wanted, got)
+def test_other_keys(spoiled):
+    for old, new, place, wanted, got in REST:
+        assert_refused(spoiled(old, new), place, wanted, got)
 
 
-@pytest.mark.parametrize(("old", "new", "place", "wanted", "got"), REST)
-def test_other_keys(spoiled: Spoil, old: str, new: str, place: str, wanted: str, got: str) -> None:
-    assert_refused(spoiled(old, new), place, wanted, got)
-
-
-@pytest.mark.parametrize("label", LABELS)
-def test_labels_have_one_grammar(spoiled: Spoil, label: str) -> None:
-    key = label if label in ("10", "resolution_hz") else f'"{label}"'
-    assert_refused(spoiled(MODE, f'"{label}" = 52'), f"[setup] frequencies_hz.{key}", GRAMMAR, f'"{label}"')
-
-
-def test_a_key_below_the_table_of_labels_is_explained(spoiled: Spoil) -> None:
+def test_labels_have_one_grammar(spoiled):
+    for label in LABELS:
+        key = label if label in ("10", "resolution_hz") else f'"{label}"'
+        assert_refused(spoiled(MODE, f'"{label}" = 52'), f"[setup] frequencies_hz.{key}", GRAMMAR, f'"{label}"')
     with pytest.raises(InputError, match=re.escape("(a key of [setup] stands above the table of labels)")):
         Board.from_text(spoiled(MODE, MODE + "\nresolution_hz = 1"), "my-board")
 
 
-def test_no_modes_at_all(spoiled: Spoil, board_text: str) -> None:
+def test_no_modes_at_all(spoiled, board_text):
     start, end = board_text.index("[setup.frequencies_hz]"), board_text.index("[setup.hammer]")
     text = board_text[:start] + board_text[end:]
 
@@ -192,12 +161,12 @@ def test_no_modes_at_all(spoiled: Spoil, board_text: str) -> None:
                    'measured frequencies, "(1,0)" = 52', "no modes")  # fmt: skip
 
 
-def test_too_many_modes(spoiled: Spoil) -> None:
+def test_too_many_modes(spoiled):
     many = "\n".join(f'"({m},{n})" = {100 + 41 * m + n}' for m in range(3, 10) for n in range(41))
     assert_refused(spoiled(MODE, f"{MODE}\n{many}"), "[setup] frequencies_hz", "at most 200 modes", "290")
 
 
-def test_all_faults_are_reported_at_once(spoiled: Spoil) -> None:
+def test_all_faults_are_reported_at_once(spoiled):
     text = spoiled(LENGTH, "length_x_mm = -3")
     text = spoiled("first_label = [1, 0]", "first_label = 3", text)
     text = spoiled('"(1,0)" = "+"', '"(9,9)" = "+"', text)
@@ -216,7 +185,7 @@ def test_all_faults_are_reported_at_once(spoiled: Spoil) -> None:
     ]
 
 
-def test_a_flood_of_faults_is_cut(spoiled: Spoil) -> None:
+def test_a_flood_of_faults_is_cut(spoiled):
     flood = "\n".join(f"key{number} = 1" for number in range(500))
 
     with pytest.raises(InputError, match="450 more faults, not listed") as caught:
@@ -231,37 +200,37 @@ FREE = (
 HEAD = 'format = 1\nname = "my-board"\n[plate]\nlength_x_mm = 253\nlength_y_mm = 114\nthickness_mm = 3\nmass_g = 41\n'
 
 
-@pytest.mark.parametrize(
-    ("second", "place", "wanted", "got"),
-    [
-        (FREE, '[[setup]] 2 "free" name', "a name of its own", '"free" again'),
-        (FREE.replace('"free"\n', '"FREE"\n', 1), '[[setup]] 2 "FREE" name', "a name of its own", '"FREE" again'),
-        (FREE.replace('name = "free"\n', ""), "[[setup]] 2 name", "a name, because there are several setups",
-         "nothing"),
-        (FREE.replace('x0 = "free"', 'x0 = "lose"').replace('"free"\n', '"b"\n', 1), '[[setup]] 2 "b" edges.x0',
-         '"clamped", "supported" or "free"', '"lose"'),
-    ],
-)  # fmt: skip
-def test_several_setups(second: str, place: str, wanted: str, got: str) -> None:
-    assert_refused(HEAD + FREE + second, place, wanted, got)
+SECOND = [
+    (FREE, '[[setup]] 2 "free" name', "a name of its own", '"free" again'),
+    (FREE.replace('"free"\n', '"FREE"\n', 1), '[[setup]] 2 "FREE" name', "a name of its own", '"FREE" again'),
+    (FREE.replace('name = "free"\n', ""), "[[setup]] 2 name", "a name, because there are several setups",
+     "nothing"),
+    (FREE.replace('x0 = "free"', 'x0 = "lose"').replace('"free"\n', '"b"\n', 1), '[[setup]] 2 "b" edges.x0',
+     '"clamped", "supported" or "free"', '"lose"'),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("text", "place", "wanted", "got"),
-    [
-        (HEAD, "setup", "a [setup] table, or several [[setup]]", "nothing"),
-        ("setup = 3\n" + HEAD, "setup", "a list of [[setup]] tables", "3"),
-        ("setup = []\n" + HEAD, "setup", "at least one of [[setup]] tables", "an empty list"),
-        (HEAD + FREE * 21, "setup", "at most 20 [[setup]] tables", "21"),
-        ("plate = 3\n" + FREE, "plate", "a table", "3"),
-        (FREE, "plate", "a [plate] table", "nothing"),
-    ],
-)
-def test_missing_sections(text: str, place: str, wanted: str, got: str) -> None:
-    assert_refused(text, place, wanted, got)
+def test_several_setups():
+    for second, place, wanted, got in SECOND:
+        assert_refused(HEAD + FREE + second, place, wanted, got)
 
 
-def test_a_sound_card_is_read(board_text: str) -> None:
+SECTIONS = [
+    (HEAD, "setup", "a [setup] table, or several [[setup]]", "nothing"),
+    ("setup = 3\n" + HEAD, "setup", "a list of [[setup]] tables", "3"),
+    ("setup = []\n" + HEAD, "setup", "at least one of [[setup]] tables", "an empty list"),
+    (HEAD + FREE * 21, "setup", "at most 20 [[setup]] tables", "21"),
+    ("plate = 3\n" + FREE, "plate", "a table", "3"),
+    (FREE, "plate", "a [plate] table", "nothing"),
+]
+
+
+def test_missing_sections():
+    for text, place, wanted, got in SECTIONS:
+        assert_refused(text, place, wanted, got)
+
+
+def test_a_sound_card_is_read(board_text):
     card = Board.from_text(board_text, "my-board")
     setup = card.setup("cantilever")
 
@@ -278,7 +247,7 @@ def test_a_sound_card_is_read(board_text: str) -> None:
     assert len(card.sha256) == 64
 
 
-def test_defaults(spoiled: Spoil) -> None:
+def test_defaults(spoiled):
     def poisson(card: Board) -> tuple[float, float, str, bool]:
         ratio = card.parameter("poisson_xy")
         return ratio.prior.mean, ratio.prior.sd, ratio.prior.kind, ratio.is_assumed
@@ -294,20 +263,9 @@ def test_defaults(spoiled: Spoil) -> None:
     assert bare.effects == ()
 
 
-def test_spaces_in_labels_change_nothing(spoiled: Spoil, board_text: str) -> None:
-    spaced = spoiled(MODE + "\n", '" ( 1 , 0 ) " = 52\n')
-
-    assert Board.from_text(spaced, "my-board").setups == Board.from_text(board_text, "my-board").setups
-
-
-def test_one_setup_may_be_written_as_a_list(board_text: str) -> None:
-    listed = board_text.replace("[setup]", "[[setup]]")
-
-    assert Board.from_text(listed, "my-board").setups == Board.from_text(board_text, "my-board").setups
-
-
-def test_a_card_cannot_be_changed(board_text: str) -> None:
-    card = Board.from_text(board_text, "my-board")
-
+def test_spaces_in_labels_and_a_list_of_one_setup_change_nothing(spoiled, board_text):
+    plain = Board.from_text(board_text, "my-board")
+    for same in (spoiled(MODE + "\n", '" ( 1 , 0 ) " = 52\n'), board_text.replace("[setup]", "[[setup]]")):
+        assert Board.from_text(same, "my-board").setups == plain.setups
     with pytest.raises(FrozenInstanceError):
-        card.name = "other"  # type: ignore[misc]
+        plain.name = "other"

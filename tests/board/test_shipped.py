@@ -33,86 +33,81 @@ PAPER = {
 }
 
 
-def test_the_shelf() -> None:
+def test_the_shelf():
     assert card_names("boards") == tuple(sorted((*PAPER, *FREE, *PANELS, "nemus-D")))
     assert card_names("priors") == ("spruce", "weakly-informative")
     assert card_names("coefficients") == ("paper-cantilever", "paper-clamped")
 
 
-@pytest.mark.parametrize("name", card_names("boards"))
-def test_a_shipped_board_is_sound_and_names_no_effect(name: str) -> None:
-    card = Board.from_toml(name)
-
-    assert physical_faults(card) == []
-    assert card.effects == ()
-    assert card.prior == "weakly-informative"
-    assert card.source
-
-
 PROFILES = ("support_stiffness", "thickness_profile", "outline_profile")
 DECLARED = dict.fromkeys(FREE, PROFILES) | {"spruce-free-2R": PROFILES[:2], "foam-panel-exciter": ("fluid_loading",)}
+"""Effects by what a card states: the free boards their support and shape, the foam its air."""
 
 
-@pytest.mark.parametrize("name", card_names("boards"))
-def test_what_a_shipped_board_declares_by_what_it_states(name: str) -> None:
-    """The free boards their support and shape, the foam its air; an empty list of effects keeps the rest undeclared."""
-    declared = prepare(name).board.effects
-    assert tuple(one for one in declared if one != "exciter") == DECLARED.get(name, ())
+def test_a_shipped_board_is_sound_and_declares_effects_by_what_it_states_alone():
+    for name in card_names("boards"):
+        card = Board.from_toml(name)
+
+        assert physical_faults(card) == []
+        assert card.effects == ()
+        assert card.prior == "weakly-informative"
+        assert card.source
+        declared = prepare(name).board.effects
+        assert tuple(one for one in declared if one != "exciter") == DECLARED.get(name, ())
 
 
-@pytest.mark.parametrize("name", PAPER)
-def test_the_boards_of_the_paper(name: str) -> None:
-    labels, hertz, (length, width, thickness, density) = PAPER[name]
-    card = Board.from_toml(name)
-    (setup,) = card.setups
+def test_the_boards_of_the_paper():
+    for name, (labels, hertz, (length, width, thickness, density)) in PAPER.items():
+        card = Board.from_toml(name)
+        (setup,) = card.setups
 
-    assert {label: quantity.mean for label, quantity in frequencies(setup).items()} == dict(
-        zip(labels, hertz, strict=True)
-    )
-    assert millimetres(card, "length_x", "length_y", "thickness") == (length, width, thickness)
-    assert card.inputs["density"].mean == density
-    assert card.inputs["poisson_xy"] == Quantity.exact(0.51)
-    assert setup.resolution == 1
-    table = load_coefficients(setup.table_name)
-    free_length = length - sum(1e3 * quantity.mean for quantity in setup.clamped.values())
-    assert table.aspect_ratio == pytest.approx(free_length / width)
-    assert set(table.table) == set(setup.labels)
-    assert (not setup.is_noise_assumed) == name.endswith("-fe")
+        assert {label: quantity.mean for label, quantity in frequencies(setup).items()} == dict(
+            zip(labels, hertz, strict=True)
+        )
+        assert millimetres(card, "length_x", "length_y", "thickness") == (length, width, thickness)
+        assert card.inputs["density"].mean == density
+        assert card.inputs["poisson_xy"] == Quantity.exact(0.51)
+        assert setup.resolution == 1
+        table = load_coefficients(setup.table_name)
+        free_length = length - sum(1e3 * quantity.mean for quantity in setup.clamped.values())
+        assert table.aspect_ratio == pytest.approx(free_length / width)
+        assert set(table.table) == set(setup.labels)
+        assert (not setup.is_noise_assumed) == name.endswith("-fe")
 
 
-@pytest.mark.parametrize(
-    ("name", "mass", "labelled", "unlabelled", "some", "confidence"),
-    [
-        ("spruce-free-1L", 236.0, 8, 11, {(0, 2): 133.28, (2, 2): 263.02}, 0.7),
-        ("spruce-free-1R", 248.0, 6, 10, {(1, 1): 55.08, (2, 2): 290.29}, 0.9),
-        ("spruce-free-2L", 256.0, 9, 7, {(0, 2): 163.29, (4, 1): 455.26}, 0.98),
-        ("spruce-free-2R", 256.8, 9, 7, {(0, 2): 159.14, (4, 1): 448.79}, 0.98),
-        ("spruce-free-3L", 235.2, 7, 10, {(1, 2): 178.89, (2, 2): 265.41}, 0.7),
-        ("spruce-free-3R", 253.2, 6, 11, {(1, 1): 60.35, (2, 2): 292.24}, 0.9),
-        ("spruce-free-4L", 225.6, 8, 9, {(0, 2): 159.72, (2, 2): 283.93}, 0.98),
-        ("spruce-free-4R", 211.2, 7, 9, {(1, 2): 198.36, (2, 2): 283.49}, 0.9),
-        ("spruce-free-5L", 272.8, 8, 10, {(0, 2): 162.87, (2, 2): 292.36}, 0.98),
-        ("spruce-free-5R", 269.2, 8, 8, {(0, 2): 163.75, (2, 2): 291.12}, 0.98),
-    ],
-)
-def test_the_free_boards(
-    name: str, mass: float, labelled: int, unlabelled: int, some: dict[tuple[int, int], float], confidence: float
-) -> None:
-    card = Board.from_toml(name)
-    (setup,) = card.setups
+FREE_BOARDS = [
+    ("spruce-free-1L", 236.0, 8, 11, {(0, 2): 133.28, (2, 2): 263.02}, 0.7, (3.5, 5.0)),
+    ("spruce-free-1R", 248.0, 6, 10, {(1, 1): 55.08, (2, 2): 290.29}, 0.9, (3.5, 5.0)),
+    ("spruce-free-2L", 256.0, 9, 7, {(0, 2): 163.29, (4, 1): 455.26}, 0.98, (3.5, 4.5)),
+    ("spruce-free-2R", 256.8, 9, 7, {(0, 2): 159.14, (4, 1): 448.79}, 0.98, (3.0, 5.0)),
+    ("spruce-free-3L", 235.2, 7, 10, {(1, 2): 178.89, (2, 2): 265.41}, 0.7, (3.5, 5.0)),
+    ("spruce-free-3R", 253.2, 6, 11, {(1, 1): 60.35, (2, 2): 292.24}, 0.9, (3.5, 5.0)),
+    ("spruce-free-4L", 225.6, 8, 9, {(0, 2): 159.72, (2, 2): 283.93}, 0.98, (3.5, 5.5)),
+    ("spruce-free-4R", 211.2, 7, 9, {(1, 2): 198.36, (2, 2): 283.49}, 0.9, (3.0, 6.0)),
+    ("spruce-free-5L", 272.8, 8, 10, {(0, 2): 162.87, (2, 2): 292.36}, 0.98, (3.0, 5.0)),
+    ("spruce-free-5R", 269.2, 8, 8, {(0, 2): 163.75, (2, 2): 291.12}, 0.98, (3.5, 4.5)),
+]
+"""Mass (g), numbers of labels and of other peaks, some modes (Hz), confidence, two peaks below the first mode (Hz)."""
 
-    assert 1e3 * board_mass(card) == pytest.approx(mass)
-    assert (len(setup.readings), len(setup.peaks)) == (labelled, unlabelled)
-    assert {reading.confidence for reading in setup.readings} == {confidence}
-    assert {label: frequencies(setup)[Label(*label)].mean for label in some} == some
-    assert setup.resolution == 0
-    assert edge_letters(setup.edges) == "FFFF"
-    assert len(card.inputs["length_y"].at_x) == 5
-    thickness = card.inputs["thickness"]
-    assert len(thickness.at_x) == len(thickness.at_y) == 10
-    # opposite corners: the residue is positive where m + n is even, whatever the board
-    signs = {reading.label: reading.sign for reading in setup.readings}
-    assert signs == {label: "+" if sum(label) % 2 == 0 else "-" for label in setup.labels}
+
+def test_the_free_boards():
+    for name, mass, labelled, unlabelled, some, confidence, rigid in FREE_BOARDS:
+        card = Board.from_toml(name)
+        (setup,) = card.setups
+
+        assert 1e3 * board_mass(card) == pytest.approx(mass)
+        assert (len(setup.readings), len(setup.peaks)) == (labelled, unlabelled)
+        assert {reading.confidence for reading in setup.readings} == {confidence}
+        assert (setup.bounce.mean - setup.bounce.sd, setup.bounce.mean + setup.bounce.sd) == rigid
+        assert {label: frequencies(setup)[Label(*label)].mean for label in some} == some
+        assert setup.resolution == 0
+        assert edge_letters(setup.edges) == "FFFF"
+        assert len(card.inputs["length_y"].at_x) == 5
+        thickness = card.inputs["thickness"]
+        assert len(thickness.at_x) == len(thickness.at_y) == 10
+        # opposite corners: the residue is positive where m + n is even, whatever the board
+        signs = {reading.label: reading.sign for reading in setup.readings}
+        assert signs == {label: "+" if sum(label) % 2 == 0 else "-" for label in setup.labels}
 
 
 PEAKS = {
@@ -130,35 +125,21 @@ PEAKS = {
 """Some peaks of each board, Hz: sd (Hz), sign and damping (%)."""
 
 
-@pytest.mark.parametrize("name", FREE)
-def test_peaks_of_the_free_boards(name: str) -> None:
+def test_peaks_of_the_free_boards():
     """The sd is half the spread of the fit, and at least 0.1 Hz; the peaks ascend, and none is a labelled mode."""
-    (setup,) = Board.from_toml(name).setups
-    read = {peak.frequency.mean: (peak.frequency.sd, peak.sign, round(100 * peak.damping, 9)) for peak in setup.peaks}
+    for name in FREE:
+        (setup,) = Board.from_toml(name).setups
+        read = {
+            peak.frequency.mean: (peak.frequency.sd, peak.sign, round(100 * peak.damping, 9)) for peak in setup.peaks
+        }
 
-    assert {hertz: read[hertz] for hertz in PEAKS[name]} == PEAKS[name]
-    assert list(read) == sorted(read)
-    assert min(sd for sd, _, _ in read.values()) >= 0.1
-    assert not {*setup.measured} & set(read)
-
-
-RIGID = {
-    "1L": (3.5, 5.0), "1R": (3.5, 5.0), "2L": (3.5, 4.5), "2R": (3.0, 5.0), "3L": (3.5, 5.0), "3R": (3.5, 5.0),
-    "4L": (3.5, 5.5), "4R": (3.0, 6.0), "5L": (3.0, 5.0), "5R": (3.5, 4.5),
-}  # fmt: skip
-"""Peaks of the record below the first mode, Hz."""
+        assert {hertz: read[hertz] for hertz in PEAKS[name]} == PEAKS[name]
+        assert list(read) == sorted(read)
+        assert min(sd for sd, _, _ in read.values()) >= 0.1
+        assert not {*setup.measured} & set(read)
 
 
-@pytest.mark.parametrize("name", FREE)
-def test_the_bounce_of_the_free_boards_is_one_of_two_peaks(name: str) -> None:
-    (setup,) = Board.from_toml(name).setups
-    bounce = setup.bounce
-    assert bounce is not None
-    assert (bounce.mean - bounce.sd, bounce.mean + bounce.sd) == RIGID[name[-2:]]
-
-
-def test_the_panels() -> None:
-    """Ratios of the steel's frequencies in air and in water, the even modes of the others, the exciter's parts."""
+def test_the_panels():
     air, water = Board.from_toml("steel-air-water").setups
     added = [(frequencies(air)[label].mean / frequencies(water)[label].mean) ** 2 - 1 for label in air.labels]
     assert [round(share, 3) for share in added] == [0.663, 0.533, 0.488, 0.573, 0.480]
@@ -178,14 +159,14 @@ def test_the_panels() -> None:
     assert (exciter.kind, exciter.places, exciter.mass.mean) == ("exciter", (), 0.048)
 
 
-def test_the_campaigns_of_the_half_tops() -> None:
+def test_the_campaigns_of_the_half_tops():
     aside, every = load_campaign("spruce-half-tops-set-aside"), load_campaign("spruce-half-tops-all")
     assert (aside.boards, every.boards) == (FREE[6:], FREE)
     assert (aside.shared, every.shared, aside.effects, every.effects) == ((), (), (), ())
     assert "24 November 2026" in aside.title
 
 
-def test_the_board_of_three_sessions() -> None:
+def test_the_board_of_three_sessions():
     """Peaks alone; each of the six spreads by the per cent of the source, largest less smallest over the mean."""
     card = Board.from_toml("nemus-D")
     sessions = [list(setup.unlabelled) for setup in card.setups]
@@ -197,12 +178,12 @@ def test_the_board_of_three_sessions() -> None:
     assert all(not setup.readings for setup in card.setups)
 
 
-@pytest.mark.parametrize("name", card_names("priors"))
-def test_a_shipped_prior_names_its_sources(name: str) -> None:
-    card = load_prior(name)
+def test_a_shipped_prior_names_its_sources():
+    for name in card_names("priors"):
+        card = load_prior(name)
 
-    assert list(card.constants) == ["E_x", "E_y", "G_xy"]
-    assert all(card.sources.values())
+        assert list(card.constants) == ["E_x", "E_y", "G_xy"]
+        assert all(card.sources.values())
 
 
 def readme_examples() -> list[str]:
@@ -210,7 +191,7 @@ def readme_examples() -> list[str]:
     return re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
 
 
-def test_the_examples_of_the_readme_are_cards(tmp_path: Path) -> None:
+def test_the_examples_of_the_readme_are_cards(tmp_path):
     board, profile, sections, setups, prior, table, campaign = readme_examples()
 
     card = Board.from_text(board, "my-board")
@@ -229,7 +210,7 @@ def test_the_examples_of_the_readme_are_cards(tmp_path: Path) -> None:
     assert load_campaign(tmp_path / "my-campaign.toml").boards == ("spruce-free-2L", "./my-board.toml")
 
 
-def test_reading_cards_imports_no_heavy_library() -> None:
+def test_reading_cards_imports_no_heavy_library():
     code = (
         "import sys, bayesplate.board.named; "
         "print([name for name in ('scipy.stats', 'arviz', 'matplotlib', 'emcee', 'skfem') if name in sys.modules])"

@@ -50,11 +50,11 @@ def comparable(board):
     return fields | {"card": None, "notes": (), "parameters": own}
 
 
-@pytest.mark.parametrize("name", card_names("boards"))
-def test_every_shipped_board_comes_back(name):
-    board = prepare(name).board
-    assert comparable(again(board)) == comparable(board)
-    assert again(board).to_toml() == board.to_toml()
+def test_every_shipped_board_comes_back():
+    for name in card_names("boards"):
+        board = prepare(name).board
+        assert comparable(again(board)) == comparable(board)
+        assert again(board).to_toml() == board.to_toml()
 
 
 def everything():
@@ -131,25 +131,32 @@ def test_a_changed_number_does_not_come_back_as_the_same():
         assert_same(comparable(again(thicker)), comparable(board))
 
 
-@pytest.mark.parametrize("name", ["thickness", "poisson_xy"])
-def test_what_no_card_can_state_is_refused(name):
+def test_what_no_card_can_state_is_refused():
     """A log-uniform thickness or a bounded ratio would come back as something else."""
-    known = {"thickness": Quantity.from_range(2e-3, 4e-3), "poisson_xy": Quantity.from_mean(0.4, 0.1, "normal", 0.0)}
-    with pytest.raises(InputError, match=f"{name}: wanted a .*normal quantity without bounds, as cards state it, got"):
-        everything().with_priors({name: known[name]}).to_toml()
+    for name in ["thickness", "poisson_xy"]:
+        known = {
+            "thickness": Quantity.from_range(2e-3, 4e-3),
+            "poisson_xy": Quantity.from_mean(0.4, 0.1, "normal", 0.0),
+        }
+        with pytest.raises(
+            InputError, match=f"{name}: wanted a .*normal quantity without bounds, as cards state it, got"
+        ):
+            everything().with_priors({name: known[name]}).to_toml()
 
 
-@pytest.mark.parametrize(
-    ("name", "rise"),
-    [
-        ("cup", Quantity.from_mean(1e-3, 2e-4)),
-        ("cup", Quantity.from_mean(1e-3, 2e-4, "normal")),
-        ("bow", Quantity.from_mean(1e-3, 2e-4, "normal", lower=0.0)),
-    ],
-)
-def test_a_warp_of_another_density_is_refused(name, rise):
-    with pytest.raises(InputError, match=f"warp {name}: wanted a normal quantity (from 0 on|without bounds), as cards"):
-        replace(everything(), warp={name: rise}).to_toml()
+OTHER_WARPS = [
+    ("cup", Quantity.from_mean(1e-3, 2e-4)),
+    ("cup", Quantity.from_mean(1e-3, 2e-4, "normal")),
+    ("bow", Quantity.from_mean(1e-3, 2e-4, "normal", lower=0.0)),
+]
+
+
+def test_a_warp_of_another_density_is_refused():
+    for name, rise in OTHER_WARPS:
+        with pytest.raises(
+            InputError, match=f"warp {name}: wanted a normal quantity (from 0 on|without bounds), as cards"
+        ):
+            replace(everything(), warp={name: rise}).to_toml()
 
 
 def test_peaks_and_what_is_believed_of_them_are_written_where_they_say_something():
@@ -164,26 +171,26 @@ def test_peaks_and_what_is_believed_of_them_are_written_where_they_say_something
     assert not any(key in bare for key in ("unlabelled", "peaks", "confidence", "missed", "spurious"))
 
 
-@pytest.mark.parametrize(
-    ("confidence", "written"),
-    [
-        ((0.5, 0.5, 0.5), "label_confidence = 0.5\n"),
-        ((0.5, 0.5, 1.0), 'label_confidence = { "(1,0)" = 0.5, "(1,1)" = 0.5 }\n'),
-        ((0.5, 0.75, 0.5), 'label_confidence = { "(1,0)" = 0.5, "(1,1)" = 0.75, "(2,0)" = 0.5 }\n'),
-    ],
-)
-def test_a_confidence_that_all_labels_share_is_one_number(confidence, written):
-    setup = everything().setups[1]
-    readings = tuple(replace(one, confidence=c) for one, c in zip(setup.readings, confidence, strict=True))
-    board = replace(everything(), setups=(replace(setup, readings=readings),))
-
-    assert written in board.to_toml()
-    assert tuple(one.confidence for one in again(board).setups[0].readings) == confidence
+SHARED = [
+    ((0.5, 0.5, 0.5), "label_confidence = 0.5\n"),
+    ((0.5, 0.5, 1.0), 'label_confidence = { "(1,0)" = 0.5, "(1,1)" = 0.5 }\n'),
+    ((0.5, 0.75, 0.5), 'label_confidence = { "(1,0)" = 0.5, "(1,1)" = 0.75, "(2,0)" = 0.5 }\n'),
+]
 
 
-@pytest.mark.parametrize("more", [{"sign": "+"}, {"amplitude": 0.5}, {"damping": 0.01}])
-def test_a_peak_of_which_more_is_known_than_its_frequency_keeps_it(more):
-    peaks = (Peak(Quantity.exact(448.8), **more), Peak(Quantity.exact(594.1)))
-    board = replace(everything(), setups=(replace(everything().setups[0], peaks=peaks),))
+def test_a_confidence_that_all_labels_share_is_one_number():
+    for confidence, written in SHARED:
+        setup = everything().setups[1]
+        readings = tuple(replace(one, confidence=c) for one, c in zip(setup.readings, confidence, strict=True))
+        board = replace(everything(), setups=(replace(setup, readings=readings),))
 
-    assert again(board).setups[0].peaks == peaks
+        assert written in board.to_toml()
+        assert tuple(one.confidence for one in again(board).setups[0].readings) == confidence
+
+
+def test_a_peak_of_which_more_is_known_than_its_frequency_keeps_it():
+    for more in [{"sign": "+"}, {"amplitude": 0.5}, {"damping": 0.01}]:
+        peaks = (Peak(Quantity.exact(448.8), **more), Peak(Quantity.exact(594.1)))
+        board = replace(everything(), setups=(replace(everything().setups[0], peaks=peaks),))
+
+        assert again(board).setups[0].peaks == peaks

@@ -16,14 +16,9 @@ from bayesplate.board.shelf import shelf_folder
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import SamplerSettings
 
-LOOSE_GATE = Gate(rhat_max=10.0, tau_count_min=1.0, ess_min=1.0)
-"""Passes at its first judgement: for tests of files and options, not of constants."""
-
 CLOSED_GATE = Gate(tau_count_min=1e9)
 STOPPED_AFTER = 200
 """Two chunks, no more than the shortest run that the real gate lets through."""
-
-SETTINGS = "bayesplate.commands.fitting.SamplerSettings"
 
 
 @pytest.fixture(scope="session")
@@ -56,7 +51,7 @@ def free(tmp_path_factory: pytest.TempPathFactory) -> runs.Run:
 @pytest.fixture
 def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
     """A sampler whose first judgement passes."""
-    monkeypatch.setattr(SETTINGS, partial(SamplerSettings, gate=LOOSE_GATE))
+    runs.sample_loosely(monkeypatch)
 
 
 @pytest.fixture
@@ -73,7 +68,8 @@ def quick_fit(tmp_path: Path, quickly: None) -> Callable[..., runs.Run]:
 def stopped_once(tmp_path_factory: pytest.TempPathFactory) -> runs.Run:
     """The clamped board, stopped after two chunks by a gate that lets nothing through: an unfinished run."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(SETTINGS, partial(SamplerSettings, max_steps=STOPPED_AFTER, gate=CLOSED_GATE))
+        settings = partial(SamplerSettings, max_steps=STOPPED_AFTER, gate=CLOSED_GATE)
+        patched.setattr("bayesplate.commands.fitting.SamplerSettings", settings)
         return runs.fit(tmp_path_factory.mktemp("stopped") / "out", "fiemme-spruce-clamped", "--json", "--no-report")
 
 

@@ -112,8 +112,6 @@ def test_a_link_out_of_the_folder_is_no_card_of_it(tmp_path):
 
 
 def test_one_board_is_a_pure_function_that_travels(two, one):
-    """What the table says of a board, and its files, are what `fit_board` gives with its seed; nothing is changed by
-    the way to another process."""
     row = rows_of(two.table.read_bytes())["b"]
     board, prior = Board.from_text(card_text("b", 1.01), "b"), load_prior("weakly-informative")
     with pytest.raises(InputError, match="request tables clamped: wanted the published coefficients"):
@@ -131,7 +129,6 @@ def test_one_board_is_a_pure_function_that_travels(two, one):
 
 
 def test_the_same_bytes_for_one_worker_and_two_and_a_bad_card_stops_nothing(two, one):
-    """By the command line: exit 7, the reasons on the terminal and in the table, every other board there."""
     run, out = one
 
     assert run.exit_code == 7, run.output
@@ -152,7 +149,6 @@ def test_the_same_bytes_for_one_worker_and_two_and_a_bad_card_stops_nothing(two,
 
 
 def test_a_board_has_its_seed_from_its_card_and_only_changed_cards_are_fitted_again(cards, two, tmp_path, monkeypatch):
-    """One more board, one mended, one taken away: the others' rows stay, and so they do in the journal."""
     out, again = shutil.copytree(two.folder, tmp_path / "out"), shutil.copytree(cards, tmp_path / "cards")
     (again / "a.toml").unlink()
     (again / "m.toml").write_text(card_text("m", 1.02), encoding="utf-8")
@@ -314,7 +310,6 @@ def test_two_boards_of_one_name_have_two_rows_and_one_line_whether_begun_or_gone
 
 
 def test_a_table_in_parquet_says_the_same(table, tmp_path):
-    """Numbers as numbers, nothing where there is nothing."""
     import pyarrow
     from pyarrow import parquet
 

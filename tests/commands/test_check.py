@@ -143,7 +143,6 @@ def test_the_tables_name_the_law_and_what_comes_next(tmp_path, monkeypatch):
 
 @pytest.mark.usefixtures("without_effects")
 def test_what_is_in_doubt_is_to_be_settled_before_a_fit(with_labels):
-    """A reading an octave too high; the sound board has no doubt."""
     card = with_labels(*PEAKS)
     sound = bayesplate.check(card)
     card.write_text(

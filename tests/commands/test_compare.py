@@ -45,53 +45,50 @@ def comparisons(cantilever, tmp_path_factory):
     result = CliRunner().invoke(main, ["compare", "fiemme-spruce-clamped", "--json", "--out", str(folder / "out")])
     assert result.exit_code == 0, result.stderr
     assert runs.files_in(folder) == {"out/compare.json": result.stdout.encode()}
-    return {
-        "finnish-spruce-cantilever": as_json(cantilever),
-        "fiemme-spruce-clamped": runs.read_json(result.stdout),
-    }
+    return {"finnish-spruce-cantilever": as_json(cantilever), "fiemme-spruce-clamped": runs.read_json(result.stdout)}
 
 
 def method(theory, name):
     return next(one for one in theory["methods"] if one["name"] == name)
 
 
-@pytest.mark.parametrize("card", EXPECTED)
-def test_shear_is_reported_better_and_worse(comparisons, card):
-    *expected, better = EXPECTED[card]
-    found = comparisons[card]
+def test_shear_is_reported_better_and_worse(comparisons):
+    for card in EXPECTED:
+        *expected, better = EXPECTED[card]
+        found = comparisons[card]
 
-    for theory, (in_sample, left_out) in zip(found["theories"], expected, strict=True):
-        assert theory["error"]["in_sample_rms_cents"] == pytest.approx(in_sample, abs=0.3)
-        assert theory["error"]["leave_one_out_rms_cents"] == pytest.approx(left_out, abs=1.0)
-    assert [theory["theory"] for theory in found["theories"]] == ["thin", "shear-flexible"]
-    assert found["verdict"]["better"] == better
-    word = "worse" if better == "thin" else "better"
-    assert found["verdict"]["sentence"].startswith(f"Transverse shear makes it {word}: ")
-
-
-@pytest.mark.parametrize("card", EXPECTED)
-def test_every_method_stands_under_both_theories(comparisons, card):
-    for theory in comparisons[card]["theories"]:
-        assert [one["name"] for one in theory["methods"]] == METHODS
-        assert method(theory, "percentile")["n_subsets"] == 42
-        for one in theory["methods"]:
-            for entry in one["elastic"].values():
-                assert entry["mean"] > 0
-                assert (entry["sd"] is not None) == (one["name"] != "paper_least_squares")
-                assert (entry["q05"] is not None) == one["name"].endswith("_posterior")
+        for theory, (in_sample, left_out) in zip(found["theories"], expected, strict=True):
+            assert theory["error"]["in_sample_rms_cents"] == pytest.approx(in_sample, abs=0.3)
+            assert theory["error"]["leave_one_out_rms_cents"] == pytest.approx(left_out, abs=1.0)
+        assert [theory["theory"] for theory in found["theories"]] == ["thin", "shear-flexible"]
+        assert found["verdict"]["better"] == better
+        word = "worse" if better == "thin" else "better"
+        assert found["verdict"]["sentence"].startswith(f"Transverse shear makes it {word}: ")
 
 
-@pytest.mark.parametrize("card", EXPECTED)
-def test_the_forward_check_is_the_papers_on_the_shear_flexible_plate_alone(comparisons, card):
+def test_every_method_stands_under_both_theories(comparisons):
+    for card in EXPECTED:
+        for theory in comparisons[card]["theories"]:
+            assert [one["name"] for one in theory["methods"]] == METHODS
+            assert method(theory, "percentile")["n_subsets"] == 42
+            for one in theory["methods"]:
+                for entry in one["elastic"].values():
+                    assert entry["mean"] > 0
+                    assert (entry["sd"] is not None) == (one["name"] != "paper_least_squares")
+                    assert (entry["q05"] is not None) == one["name"].endswith("_posterior")
+
+
+def test_the_forward_check_is_the_papers_on_the_shear_flexible_plate_alone(comparisons):
     """At the paper's means: its FE frequencies to the printed Hz with shear; without, (1,2) and (2,2) are far off."""
-    thin, sheared = (
-        {row["label"]: row["predicted_hz"] for row in method(theory, "percentile")["forward"]}
-        for theory in comparisons[card]["theories"]
-    )
+    for card in EXPECTED:
+        thin, sheared = (
+            {row["label"]: row["predicted_hz"] for row in method(theory, "percentile")["forward"]}
+            for theory in comparisons[card]["theories"]
+        )
 
-    # Half a printed Hz, and means that differ by 0.7 % from the printed ones: 0.6 Hz at 169 Hz.
-    assert sheared == pytest.approx(PAPER_FE[card], abs=1.1)
-    assert thin["(1,2)"] > 1.01 * PAPER_FE[card]["(1,2)"]
+        # Half a printed Hz, and means that differ by 0.7 % from the printed ones: 0.6 Hz at 169 Hz.
+        assert sheared == pytest.approx(PAPER_FE[card], abs=1.1)
+        assert thin["(1,2)"] > 1.01 * PAPER_FE[card]["(1,2)"]
 
 
 @pytest.mark.parametrize("card", EXPECTED)
@@ -153,6 +150,7 @@ def test_all_methods_stand_on_the_labels_that_the_draws_leave(monkeypatch):
     bare = replace(setup, readings=tuple(sure), peaks=(Peak(last.frequency),))
     monkeypatch.setattr("bayesplate.posterior.likely_labels.LIKELY", 1.0)
     monkeypatch.setattr("bayesplate.commands.compare._SHEAR", ())  # the thin plate twice: shear takes its time
+    runs.sample_loosely(monkeypatch, "compare")
 
     result = compare(replace(board, setups=(bare,)))
 

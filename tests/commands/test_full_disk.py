@@ -138,11 +138,9 @@ READ_ONLY = "Read-only file system"
 
 
 @pytest.mark.parametrize(
-    ("command", "place", "code"),
-    [("fit", BOARD, 6), ("batch", "CARDS", 6), ("pick", "HIT", 3), ("modes", BOARD, 3)],
+    ("command", "place", "code"), [("fit", BOARD, 6), ("batch", "CARDS", 6), ("pick", "HIT", 3), ("modes", BOARD, 3)]
 )
 def test_a_folder_that_cannot_be_written_is_left_as_it_is(command, place, code, places, tmp_path):
-    """Results of an earlier run stay, though --force would replace them."""
     out = tmp_path / "out"
     out.mkdir()
     for name in ("summary.json", "diagnosis.json", "boards.csv", "setup.toml", "modes.svg"):

@@ -37,11 +37,6 @@ def item(*lines: str) -> Change:
     return PLACE, "\n".join([PLACE, *lines])
 
 
-def air(line: str) -> Change:
-    """Air around the board."""
-    return "[[setup.attached]]", f"[setup.fluid]\n{line}\n\n[[setup.attached]]"
-
-
 NO_CLAMP = "no edge is clamped"
 NO_FRAME = "no two opposite edges are held, so there is no frame that would only shift"
 NO_PULL = "no two opposite edges are held, so nothing can stretch the board"
@@ -53,7 +48,6 @@ OFF_BOARD = (
     "y 0 to 114 mm, got [300, 20] (from the corner of x0 and y0 of the whole board)"
 )
 TOO_HEAVY = "my-board.toml [setup] attached 1 mass_g: wanted less than the board's own 41 g, got 50 g"
-VACUUM = "wanted a positive number, got {} (air at the ground is 1.2 kg/m3, water is 997)"
 
 CASES: dict[str, tuple[list[Change], list[str]]] = {
     "a clamp that turns on a free board": ([declaring("clamp_rotation")], [refused("clamp_rotation", NO_CLAMP)]),
@@ -74,16 +68,8 @@ CASES: dict[str, tuple[list[Change], list[str]]] = {
         [declaring("attached_mass"), NO_ITEM],
         [refused("attached_mass", "no [[setup.attached]] says what is fixed to the board and where")],
     ),
-    "a sensor that weighs less than nothing": (
-        [item("mass_g = -0.6")], ["my-board.toml [setup] attached 1 mass_g: wanted a positive number, got -0.6"],
-    ),
     "a sensor of unknown mass that roved over a light board": (
         [declaring("attached_mass"), (PLACE, "at_mm = [[200, 20], [20, 20]]")], [refused("attached_mass", ROVED)],
-    ),
-    "no air": ([air("density_kg_m3 = 0")], ["my-board.toml [setup] fluid.density_kg_m3: " + VACUUM.format("0")]),
-    "a clamp on a free edge": (
-        [("[setup.frequencies_hz]", "clamped_mm = { x0 = 30 }\n[setup.frequencies_hz]")],
-        ["my-board.toml [setup] clamped_mm.x0: wanted a clamped edge, got a free one"],
     ),
     "all at once": (
         [declaring("clamp_rotation", "membrane_tension", "grain_angle", "outline_profile"),
@@ -99,17 +85,15 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.chdir(tmp_path)
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_refused_with_the_reason(case):
-    """One line a fault, no other line, exit code 3, no folder."""
-    changes, lines = CASES[case]
-    Path("my-board.toml").write_text(spoiled(*changes), encoding="utf-8")
-    result = invoke("fit", "my-board.toml")
+def test_refused_with_the_reason():
+    for changes, lines in CASES.values():
+        Path("my-board.toml").write_text(spoiled(*changes), encoding="utf-8")
+        result = invoke("fit", "my-board.toml")
 
-    assert result.exit_code == 3
-    assert result.stderr.splitlines() == lines
-    assert result.stdout == ""
-    assert [path.name for path in Path().iterdir()] == ["my-board.toml"]
+        assert result.exit_code == 3
+        assert result.stderr.splitlines() == lines
+        assert result.stdout == ""
+        assert [path.name for path in Path().iterdir()] == ["my-board.toml"]
 
 
 def test_the_same_by_the_option():

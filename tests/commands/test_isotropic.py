@@ -30,8 +30,7 @@ def rms(values):
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-@pytest.mark.parametrize("nu", [0.05, 0.3, 0.45])
-@pytest.mark.parametrize("E", [0.02e9, 70e9, 400e9])
+@pytest.mark.parametrize(("E", "nu"), [(0.02e9, 0.05), (400e9, 0.45)])
 def test_the_modulus_of_a_plate_by_an_independent_solver_comes_back(E, nu):
     """Both solvers are converged to a hundredth of a cent on these modes: a hundred thousandth of E."""
     estimate = weighted_least_squares(sheet(sheet_hz(E, nu), poisson_xy=nu))
@@ -42,22 +41,15 @@ def test_the_modulus_of_a_plate_by_an_independent_solver_comes_back(E, nu):
     assert rms(cents(estimate.residuals)) < 0.01
 
 
-@pytest.mark.parametrize(
-    ("effects", "wanted", "at_most"), [([], THIN_CENTS, 0.2), (["transverse_shear"], SHEAR_CENTS, 0.8)]
-)
-def test_the_steel_plate_is_missed_as_an_independent_solver_misses_it(effects, wanted, at_most):
-    """To the rounding of its figures on the thin plate; its 14 x 14 terms leave the other 0.7 cents off."""
-    report = bayesplate.check(steel(), effects=effects)
+def test_the_modulus_of_steel_and_its_misses_are_those_of_an_independent_solver():
+    """Handbooks have 200 to 210 GPa; thin the plate seems 3 % softer, and its shear moduli are no further constants.
 
-    assert [-mode.residual_cents for mode in report.modes] == pytest.approx(wanted, abs=at_most)
-
-
-def test_the_modulus_of_steel():
-    """Handbooks have 200 to 210 GPa; thin the plate seems 3 % softer, and its shear moduli are no further constants."""
+    The misses agree to the rounding of its figures on the thin plate; its 14 x 14 terms leave the other 0.7 cents off.
+    """
     thin, flexible = (bayesplate.fit(steel(), effects=effects).summary for effects in ([], ["transverse_shear"]))
 
-    assert thin.error.in_sample_rms_cents == pytest.approx(10.2, abs=0.1)
-    assert flexible.error.in_sample_rms_cents == pytest.approx(5.0, abs=0.3)
+    for summary, wanted, at_most in ((thin, THIN_CENTS, 0.2), (flexible, SHEAR_CENTS, 0.8)):
+        assert [-mode.residual_cents for mode in summary.modes] == pytest.approx(wanted, abs=at_most)
     assert flexible.elastic.E_x.mean == pytest.approx(200e9, abs=4e9)
     assert thin.elastic.E_x.mean < 0.98 * flexible.elastic.E_x.mean
     assert flexible.effects["board"]["transverse_shear"] == {}
@@ -66,6 +58,7 @@ def test_the_modulus_of_steel():
     assert "in all directions, so that the shear modulus is 77.7" in summary_sentences(flexible)[0]
 
 
+@pytest.mark.usefixtures("quickly")
 def test_moduli_belong_together_draw_by_draw():
     board = sheet(
         sheet_hz(70e9, 0.25),
@@ -165,14 +158,13 @@ def test_every_method_stands_side_by_side():
         assert by_name[name].G_xy.mean == pytest.approx(70e9 / 2.6, rel=2e-3)
 
 
-@pytest.mark.parametrize(
-    ("effect", "reason"),
-    [("grain_angle", "turned by any angle it is the same"), ("stiffness_gradient", "stiffer along x alone")],
-)
-def test_effects_of_wood_are_refused_with_a_reason(effect, reason):
-    with pytest.raises(InputError, match=reason):
-        bayesplate.check(steel(), effects=[effect])
-    assert effect not in {one.effect for one in bayesplate.check(steel()).signatures}
+def test_effects_of_wood_are_refused_with_a_reason_and_not_tried():
+    tried = {one.effect for one in bayesplate.check(steel()).signatures}
+    reasons = {"grain_angle": "turned by any angle it is the same", "stiffness_gradient": "stiffer along x alone"}
+    assert tried.isdisjoint(reasons)
+    for effect, reason in reasons.items():
+        with pytest.raises(InputError, match=reason):
+            bayesplate.check(steel(), effects=[effect])
 
 
 def test_a_free_poisson_ratio_takes_the_shear_modulus_along():

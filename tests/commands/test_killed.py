@@ -86,12 +86,7 @@ def moments(n: int, n_of: int, seed: int) -> list[int]:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "n"),
-    [
-        ("fit and report", 20),
-        ("diagnose", 20),
-        ("batch", 20),
-        ("campaign", 20),
-    ],
+    [("fit and report", 20), ("diagnose", 20), ("batch", 20), ("campaign", 20)],
     indirect=["arguments"],
 )
 def test_killed_at_any_moment_and_resumed_the_files_are_the_same(tmp_path, arguments, n):
@@ -190,7 +185,6 @@ def test_force_lays_aside_what_a_campaign_left_of_each_board_and_nothing_else(tm
 
 
 def test_a_board_of_a_campaign_may_have_the_name_of_a_file_of_the_checkpoint(monkeypatch):
-    """Each board has a place for its chunks among those of boards alone."""
     kept = []
     monkeypatch.setattr(Run, "fit", lambda run, problem, place, *others, **told: kept.append(place))
     problems = [SimpleNamespace(board=SimpleNamespace(name=name)) for name in ("lock", "earlier", "before")]

@@ -134,7 +134,6 @@ def test_a_sheet_does_not_keep_a_fit_from_the_folder(finnish_sheet):
 
 
 def test_modes_not_measured_have_the_range_that_the_others_foretell(finnish_sheet):
-    """At least as wide as the noise, and around the computed frequency; what was measured has none."""
     (setup,) = runs.read_json(finnish_sheet.stdout)["setups"]
 
     for mode in setup["modes"]:

@@ -30,7 +30,6 @@ def invoke(*arguments: str, answers: str = ""):
 
 
 def test_answers_become_a_card_without_a_fault():
-    """A decimal comma is asked again; the modes asked about are modes of the board."""
     result = invoke(answers="\n".join(ANSWERS) + "\n")
     card = Board.from_toml("my-board.toml")
 
@@ -65,7 +64,7 @@ def test_every_question_can_be_skipped_and_modes_works_on_the_card():
     assert modes("first.toml").summary.basis == "at the median of the prior"
 
 
-@pytest.mark.parametrize("edges", ["free", "cantilever", "clamped", "supported", "CFSF"])
+@pytest.mark.parametrize("edges", ["free", "cantilever", "CFSF"])
 def test_the_examples_are_modes_that_the_board_has(edges):
     text = new("a", edges=edges).read_text(encoding="utf-8")
     labels = [line[2:9] for line in text.splitlines() if line.startswith('# "(')]
@@ -111,48 +110,48 @@ def test_options_ask_nothing():
     assert frequencies(card.setups[0])[Label(1, 0)].mean == 52
 
 
-@pytest.mark.parametrize(
-    ("options", "code", "said"),
-    [
-        (["--thickness", "2,8", "--length-x=-3", "--edges", "round"], 3,
-         ['thickness: wanted a number, got "2,8" (a decimal point and no quotes: 2.8)',
-          "[plate] length_x_mm: wanted a positive number, got -3", 'edges: wanted "free", "cantilever"']),
-        (["--frequency", "(0,0)=35"], 3, ["a motion without bending, at 0 Hz"]),
-        (["--frequency", "10=35"], 3, ["wanted two whole numbers"]),
-        (["--prior", "spruse"], 3, ["did you mean spruce?"]),
-        (["--frequency", "35"], 2, ["write a label and its frequency"]),
-    ],
-)  # fmt: skip
-def test_what_cannot_stand_on_a_card_is_refused_and_nothing_written(options, code, said):
-    result = invoke("mine", *options)
-
-    assert result.exit_code == code
-    assert [passage for passage in said if passage not in result.stderr] == []
-    assert list(Path().iterdir()) == []
+REFUSED = [
+    (["--thickness", "2,8", "--length-x=-3", "--edges", "round"], 3,
+     ['thickness: wanted a number, got "2,8" (a decimal point and no quotes: 2.8)',
+      "[plate] length_x_mm: wanted a positive number, got -3", 'edges: wanted "free", "cantilever"']),
+    (["--frequency", "(0,0)=35"], 3, ["a motion without bending, at 0 Hz"]),
+    (["--frequency", "10=35"], 3, ["wanted two whole numbers"]),
+    (["--prior", "spruse"], 3, ["did you mean spruce?"]),
+    (["--frequency", "35"], 2, ["write a label and its frequency"]),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"sizes": {"length_x_mm": 300, "length": 1}},
-         ["sizes length_x_mm: wanted one of length_x, length_y, thickness, mass, got", "did you mean length_x?",
-          "sizes length: wanted one of"]),
-        ({"sizes": {"mass": None, "thickness": [1]}}, ["mass: wanted a number, got nothing", "thickness: wanted a n"]),
-        ({"sizes": [1], "edges": None}, ["edges: wanted a text, got None", "sizes: wanted a dict of numbers, got [1]"]),
-    ],
-)  # fmt: skip
-def test_what_is_given_in_python_is_held_to_its_kind(given, said):
-    with pytest.raises(bayesplate.InputError) as refused:
-        new("mine", **given)
-    assert [passage for passage in said if passage not in str(refused.value)] == []
-    assert list(Path().iterdir()) == []
+def test_what_cannot_stand_on_a_card_is_refused_and_nothing_written():
+    for options, code, said in REFUSED:
+        result = invoke("mine", *options)
+
+        assert result.exit_code == code
+        assert [passage for passage in said if passage not in result.stderr] == []
+        assert list(Path().iterdir()) == []
 
 
-@pytest.mark.parametrize("arguments", [["mine"], ["mine.toml", "--mass", "40"]])
-def test_a_card_that_is_there_is_not_overwritten(arguments):
-    Path("mine.toml").write_text("mine", encoding="utf-8")
-    result = invoke(*arguments, answers="\n" * 20)
+UNLIKE = [
+    ({"sizes": {"length_x_mm": 300, "length": 1}},
+     ["sizes length_x_mm: wanted one of length_x, length_y, thickness, mass, got", "did you mean length_x?",
+      "sizes length: wanted one of"]),
+    ({"sizes": {"mass": None, "thickness": [1]}}, ["mass: wanted a number, got nothing", "thickness: wanted a n"]),
+    ({"sizes": [1], "edges": None}, ["edges: wanted a text, got None", "sizes: wanted a dict of numbers, got [1]"]),
+]  # fmt: skip
 
-    assert result.exit_code == 3
-    assert "mine.toml: wanted a new file, got one that exists" in result.stderr
-    assert Path("mine.toml").read_text(encoding="utf-8") == "mine"
+
+def test_what_is_given_in_python_is_held_to_its_kind():
+    for given, said in UNLIKE:
+        with pytest.raises(bayesplate.InputError) as refused:
+            new("mine", **given)
+        assert [passage for passage in said if passage not in str(refused.value)] == []
+        assert list(Path().iterdir()) == []
+
+
+def test_a_card_that_is_there_is_not_overwritten():
+    for arguments in [["mine"], ["mine.toml", "--mass", "40"]]:
+        Path("mine.toml").write_text("mine", encoding="utf-8")
+        result = invoke(*arguments, answers="\n" * 20)
+
+        assert result.exit_code == 3
+        assert "mine.toml: wanted a new file, got one that exists" in result.stderr
+        assert Path("mine.toml").read_text(encoding="utf-8") == "mine"

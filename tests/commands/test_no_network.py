@@ -111,7 +111,6 @@ SPEEDS = [("quick", c) if c in QUICK else pytest.param("slow", c, marks=pytest.m
 
 @pytest.mark.parametrize(("speed", "command"), SPEEDS)
 def test_a_command_runs_without_a_network(speed, command, request):
-    """With all that it writes, pages, figures, tables; and nothing of it lies anywhere but in the output folder."""
     code, messages, outside = request.getfixturevalue(speed)[command]
 
     assert code == 0, messages

@@ -22,8 +22,10 @@ from bayesplate.results.contract import as_json
     ],
 )
 def test_a_forced_law_and_robust_noise_reach_the_summary(quick_fit, board, options, law, robust):
-    summary = quick_fit(board, *options, "--quiet").summary
+    run = quick_fit(board, *options, "--quiet")
+    summary = run.summary
 
+    assert (run.exit_code, run.stdout, run.stderr) == (0, "", "")
     assert summary["model"]["law"] == law
     assert summary["model"]["robust"] is robust
     assert summary[f"{law}_means"]["E_x"] == pytest.approx(summary["elastic"]["E_x"]["mean"], rel=1e-12)
@@ -46,12 +48,6 @@ def test_robust_noise_sets_one_wrong_reading_apart(finnish, tmp_path):
         octave = 1200.0 * (row.label == "(2,1)")
         assert abs(row.residual_cents - octave - before["residual_cents"]) < 40.0  # two sd of its own noise, 1.2 %
         assert abs(row.left_out_cents - octave - before["left_out_cents"]) < 80.0  # and a leverage of up to one half
-
-
-def test_quiet_prints_nothing(quick_fit):
-    run = quick_fit("fiemme-spruce-clamped", "--quiet")
-
-    assert (run.exit_code, run.stdout, run.stderr) == (0, "", "")
 
 
 def test_nothing_is_written_unless_asked_for(tmp_path, monkeypatch, fiemme):
@@ -84,13 +80,6 @@ def test_a_card_is_fitted_by_path_and_no_place_of_the_machine_is_told(quick_fit,
         assert [place for place in places if place in content] == []
 
 
-@pytest.mark.parametrize(
-    ("card", "folder"),
-    [
-        ("fiemme-spruce-clamped", "fiemme-spruce-clamped"),
-        ("cards/my.board.toml", "my.board"),
-        ("./half-top.txt", "half-top"),
-    ],
-)
-def test_the_command_line_writes_below_results_under_the_name_of_the_board(card, folder):
-    assert default_folder(card) == Path("results", folder)
+def test_a_folder_is_named_after_the_card_without_its_ending():
+    assert default_folder("cards/my.board.toml") == Path("results", "my.board")
+    assert default_folder("./half-top.txt") == Path("results", "half-top")

@@ -19,22 +19,24 @@ def results(fiemme):
     return {"fit": fiemme, "check": bayesplate.check(fiemme.problem), "modes": bayesplate.modes(fiemme.problem)}
 
 
-@pytest.mark.parametrize(
-    ("name", "short", "cell"),
-    [("fit", "<FitResult of fiemme-spruce-clamped: E_x = {mean:.2f} ± {sd:.2f} GPa, ", "Ex, along grain"),
-     ("check", "<CheckResult of fiemme-spruce-clamped: 6 modes, E_x ± ", "Ex, along grain"),
-     ("modes", "<ModesResult of fiemme-spruce-clamped: clamped: 12 from ", "(0,0)")],
-)  # fmt: skip
-def test_a_result_shows_itself(results, name, short, cell):
-    result = results[name]
-    page = result._repr_html_()
-    E_x = results["fit"].summary.elastic.E_x
+SHOWN = [
+    ("fit", "<FitResult of fiemme-spruce-clamped: E_x = {mean:.2f} ± {sd:.2f} GPa, ", "Ex, along grain"),
+    ("check", "<CheckResult of fiemme-spruce-clamped: 6 modes, E_x ± ", "Ex, along grain"),
+    ("modes", "<ModesResult of fiemme-spruce-clamped: clamped: 12 from ", "(0,0)"),
+]
 
-    assert repr(result).startswith(short.format(mean=E_x.mean / 1e9, sd=E_x.sd / 1e9))
-    assert len(repr(result).splitlines()) == 1
-    assert page.startswith(f"<h3>{result.problem.board.title if name == 'fit' else result.summary.title}</h3>")
-    assert cell in Read(page).text
-    assert {name for name, _ in Read(page).elements} <= ALLOWED
+
+def test_a_result_shows_itself(results):
+    for name, short, cell in SHOWN:
+        result = results[name]
+        page = result._repr_html_()
+        E_x = results["fit"].summary.elastic.E_x
+
+        assert repr(result).startswith(short.format(mean=E_x.mean / 1e9, sd=E_x.sd / 1e9))
+        assert len(repr(result).splitlines()) == 1
+        assert page.startswith(f"<h3>{result.problem.board.title if name == 'fit' else result.summary.title}</h3>")
+        assert cell in Read(page).text
+        assert {name for name, _ in Read(page).elements} <= ALLOWED
 
 
 def test_the_summary_of_a_check_is_the_report_and_its_problem_can_be_fitted(results):

@@ -151,7 +151,6 @@ def test_a_damaged_checkpoint_is_refused_and_stays(stopped):
     ],
 )
 def test_another_run_is_not_continued(stopped, own_card, old, new, options, what):
-    """Exit 6, the difference named, and what the first run left stays as it was."""
     before = stopped.files
     text = own_card.read_text(encoding="utf-8")
     assert text.count(old) == 1 or not old
@@ -186,23 +185,29 @@ def test_there_is_nothing_to_resume(tmp_path, content):
     assert run.files == content
 
 
-def test_force_replaces_the_results_and_the_checkpoint_and_nothing_else(stopped, quick_fit):
-    (stopped.folder / "posterior.nc").write_bytes(b"old")
-    (stopped.folder / "notes.txt").write_bytes(b"mine")
+def test_force_replaces_the_results_the_report_and_the_checkpoint_and_nothing_else(stopped, quick_fit):
+    """Also where the new run writes no report: a page must not stand beside numbers that are not its own."""
+    (stopped.folder / "figures").mkdir()
+    tables = [
+        f"{table}.{ending}" for table in ("constants", "before-after", "known-effects") for ending in ("csv", "tex")
+    ]
+    for name in ("posterior.nc", "report.html", "figures/board.svg", *tables):
+        (stopped.folder / name).write_bytes(b"old")
+    mine = {"notes.txt": b"mine", "figures/mine.txt": b"mine"}
+    for name, content in mine.items():
+        (stopped.folder / name).write_bytes(content)
     run = quick_fit(BOARD, "--force", "--quiet")
 
     assert run.folder == stopped.folder
-
     assert run.exit_code == 0
-    assert set(run.files) == {*RESULTS, "notes.txt"}
-    assert run.files["notes.txt"] == b"mine"
+    assert set(run.files) == RESULTS | set(mine)
+    assert {name: run.files[name] for name in mine} == mine
     assert run.summary["converged"] is True
     assert run.files["posterior.nc"] != b"old"
 
 
 @pytest.mark.usefixtures("quickly")
 def test_force_that_is_interrupted_before_sampling_leaves_the_old_results(tmp_path, monkeypatch):
-    """They were laid aside, and come back."""
     (tmp_path / "figures").mkdir()
     for name in ("summary.json", "posterior.nc", "figures/modes.png"):
         (tmp_path / name).write_bytes(b"old")
@@ -218,8 +223,8 @@ def test_force_that_is_interrupted_before_sampling_leaves_the_old_results(tmp_pa
     assert files_in(tmp_path) == before
 
 
-def test_force_of_a_refused_card_keeps_the_old_results(quick_fit, own_card):
-    before = quick_fit(str(own_card), "--quiet").files
+def test_force_of_a_refused_card_keeps_the_old_results(stopped, quick_fit, own_card):
+    before = stopped.files
     own_card.write_text(own_card.read_text(encoding="utf-8").replace("= 600", "= -600"), encoding="utf-8")
     run = quick_fit(str(own_card), "--force")
 
@@ -242,20 +247,3 @@ def test_the_same_seed_gives_the_same_bytes_whatever_the_number_of_threads(tmp_p
         assert process.communicate(timeout=300) == ("", "")
 
     assert files_in(tmp_path / "out") == fiemme_files
-
-
-def test_a_new_run_takes_the_old_report_away(quick_fit):
-    """Also where the new one writes none: a page must not stand beside numbers that are not its own."""
-    run = quick_fit(BOARD, "--quiet")
-    (run.folder / "figures").mkdir()
-    tables = [
-        f"{table}.{ending}" for table in ("constants", "before-after", "known-effects") for ending in ("csv", "tex")
-    ]
-    for name in ("report.html", *tables):
-        (run.folder / name).write_bytes(b"old")
-    (run.folder / "figures" / "board.svg").write_bytes(b"old")
-    (run.folder / "figures" / "mine.txt").write_bytes(b"mine")
-    again = quick_fit(BOARD, "--quiet", "--force")
-
-    assert again.exit_code == 0
-    assert set(files_in(run.folder)) == {"summary.json", "posterior.nc", "figures/mine.txt"}

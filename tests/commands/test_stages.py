@@ -11,15 +11,11 @@ from bayesplate.posterior.sampling import Progress
 from bayesplate.terminal import progress_line
 
 
-def sampled(n_taus: float) -> Progress:
-    return Progress(100, 20_000, n_taus)
-
-
 def test_the_share_is_that_of_the_whole_and_never_falls():
     told = []
     stages = Stages(told.append, 8.0)
     stages.begin("one", 2.0)
-    stages.sampled(sampled(0.5 * Gate().tau_count_min))
+    stages.sampled(Progress(100, 20_000, 0.5 * Gate().tau_count_min))
     stages.begin("two", 2.0)
     stages.left = 0.0  # nothing is left after this part, contrary to what was expected
     stages.reached(0.5)
@@ -30,20 +26,14 @@ def test_the_share_is_that_of_the_whole_and_never_falls():
     assert told[1].n_steps == 100
 
 
-@pytest.mark.parametrize(
-    ("done", "seconds", "words"),
-    [
+def test_the_line_tells_the_share_and_the_time_left_and_after_a_part_its_sampling():
+    for done, seconds, words in (
         (0.0, 3.0, "0 % done: search"),
         (0.25, 10.0, "25 % done, about 30 s left: search"),
         (0.1, 60.0, "10 % done, about 9 min left: search"),
         (1.0, 60.0, "100 % done, about 1 s left: search"),
-    ],
-)
-def test_the_line_tells_the_share_and_the_time_left(done, seconds, words):
-    assert progress_text(Progress(0, 0, None, "search", done), seconds) == words
-
-
-def test_sampling_within_a_part_is_told_after_it():
+    ):
+        assert progress_text(Progress(0, 0, None, "search", done), seconds) == words
     text = progress_text(Progress(25, 20_000, None, "fit", 0.5), 10.0)
     assert text == "50 % done, about 10 s left: fit; sampling: step 25 of at most 20000"
     assert progress_text(Progress(25, 20_000)) == "sampling: step 25 of at most 20000"

@@ -68,7 +68,6 @@ def test_the_wheel_holds_the_package_its_cards_and_its_licence(wheel):
 
 
 def test_the_wheel_holds_nothing_else(wheel):
-    """No tests, no examples, nothing that executes data, no trace of the machine that built it."""
     with zipfile.ZipFile(wheel) as archive:
         roots = {name.partition("/")[0] for name in archive.namelist()}
         content = {name: archive.read(name) for name in archive.namelist()}

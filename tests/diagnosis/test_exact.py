@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from made_searches import bare, baseline, candidate, ground_of, one_level, with_modes
+from made_searches import baseline, candidate, ground_of, one_level, singles, with_modes
 
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.diagnosis import sensitivity
@@ -63,7 +63,7 @@ def found():
         direction = 0.02 * rng.standard_normal(6)
         one = candidate(base, name, direction)
         candidates[name] = replace(one, laws=(BentLaw(one.laws[0].form, base, direction),))
-    every = [bare(base, levels), *(Hypothesis((n,), 0.2, one.fine, levels, base) for n, one in candidates.items())]
+    every = singles(base, candidates, levels, 0.2)
     return search(ground_of(base, *every, candidates=candidates), 0.015 * rng.standard_normal(6))
 
 
@@ -104,7 +104,6 @@ def test_draws_and_evidence_are_those_of_the_bent_law(found, index):
 
 
 def test_odds_are_those_of_the_bent_law(found):
-    """Of the effect against none: the grid's, to the error of 128 draws."""
     exact = under_exact_law(found)
     none, effect = (quadrature(found, law)[2] for law in (None, found.ground.candidates["a"].laws[0]))
     wanted = effect - none
@@ -158,7 +157,6 @@ def test_where_the_law_is_straight_nothing_changes(found):
 
 
 def test_two_effects_add_at_the_constants_of_a_draw(found):
-    """The shift of one beside the shift of the other, both by their own law."""
     one, other = (found.ground.candidates[name] for name in ("a", "b"))
     pair = Hypothesis(
         ("a", "b"), 0.1, together(one.coarse, other.coarse), found.ground.hypotheses[0].noise, found.ground.baseline

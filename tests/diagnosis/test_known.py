@@ -134,11 +134,11 @@ def test_sizes_are_fixed_at_their_medians_and_all_else_is_left(fiemme):
     assert {one.owner for one in sized.parameters if one.effect == SHEAR} == {BOARD}
 
 
-@pytest.mark.parametrize("declared", [(), (SHEAR,), (AIR, SHEAR)])
-def test_every_combination_is_computed_whatever_is_declared(fiemme, declared):
-    board = replace(fiemme.board, effects=declared)
-    assert known_effects(board) == (SHEAR, AIR)
-    assert every_combination(board) == [(), (SHEAR,), (AIR,), (SHEAR, AIR)]
+def test_every_combination_is_computed_whatever_is_declared(fiemme):
+    for declared in [(), (SHEAR,), (AIR, SHEAR)]:
+        board = replace(fiemme.board, effects=declared)
+        assert known_effects(board) == (SHEAR, AIR)
+        assert every_combination(board) == [(), (SHEAR,), (AIR,), (SHEAR, AIR)]
 
 
 def test_an_exciter_of_stated_mass_is_known_and_stated_though_an_empty_list_declares_nothing():

@@ -70,25 +70,25 @@ def test_falls_and_rises_are_said_plainly():
     assert known_sentence(KNOWN[:1]) == known_sentence(()) == ""
 
 
-@pytest.mark.parametrize(
-    ("models", "words", "rises"),
-    [
-        ((STANDS, SHEAR), "transverse shear lowers the left-out error from 46 to 12 cents.", False),
-        (
-            (STANDS, replace(SENSOR, leave_one_out_rms_cents=12.0)),
-            "attached mass, as the card states it, raises the left-out error from 12 to 46 cents. ",
-            True,
-        ),
-        ((STANDS, replace(AIR, leave_one_out_rms_cents=46.6)), "raises the left-out error from 46 to 47 cents. ", True),
-        ((STANDS, replace(AIR, leave_one_out_rms_cents=46.3)), "leaves the left-out error at 46 cents.", False),
-        ((STANDS, replace(AIR, leave_one_out_rms_cents=None)), "the error in the fit from 21 to 43 cents.", True),
-        ((known_model(4.0, 6.0), known_model(5.0, 8.25, "fluid_loading")), "from 6.0 to 8.2 cents. ", True),
-    ],
-)  # fmt: skip
-def test_each_effect_is_told_by_its_own_error(models, words, rises):
-    told = known_sentence(models)
-    assert words in told
-    assert (RISE in told) is rises
+TOLD = [
+    ((STANDS, SHEAR), "transverse shear lowers the left-out error from 46 to 12 cents.", False),
+    (
+        (STANDS, replace(SENSOR, leave_one_out_rms_cents=12.0)),
+        "attached mass, as the card states it, raises the left-out error from 12 to 46 cents. ",
+        True,
+    ),
+    ((STANDS, replace(AIR, leave_one_out_rms_cents=46.6)), "raises the left-out error from 46 to 47 cents. ", True),
+    ((STANDS, replace(AIR, leave_one_out_rms_cents=46.3)), "leaves the left-out error at 46 cents.", False),
+    ((STANDS, replace(AIR, leave_one_out_rms_cents=None)), "the error in the fit from 21 to 43 cents.", True),
+    ((known_model(4.0, 6.0), known_model(5.0, 8.25, "fluid_loading")), "from 6.0 to 8.2 cents. ", True),
+]  # fmt: skip
+
+
+def test_each_effect_is_told_by_its_own_error():
+    for models, words, rises in TOLD:
+        told = known_sentence(models)
+        assert words in told
+        assert (RISE in told) is rises
 
 
 def of_errors(neither, first, second, both):
@@ -112,23 +112,22 @@ def test_the_best_combination_is_told_or_that_there_is_none():
     assert "combinations" not in known_sentence(of_errors(16.0, 20.0, 43.0, 15.4)[:3])
 
 
-@pytest.mark.parametrize(
-    ("errors", "is_told"),
-    [
-        ((16.0, 20.0, 43.0, 4.0), True),
-        ((16.0, 15.9, 43.0, 4.0), False),
-        ((16.0, 20.0, 15.9, 4.0), False),
-        ((16.0, 20.0, 43.0, 16.1), False),
-    ],
-)
-def test_two_effects_that_work_only_together_are_told_so(errors, is_told):
-    """Both together lower the error, and either alone raises it."""
+TOGETHER = [
+    ((16.0, 20.0, 43.0, 4.0), True),
+    ((16.0, 15.9, 43.0, 4.0), False),
+    ((16.0, 20.0, 15.9, 4.0), False),
+    ((16.0, 20.0, 43.0, 16.1), False),
+]
+
+
+def test_two_effects_that_work_only_together_are_told_so():
     words = (
         "Transverse shear and fluid loading work only together: transverse shear alone takes the left-out error from "
         "16.0 to 20.0 cents, fluid loading alone to 43.0, both to 4.0."
     )
-    assert (words in known_sentence(of_errors(*errors))) is is_told
-    assert ("only together" in known_sentence(of_errors(*errors))) is is_told
+    for errors, is_told in TOGETHER:
+        assert (words in known_sentence(of_errors(*errors))) is is_told
+        assert ("only together" in known_sentence(of_errors(*errors))) is is_told
 
 
 def test_two_effects_of_which_one_is_declared_are_seen_to_work_only_together():

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made_searches import bare, baseline, candidate, ground_of
+from made_searches import baseline, candidate, found_among, singles
 
 from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.folds import carrying
 from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.search import Found
 from bayesplate.diagnosis.shifts import together
 from bayesplate.diagnosis.terms import noise_grid
 
@@ -23,10 +22,9 @@ def found():
     base = baseline(np.random.default_rng(1), N_MODES, n_inputs=0)
     levels = noise_grid(base.board)
     effects = {name: candidate(base, name, 0.2 * np.eye(N_MODES)[mode], WIDE) for name, mode in (("a", 4), ("b", 6))}
-    every = [bare(base, levels), *(Hypothesis((name,), 0.1, one.fine, levels, base) for name, one in effects.items())]
-    every.append(Hypothesis(("a", "b"), 0.1, together(effects["a"].coarse, effects["b"].coarse), levels, base))
-    shares = np.full(len(every), 1.0 / len(every))
-    return Found(ground_of(base, *every, candidates=effects), np.zeros(N_MODES), np.log(shares), shares)
+    both = together(effects["a"].coarse, effects["b"].coarse)
+    every = [*singles(base, effects), Hypothesis(("a", "b"), 0.1, both, levels, base)]
+    return found_among(base, effects, every, [0.25] * 4, np.zeros(N_MODES))
 
 
 def hat(found, *modes):

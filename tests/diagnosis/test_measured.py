@@ -71,11 +71,7 @@ def test_fiemme_names_nothing_alone(diagnosed):
 @slow
 @pytest.mark.parametrize(
     ("name", "possible"),
-    [
-        ("spruce-free-2R", {SHEAR, "attached_mass"}),
-        ("spruce-free-2L", {"grain_angle"}),
-        ("spruce-free-3R", {SHEAR}),
-    ],
+    [("spruce-free-2R", {SHEAR, "attached_mass"}), ("spruce-free-2L", {"grain_angle"}), ("spruce-free-3R", {SHEAR})],
 )
 def test_a_blind_board_that_is_named_or_grouped_is_so_with_what_its_peaks_ask_for(diagnosed, name, possible):
     """Of none may anything be claimed, and a verdict without effects is one that names none."""

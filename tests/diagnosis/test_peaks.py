@@ -137,10 +137,7 @@ def planted():
     one = candidate(replace_all(base), "a", direction[order])
     levels = one_level(base)
     none = bare(base, levels)
-    hypotheses = (
-        with_every(none),
-        Hypothesis(("a",), 0.5, one.fine, levels, base),
-    )
+    hypotheses = (with_every(none), Hypothesis(("a",), 0.5, one.fine, levels, base))
     return ground_of(base, *hypotheses, candidates={"a": one}), [*range(2), order.index(3), 3, 4, 5]
 
 

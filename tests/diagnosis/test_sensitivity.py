@@ -6,19 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_searches import bare, baseline, candidate, ground_of, one_level, visible_of
+from made_searches import baseline, candidate, ground_of, one_level, singles, visible_of
 from scipy.stats import binom
 
 from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.folds import ALWAYS, nested
 from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.null_control import (
-    FALSE_ALARMS,
-    NullControl,
-    _share,
-    made_to_choose,
-    null_control,
-)
+from bayesplate.diagnosis.null_control import FALSE_ALARMS, NullControl, _share, made_to_choose, null_control
 from bayesplate.diagnosis.search import Found, noise_of_board, search
 from bayesplate.diagnosis.sensitivity import draw_constants, under_exact_law, variants, varied
 from bayesplate.diagnosis.terms import noise_grid
@@ -30,9 +24,7 @@ def small():
     base = baseline(np.random.default_rng(1))
     direction = 0.02 * np.linalg.qr(np.random.default_rng(2).standard_normal((6, 6)))[0][0]
     one = candidate(base, "a", direction)
-    levels = noise_grid(base.board)
-    ground = ground_of(base, bare(base, levels), Hypothesis(("a",), 0.4, one.fine, levels, base), candidates={"a": one})
-    return ground, one
+    return ground_of(base, *singles(base, {"a": one}, prior=0.4), candidates={"a": one}), one
 
 
 def test_constants_are_those_of_a_direct_regression():
@@ -114,11 +106,11 @@ def test_fewer_null_sets_are_made_where_chance_is_certain(small):
     assert null_control(ground, np.random.default_rng(8), 250).against.size == 250
 
 
-@pytest.mark.parametrize(("larger", "stops"), [(6, False), (7, True)])
-def test_chance_is_certain_from_the_lower_bound_of_the_share_on(larger, stops):
+def test_chance_is_certain_from_the_lower_bound_of_the_share_on():
     """Of a hundred sets: the bound of 99 % is 0.0180 with six above, 0.0238 with seven."""
-    low, _ = _share(np.arange(100) < larger)
-    assert (low > FALSE_ALARMS) is stops
+    for larger, stops in [(6, False), (7, True)]:
+        low, _ = _share(np.arange(100) < larger)
+        assert (low > FALSE_ALARMS) is stops
 
 
 def test_bounds_of_a_share_are_those_of_the_binomial_distribution():
@@ -169,10 +161,7 @@ def test_a_variant_is_the_search_with_that_prior(change, prior):
         one = candidate(base, "a", direction, Quantity.from_mean(0.0, sd, "normal"), n_cells=99)
         levels = noise_grid(base.board)
         levels = replace(levels, sd=noise * levels.sd)
-        ground = ground_of(
-            base, bare(base, levels), Hypothesis(("a",), 0.4, one.fine, levels, base), candidates={"a": one}
-        )
-        return search(ground, residual)
+        return search(ground_of(base, *singles(base, {"a": one}, levels, 0.4), candidates={"a": one}), residual)
 
     usual = searched(1.0, 1.0)
     wanted = searched(change.get("width", 1.0), change.get("noise", 1.0))

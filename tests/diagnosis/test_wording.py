@@ -121,26 +121,26 @@ def test_every_word_of_the_verdict_and_every_error_has_its_words():
     assert read == list(range(len(fields(Errors))))
 
 
-@pytest.mark.parametrize(
-    ("word", "words"),
-    [
-        ("none needed", "no more than their noise would make them"),
-        ("named", "point to membrane tension. The reason: the reason of it. The error of the prediction is reduced: "
-         "the left-out error fell from 46 to 12 cents, and every condition of that claim is met."),
-        ("indistinguishable group", "cannot tell which: membrane tension or fluid loading."),
-        ("unexplained", "no effect that was tried explains it"),
-        ("undetectable", "could not show them even if they were there"),
-    ],
-)  # fmt: skip
-def test_the_terminal_and_the_page_tell_the_same(word, words):
-    one = DIAGNOSES[word]
-    closing = verdict_sentence(one)
+PASSAGES = [
+    ("none needed", "no more than their noise would make them"),
+    ("named", "point to membrane tension. The reason: the reason of it. The error of the prediction is reduced: "
+     "the left-out error fell from 46 to 12 cents, and every condition of that claim is met."),
+    ("indistinguishable group", "cannot tell which: membrane tension or fluid loading."),
+    ("unexplained", "no effect that was tried explains it"),
+    ("undetectable", "could not show them even if they were there"),
+]  # fmt: skip
 
-    assert closing.startswith(f"Verdict: {word}. {verdict_sentences(one)[0]}")
-    assert words in closing
-    assert ("reduced" in closing) is one.claim
-    assert ("No improvement is claimed" in closing) is (one.is_refitted and not one.claim)
-    assert verdict_sentences(one)[-1] == closing[-len(verdict_sentences(one)[-1]) :] or not one.is_refitted
+
+def test_the_terminal_and_the_page_tell_the_same():
+    for word, words in PASSAGES:
+        one = DIAGNOSES[word]
+        closing = verdict_sentence(one)
+
+        assert closing.startswith(f"Verdict: {word}. {verdict_sentences(one)[0]}")
+        assert words in closing
+        assert ("reduced" in closing) is one.claim
+        assert ("No improvement is claimed" in closing) is (one.is_refitted and not one.claim)
+        assert verdict_sentences(one)[-1] == closing[-len(verdict_sentences(one)[-1]) :] or not one.is_refitted
 
 
 def test_the_page_says_what_its_constants_are():
@@ -157,23 +157,23 @@ def test_the_page_says_what_its_constants_are():
     assert show_diagnosis(DIAGNOSES["unexplained"]).warnings == tuple(warnings(DIAGNOSES["unexplained"]))
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "words"),
-    [
-        (53.2, 61.4, "The left-out error rose from 53 to 61 cents. No improvement is claimed."),
-        (53.2, 53.4, "The left-out error stayed at 53 cents. No improvement is claimed."),
-        (5.2, 5.44, "The left-out error rose from 5.2 to 5.4 cents. No improvement is claimed."),
-        (61.4, 53.2, "The left-out error fell from 61 to 53 cents. No improvement is claimed: the readings left out "
-         "are not predicted better beyond two standard errors."),
-    ],
-)  # fmt: skip
-def test_an_error_that_rises_is_said_to_rise(before, after, words):
-    one = replace(
-        DIAGNOSES["indistinguishable group"],
-        before=replace(BEFORE, nested_leave_one_out_rms_cents=before),
-        after=replace(AFTER, nested_leave_one_out_rms_cents=after),
-    )
-    assert claim_sentence(one) == words
+ROSE = [
+    (53.2, 61.4, "The left-out error rose from 53 to 61 cents. No improvement is claimed."),
+    (53.2, 53.4, "The left-out error stayed at 53 cents. No improvement is claimed."),
+    (5.2, 5.44, "The left-out error rose from 5.2 to 5.4 cents. No improvement is claimed."),
+    (61.4, 53.2, "The left-out error fell from 61 to 53 cents. No improvement is claimed: the readings left out "
+     "are not predicted better beyond two standard errors."),
+]  # fmt: skip
+
+
+def test_an_error_that_rises_is_said_to_rise():
+    for before, after, words in ROSE:
+        one = replace(
+            DIAGNOSES["indistinguishable group"],
+            before=replace(BEFORE, nested_leave_one_out_rms_cents=before),
+            after=replace(AFTER, nested_leave_one_out_rms_cents=after),
+        )
+        assert claim_sentence(one) == words
 
 
 def test_with_too_few_readings_the_error_that_both_models_have_is_told():
@@ -222,25 +222,25 @@ def test_what_looks_like_the_named_effect_is_told():
     assert alike_sentence(NAMED) == alike_sentence(replace(one, verdict="indistinguishable group")) == ""
 
 
-@pytest.mark.parametrize(
-    ("unit", "sizes", "shown"),
-    [
-        ("kg", (1e-4, 8e-4, 1.8e-3), "mass 0.8 g (0.1 to 1.8)"),
-        ("rad", (0.01745329, 0.03490659, 0.05235988), "mass 2 degrees (1 to 3)"),
-        ("Pa", (6.2e8, 6.2e8, 6.2e8), "mass 0.62 GPa (fixed)"),
-        ("m", (1e-4, 2e-4, 3e-4), "mass 0.2 mm (0.1 to 0.3)"),
-        ("1", (0.1, 0.2, 0.3), "mass 0.2 (0.1 to 0.3)"),
-        ("kg", (2.5, 8.3, 44.5), "mass 8300 g (2500 to 44500)"),
-        ("1", (-0.1, 1e-9, 0.1), "mass 0 (-0.1 to 0.1)"),
-    ],
-)
-def test_sizes_have_the_units_of_people(unit, sizes, shown):
-    low, middle, high = sizes
-    size = Amplitude(parameter="mass", form="", q05=low, q50=middle, q95=high, unit=unit)
-    one = replace(NAMED, candidates=(replace(TENSION, amplitude=size),))
-    for narrow in (False, True):
-        table = candidates_table(one, narrow=narrow)
-        assert dict(zip(table.columns, table.texts[0], strict=True))["size (90 %)"] == shown
+SIZES = [
+    ("kg", (1e-4, 8e-4, 1.8e-3), "mass 0.8 g (0.1 to 1.8)"),
+    ("rad", (0.01745329, 0.03490659, 0.05235988), "mass 2 degrees (1 to 3)"),
+    ("Pa", (6.2e8, 6.2e8, 6.2e8), "mass 0.62 GPa (fixed)"),
+    ("m", (1e-4, 2e-4, 3e-4), "mass 0.2 mm (0.1 to 0.3)"),
+    ("1", (0.1, 0.2, 0.3), "mass 0.2 (0.1 to 0.3)"),
+    ("kg", (2.5, 8.3, 44.5), "mass 8300 g (2500 to 44500)"),
+    ("1", (-0.1, 1e-9, 0.1), "mass 0 (-0.1 to 0.1)"),
+]
+
+
+def test_sizes_have_the_units_of_people():
+    for unit, sizes, shown in SIZES:
+        low, middle, high = sizes
+        size = Amplitude(parameter="mass", form="", q05=low, q50=middle, q95=high, unit=unit)
+        one = replace(NAMED, candidates=(replace(TENSION, amplitude=size),))
+        for narrow in (False, True):
+            table = candidates_table(one, narrow=narrow)
+            assert dict(zip(table.columns, table.texts[0], strict=True))["size (90 %)"] == shown
 
 
 def test_the_sizes_of_what_was_fitted_again():
@@ -301,7 +301,6 @@ def test_candidates_stand_in_the_order_of_their_probability():
 
 
 def test_an_exchange_of_labels_that_is_out_of_the_question_is_not_shown():
-    """Any two neighbours are a candidate: from one per cent on they are shown."""
     for share, shown in ((0.0099, False), (0.01, True)):
         one = replace(NAMED, candidates=(TENSION, replace(EXCHANGE, inclusion_probability=share)))
         assert (len(candidates_table(one).texts) == 2) is shown
