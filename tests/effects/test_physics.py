@@ -152,6 +152,7 @@ CASES = {
     ),
     "grain": Case(FREE, [GrainAngle()], {ANGLE: 0.2}, [planted.GrainAngle(0.2)]),
     "grain, shear-flexible": Case(FINNISH, [GrainAngle()], {ANGLE: 0.2}, [planted.GrainAngle(0.2)], is_sheared=True),
+    "tension along": Case(FIEMME, [MembraneTension(MADE, "x")], {N: 5e3}, [planted.MembraneTension(5e3, 0.0)]),
     "tension across": Case(FIEMME, [MembraneTension(MADE, "y")], {N: 5e3}, [planted.MembraneTension(0.0, 5e3)]),
     "tension, shear-flexible": Case(
         FIEMME, [MembraneTension(MADE, "both")], {N: 5e3}, [planted.MembraneTension(5e3, 5e3)], is_sheared=True
