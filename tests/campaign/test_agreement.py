@@ -64,7 +64,7 @@ def leaning(size, seed=4, n=4000):
     return Pull.of_draws(draws, np.full(n, 1.0 / n))
 
 
-@pytest.mark.parametrize("size", [-1.0, 0.5, 1.0])
+@pytest.mark.parametrize("size", [-1.0, 1.0])
 def test_a_board_that_only_leans_does_not_refuse(size):
     """Its posterior moves by as much as one of the prior's sds and stays as wide."""
     pull = leaning(size)

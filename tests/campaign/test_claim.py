@@ -36,9 +36,8 @@ def test_nothing_is_claimed_where_nothing_is_shared():
     assert sum(claimed(seed, 0.0) for seed in range(100, 200)) <= 12
 
 
-@pytest.mark.parametrize(("size", "n"), [(1.5, 30), (4.0, 8)])
-def test_what_three_of_eight_have_is_not_claimed(size, n):
-    assert np.mean([claimed(seed, size, without=(0, 2, 3, 5, 7)) for seed in range(200, 200 + n)]) <= 0.1
+def test_what_three_of_eight_have_is_not_claimed():
+    assert np.mean([claimed(seed, 1.5, without=(0, 2, 3, 5, 7)) for seed in range(200, 230)]) <= 0.1
 
 
 @pytest.mark.parametrize(

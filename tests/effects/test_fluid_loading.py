@@ -68,7 +68,7 @@ def test_a_setup_that_states_its_own_fluid_keeps_it():
     assert FluidLoading.of(board, setup).in_setup(board, wet).density.mean == 997.0
 
 
-@pytest.mark.parametrize(("density", "word"), [(1.2, "air"), (99.0, "air"), (997.0, "water"), (790.0, "fluid")])
-def test_people_call_it_air_or_water(density, word):
-    density, _ = FluidLoading(MADE, density=Quantity.exact(density)).parameters()
-    assert density.words == f"density of the {word} of fluid loading"
+def test_people_call_it_air_or_water():
+    for value, word in ((99.0, "air"), (997.0, "water"), (790.0, "fluid")):
+        density, _ = FluidLoading(MADE, density=Quantity.exact(value)).parameters()
+        assert density.words == f"density of the {word} of fluid loading"

@@ -78,7 +78,6 @@ def test_a_thickness_that_was_read_at_places_tells_the_sign(card, details):
         (CORNER, ("grain_angle", "attached_mass"), {}, True),
         (MIDDLE, ("grain_angle", "attached_mass"), {}, False),
         (CORNER, ("attached_mass",), {}, False),
-        (MIDDLE, ("grain_angle", "attached_mass"), {"x0": "clamped", "y0": "clamped"}, True),
     ],
 )
 def test_it_is_said_where_the_sign_counts(place, effects, edges, is_told):

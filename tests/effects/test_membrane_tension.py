@@ -22,7 +22,6 @@ def test_acts_between_held_edges_only():
     [
         (["all"], {"": ["both"], "along x": ["x"], "along y": ["y"]}),
         (["y"], {"along y": ["y"]}),
-        (["all", "y"], {"": ["both", "y"], "along x": ["x"], "along y": ["y", "y"]}),
         (["y", "none", "all"], {"": ["y", "both"], "along x": ["x"], "along y": ["y", "y"]}),
     ],
 )

@@ -111,9 +111,6 @@ def expected(taper_x: float, taper_y: float) -> FieldProfile:
 
 CASES = {
     "clamps that turn": Case(FIEMME, [clamp(ClampRotation, FIEMME)], {TURN: 1 / 3}, [turning(FIEMME, 1 / 3)]),
-    "a clamp that hardly turns, shear-flexible": Case(
-        FINNISH, [clamp(ClampRotation, FINNISH)], {TURN: 1e-3}, [turning(FINNISH, 1e-3)], is_sheared=True
-    ),
     "a clamp along x takes the sides of y": Case(
         ALONG_X, [clamp(ClampRotation, ALONG_X)], {TURN: 0.05}, [turning(ALONG_X, 0.05)]
     ),
@@ -125,13 +122,9 @@ CASES = {
         [turning(FINNISH, 1 / 30), sinking(FINNISH, 1e-4)],
         is_sheared=True,
     ),
-    "density": Case(FINNISH, [DensityGradient()], {DENSITY: 0.6}, [planted.DensityGradient(0.6)]),
     "density, shear-flexible": Case(FREE, [DensityGradient()], {DENSITY: 0.6}, [planted.DensityGradient(0.6)], True),
     "density of a part": Case(COVERED, [DensityGradient(part=PART)], {DENSITY: 0.3}, [planted.DensityGradient(0.3)]),
     "stiffness": Case(PLAIN, [StiffnessGradient()], {STIFFNESS: 0.6}, [planted.StiffnessGradient(0.6)], cents=0.1),
-    "stiffness, shear-flexible": Case(
-        FIEMME, [StiffnessGradient()], {STIFFNESS: -0.2}, [planted.StiffnessGradient(-0.2)], is_sheared=True
-    ),
     "stiffness of a part": Case(
         COVERED, [StiffnessGradient(part=PART)], {STIFFNESS: 0.2}, [planted.StiffnessGradient(0.2)]
     ),
@@ -165,14 +158,9 @@ CASES = {
         FIEMME, [MembraneTension(MADE, "both")], {N: 5e3}, [planted.MembraneTension(5e3, 5e3)], is_sheared=True
     ),
     "a frame as heavy as the board": Case(FIEMME, [SupportMass(MADE)], {FRAME: 0.3}, [planted.SupportMass(0.3)]),
-    "a frame, shear-flexible": Case(
-        FIEMME, [SupportMass(MADE)], {FRAME: 8.0}, [planted.SupportMass(8.0)], is_sheared=True
-    ),
-    "a bed": Case(FINNISH, [SupportStiffness(MADE)], {BED: 2e5}, [planted.SupportStiffness(2e5)]),
     "a bed, on which rigid motions bounce, shear-flexible": Case(
         FREE, [SupportStiffness(MADE)], {BED: 2e5}, [planted.SupportStiffness(2e5)], is_sheared=True
     ),
-    "tapers": Case(FIEMME, [ThicknessProfile()], tapers(0.4, -0.3), [planted.ThicknessProfile(0.4, -0.3)]),
     "tapers of a stout board, whose rotary inertia counts, shear-flexible": Case(
         STOUT, [ThicknessProfile()], tapers(0.4, -0.3), [planted.ThicknessProfile(0.4, -0.3)], is_sheared=True
     ),
@@ -234,8 +222,8 @@ def weight(plate: Plate) -> float:
 
 @pytest.mark.parametrize(
     ("plate", "place", "share", "is_turning"),
-    [(FREE, (0.97, 0.91), 0.1, False), (FINNISH, (0.9, 0.75), 0.03, False), (FREE, (0.966, 0.908), 0.012, True)],
-    ids=["a tenth of a free board", "a thirtieth of a cantilever", "a sensor that turns"],
+    [(FREE, (0.97, 0.91), 0.1, False), (FREE, (0.966, 0.908), 0.012, True)],
+    ids=["a tenth of a board", "a sensor that turns"],
 )
 def test_point_masses_are_those_of_the_generator(plate, place, share, is_turning):
     """Whose polynomials err as the inverse square of their number, so that two numbers of them are extrapolated."""
@@ -285,23 +273,15 @@ def test_clamps_of_no_compliance_are_ideal(kind, name, cents):
 
 
 REFUSALS = [
-    (name, plate, "no edge is clamped") for name in ("clamp_rotation", "clamp_translation") for plate in (FREE,)
-] + [
-    ("membrane_tension", FINNISH, "nothing can stretch"),
-    ("membrane_tension", FREE, "nothing can stretch"),
-    ("support_mass", FINNISH, "no frame"),
-    ("support_mass", FREE, "no frame"),
-    ("support_stiffness", FINNISH, "an edge is held"),
-    ("support_stiffness", replace(FIEMME, edges=ALL_SUPPORTED), "an edge is held"),
-    *((name, plate, "") for name, plate in (
-        ("clamp_rotation", FINNISH), ("clamp_translation", FIEMME), ("membrane_tension", FIEMME),
-        ("support_mass", FIEMME), ("support_stiffness", FREE),
-    )),
-]  # fmt: skip
+    ("clamp_rotation", FREE, FINNISH, "no edge is clamped"),
+    ("clamp_translation", FREE, FIEMME, "no edge is clamped"),
+    ("membrane_tension", FINNISH, FIEMME, "nothing can stretch"),
+    ("support_mass", FINNISH, FIEMME, "no frame"),
+    ("support_stiffness", replace(FIEMME, edges=ALL_SUPPORTED), FREE, "an edge is held"),
+]
 
 
-@pytest.mark.parametrize(("name", "plate", "words"), REFUSALS)
-def test_what_edges_refuse(name, plate, words):
-    refused = EFFECTS[name].refusal(None, setup_of(plate))
-    assert words in refused
-    assert bool(refused) == bool(words)
+@pytest.mark.parametrize(("name", "refused", "taken", "words"), REFUSALS)
+def test_what_edges_refuse(name, refused, taken, words):
+    assert words in EFFECTS[name].refusal(None, setup_of(refused))
+    assert EFFECTS[name].refusal(None, setup_of(taken)) == ""

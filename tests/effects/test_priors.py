@@ -23,7 +23,6 @@ from bayesplate.board.board import Board
 from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.forms import forms
 from bayesplate.effects import EFFECTS
-from bayesplate.effects.attached_items import item_on_board
 
 HALF = (0.0, inf)
 ANY = (-inf, inf)
@@ -116,17 +115,14 @@ def test_prior_and_unit_of_every_parameter():
         assert same(found.prior, *prior), (name, told(found.prior))
 
 
-@pytest.mark.parametrize("kind", MASSES)
-def test_mass_of_a_thing_that_the_card_does_not_weigh(kind):
-    board = BOARDS[1]
-    setup = replace(board.setups[0], attached=(AttachedItem(kind, ((0.1, 0.1),)),))
-    declared = replace(board, effects=("attached_mass",))
-    median, factor = MASSES[kind]
-    item = item_on_board(board, setup, setup.attached[0])
+def test_mass_of_a_thing_that_the_card_does_not_weigh():
+    declared = replace(BOARDS[1], effects=("attached_mass",))
+    for kind, (median, factor) in MASSES.items():
+        setup = replace(declared.setups[0], attached=(AttachedItem(kind, ((0.1, 0.1),)),))
+        (found,) = EFFECTS["attached_mass"].of(declared, setup).parameters()
 
-    assert same(item.mass, "log-normal", median, log(factor), ANY), told(item.mass)
-    found = EFFECTS["attached_mass"].of(declared, setup).parameters()
-    assert [(one.unit, one.prior) for one in found] == [("kg", item.mass)]
+        assert same(found.prior, "log-normal", median, log(factor), ANY), told(found.prior)
+        assert found.unit == "kg"
 
 
 def test_mass_of_a_thing_that_nobody_mentioned():
@@ -159,7 +155,7 @@ def test_resonance_in_place_of_a_suspension():
     assert found["resonance"] == ("Hz", stated)
 
 
-@pytest.mark.parametrize("board", [BOARDS[1], DRIVEN], ids=["free", "driven"])
+@pytest.mark.parametrize("board", [DRIVEN, BOARDS[1]], ids=["driven", "free"])
 def test_a_search_keeps_prior_and_unit(board):
     """What it tries is the effect's own parameter, not one of another width or without a unit."""
     seen = set()
@@ -191,7 +187,7 @@ edges = {{ x0 = "{}", x1 = "free", y0 = "free", y1 = "free" }}
 """
 
 
-@pytest.mark.parametrize(("edge", "median"), [("free", 0.003), ("supported", 0.003), ("clamped", 0.008)])
+@pytest.mark.parametrize(("edge", "median"), [("supported", 0.003), ("clamped", 0.008)])
 def test_noise_and_poisson_ratio_of_a_card_that_states_neither(edge, median):
     board = Board.from_text(CARD.format(edge), "b")
 

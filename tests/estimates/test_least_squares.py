@@ -92,23 +92,13 @@ def test_a_reading_s_own_uncertainty_weighs_it():
     assert errors[1] < 0.05 * errors[0] + 1e-3
 
 
-@pytest.mark.parametrize(
-    ("step", "previous", "settled"),
-    [
-        (1e-10, 1e-4, True),
-        (1e-6, 4e-7, True),
-        (1e-6, 1.5e-6, False),  # shrinking slowly
-        (1e-6, 1e-3, True),  # a thousandth of it remains
-        (2e-6, 1e-5, False),  # a fifth of it remains
-        (1e-3, 1e-3, False),  # two solutions that swap
-        (1e-6, np.inf, False),
-    ],
-)
-def test_steps_end_where_they_do_not_count_or_are_rounding(step, previous, settled):
-    assert has_settled(step, previous) is settled
+def test_steps_end_where_they_do_not_count_or_are_rounding():
+    settled = [(1e-10, 1e-4), (1e-6, 4e-7), (1e-6, 1e-3)]  # of the last a thousandth remains
+    not_yet = [(1e-6, 1.5e-6), (2e-6, 1e-5), (1e-3, 1e-3), (1e-6, np.inf)]  # shrinking slowly; a fifth remains; a swap
+    assert [has_settled(*one) for one in (*settled, *not_yet)] == [True] * 3 + [False] * 4
 
 
-@pytest.mark.parametrize("steps", [1, 2, 40])
+@pytest.mark.parametrize("steps", [1, 40])
 def test_an_estimate_is_where_its_models_were_solved_settled_or_not(steps):
     board = prepare("finnish-spruce-cantilever").board
     estimate = weighted_least_squares(board, steps)
@@ -185,7 +175,7 @@ def test_steps_to_and_fro_are_shortened_while_no_names_are_exchanged(monkeypatch
         assert np.log(estimate.rigidities) == pytest.approx(law.start, abs=1e-6)
 
 
-@pytest.mark.parametrize(("factor", "goes_round"), [(0.3, False), (-0.5, False), (-0.8, False), (-1.0, True)])
+@pytest.mark.parametrize(("factor", "goes_round"), [(-0.8, False), (-1.0, True)])
 def test_steps_that_shrink_do_not_go_round(factor, goes_round):
     places = np.cumsum(0.1 * factor ** np.arange(8.0))
     tried = [SimpleNamespace(rigidities=np.exp([place, 0.0, 0.0])) for place in places]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from generator.designs import POISSON, SHEAR_MEANS, STEEL_POISSON, Design, Setup
+from generator.designs import POISSON, SHEAR_MEANS, Design, Setup
 from generator.naming import Label
 
 NOISE_FACTOR = 1.65
@@ -34,35 +34,11 @@ def card_text(
 ) -> str:
     """The card of a simulated board.
 
-    Parameters
-    ----------
-    name : str
-    design : Design
-    readings : mapping
-        Setup name -> laboratory's label -> Hz.
-    noise_cents : float
-        Stated as the median of the noise prior.
-    noise_factor : float
-        Of the noise prior: 1.65 says little about the noise.
-    resolution : float, Hz
-        To which readings are rounded; 0: the card says nothing of it.
-    places : sequence of (float, float), m
-        Of an accelerometer whose mass is not stated; several if it roved.
-    driven : sequence of (float, float), m
-        Of an exciter likewise; where its mass is stated it stands on the card even without a place.
-    outline : mapping, optional
-        Stations and widths, m, of a board that is not a rectangle: they are measured, so the card has them.
-    prior : str
-        A prior card; empty: the package's default.
-    stated : mapping
-        Key of the card -> its value as TOML, in place of what stands there otherwise, or besides: length_y_mm,
-        thickness_mm, warp_mm, poisson_xy, shear_xz_gpa, shear_yz_gpa, effects; of every setup noise_percent, air or
-        fluid, the kind and mass_g of what is attached, exciter_mass_g (its mass_g), coil_mass_g, suspension_n_per_m,
-        resonance_hz and magnet of the exciter, and of clamped ones clamped_x0_mm.
-
-    Returns
-    -------
-    str
+    readings: setup name -> laboratory's label -> Hz; places, m, of an accelerometer whose mass is not stated, and
+    driven, of an exciter, which stands on the card even without a place where its mass is stated; outline: stations and
+    widths, m; stated: key of the card -> its value as TOML, in place of what stands there otherwise, or besides
+    (length_y_mm, thickness_mm, warp_mm, poisson_xy, shear_xz_gpa, shear_yz_gpa, effects, exciter_mass_g, clamped_x0_mm
+    and those of `_OF_SETUPS`).
     """
     width = f"{_mm(design.L_y)}"
     if outline:
@@ -86,7 +62,7 @@ def card_text(
         *([f"warp_mm = {stated['warp_mm']}"] if "warp_mm" in stated else []),
         "",
         "[material]",
-        *_material_lines(design, stated),
+        *_material_lines(stated),
         *([f'prior = "{prior}"'] if prior else []),
     ]
     for setup in design.setups:
@@ -99,12 +75,8 @@ def noise_percent(cents: float) -> float:
     return 100.0 * (2.0 ** (max(cents, LEAST_NOISE_CENTS) / 1200.0) - 1.0)
 
 
-def _material_lines(design: Design, stated: Mapping[str, str]) -> list[str]:
-    """Poisson ratio and shear moduli; those of an isotropic plate follow from its modulus."""
-    if design.isotropic:
-        mean, sd = STEEL_POISSON
-        ratio = f"{{ mean = {mean:g}, sd = {sd:g} }}"
-        return ["isotropic = true", f"poisson_xy = {stated.get('poisson_xy', ratio)}"]
+def _material_lines(stated: Mapping[str, str]) -> list[str]:
+    """Poisson ratio and shear moduli."""
     shear = {key: f"{{ mean = {mean / 1e9:.6g}, sd = {sd / 1e9:.6g} }}" for key, (mean, sd) in SHEAR_MEANS.items()}
     return [
         f"poisson_xy = {stated.get('poisson_xy', POISSON)}",
@@ -123,7 +95,6 @@ def _setup_lines(
     edges = ", ".join(f'{edge} = "{word}"' for edge, word in setup.edges.items())
     sensor = {"mass_g": stated.get("mass_g")}
     drive = {"mass_g": stated.get("exciter_mass_g")} | {key: stated.get(key) for key in _OF_EXCITERS}
-    fluid = f'{{ density_kg_m3 = {setup.tank:g}, baffle = "none" }}' if setup.tank else stated.get("fluid")
     return [
         "[[setup]]",
         f'name = "{setup.name}"',
@@ -132,8 +103,8 @@ def _setup_lines(
         f"first_label = [{setup.first_label[0]}, {setup.first_label[1]}]",
         f"noise_percent = {stated['noise_percent']}",
         *([f"resolution_hz = {stated['resolution_hz']}"] if "resolution_hz" in stated else []),
-        *([f"air = {stated['air']}"] if "air" in stated and not setup.tank else []),
-        *([f"fluid = {fluid}"] if fluid else []),
+        *([f"air = {stated['air']}"] if "air" in stated else []),
+        *([f"fluid = {stated['fluid']}"] if "fluid" in stated else []),
         "",
         "[setup.frequencies_hz]",
         *(f'"({m},{n})" = {value:.9g}' for (m, n), value in sorted(hertz.items(), key=lambda item: item[1])),

@@ -1,11 +1,10 @@
-"""The experiments that are simulated, on spruce boards and on a steel plate, and how large each effect is on them."""
+"""The experiments that are simulated, on spruce boards, and how large each effect is on them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from generator.effects import FluidLoading
 from generator.naming import Label
 from generator.plate import EDGES, Plate
 
@@ -18,11 +17,6 @@ MEDIANS = {"E_x": (11.5e9, 1.12), "E_y": (0.90e9, 1.15), "G_xy": (0.70e9, 1.12)}
 
 SHEAR_MEANS = {"G_xz": (0.65e9, 0.15e9), "G_yz": (0.03e9, 0.01e9)}
 """Mean and sd, Pa, of literature values, as cards state them."""
-
-
-STEEL_MEDIANS = {"E_x": (205.0e9, 1.03)}
-STEEL_POISSON = (0.29, 0.01)
-"""Of an isotropic plate: the one modulus likewise, mean and sd of its Poisson ratio, as its card states them."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +33,6 @@ class Setup:
         The laboratory's label of the lowest beam orders.
     covered : float, m
         What the clamp at x = 0 covers.
-    tank : float, kg m^-3
-        Density of a liquid that the board is held in, far from walls and surface; 0: the board is in air.
     """
 
     name: str
@@ -48,12 +40,6 @@ class Setup:
     beams: tuple[Label, ...]
     first_label: Label = (0, 0)
     covered: float = 0.0
-    tank: float = 0.0
-
-    @property
-    def surroundings(self) -> tuple[FluidLoading, ...]:
-        """What acts in this setup whatever is planted, and is known: the liquid of a tank."""
-        return (FluidLoading(self.tank, 0.0),) if self.tank else ()
 
     def label(self, beams: Label) -> Label:
         """The laboratory's label of beam orders."""
@@ -92,8 +78,6 @@ class Design:
         Effects of the library that a random board may have: those with a visible trace on this design.
     drawn_outside : tuple of str
         Those outside the library likewise.
-    isotropic : bool
-        A plate of steel: one modulus and a Poisson ratio, in place of spruce.
     """
 
     name: str
@@ -105,7 +89,6 @@ class Design:
     nominal: Mapping[str, float] = field(hash=False)
     drawn: tuple[str, ...] = ()
     drawn_outside: tuple[str, ...] = ("rib", "crack")
-    isotropic: bool = False
 
     @property
     def mass(self) -> float:
@@ -138,7 +121,6 @@ _CANTILEVER_SIZES = {
     "rib": 0.02,  # N m^2
 }
 _FREE_SIZES = {**_COMMON, "attached_mass": 3e-3, "support_stiffness": 3000.0, "rib": 0.25, "exciter": 0.2}
-_STEEL_SIZES = {**_FREE_SIZES, "attached_mass": 30e-3, "support_stiffness": 3e6, "rib": 50.0, "exciter": 1.0}
 _CLAMPED_SIZES = {
     **_COMMON,
     "attached_mass": 10e-3,
@@ -164,13 +146,6 @@ _FREE_MODES: tuple[Label, ...] = (
 _CLAMPED_MODES: tuple[Label, ...] = (
     (0, 0), (0, 1), (1, 0), (1, 1), (0, 2), (1, 2), (2, 0), (0, 3), (2, 1),
 )  # fmt: skip
-
-
-_STEEL_MODES: tuple[Label, ...] = (
-    (2, 0), (1, 1), (2, 1), (3, 0), (0, 2), (1, 2), (3, 1), (2, 2),
-)  # fmt: skip
-_IN_AIR = Setup("air", ALL_FREE, _STEEL_MODES)
-_IN_WATER = Setup("water", ALL_FREE, _STEEL_MODES[:5], tank=997.0)
 
 
 def _cantilever(n_modes: int, covered: float = 0.0) -> Setup:
@@ -211,16 +186,3 @@ DESIGNS: dict[str, Design] = {
         ),
     )
 }
-STEEL_DESIGNS: dict[str, Design] = {
-    name: Design(
-        name,
-        *(0.270, 0.1495, 8.96e-3, 7800.0),
-        setups=setups,
-        nominal=_STEEL_SIZES,
-        drawn=("transverse_shear", "attached_mass"),
-        drawn_outside=("rib",),
-        isotropic=True,
-    )
-    for name, setups in (("steel-8", (_IN_AIR,)), ("steel-air-water", (_IN_AIR, _IN_WATER)))
-}
-"""Those on an isotropic plate, in air and in a tank; apart, as the trial is drawn over the others."""

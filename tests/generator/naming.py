@@ -59,21 +59,9 @@ def named(modes: Modes, edges: Mapping[str, str]) -> dict[Label, tuple[float, fl
 def frequencies(
     plate: Plate, effects: Sequence[NoEffect], labels: Sequence[Label], n: tuple[int, int] | None = None
 ) -> tuple[dict[Label, float], float]:
-    """Frequencies of labelled modes, averaged over the places of a roving mass.
+    """Frequencies (Hz) of labelled modes, averaged over the places of a roving mass, and the smallest correlation.
 
-    Parameters
-    ----------
-    plate : Plate
-    effects : sequence of effects
-    labels : sequence of (int, int)
-        Beam orders.
-    n : (int, int), optional
-        Polynomials along x and along y.
-
-    Returns
-    -------
-    dict, float
-        Beam orders -> Hz, and the smallest correlation; 0 if a label was not among the lowest modes.
+    The correlation is 0 if a label was not among the lowest modes; n: polynomials along x and along y.
     """
     runs: list[tuple[NoEffect, ...]] = [()]
     for effect in effects:

@@ -91,21 +91,9 @@ def _mass(basis: Basis, n_x: int, n_y: int, baffled: bool) -> Floats:
 
 @lru_cache(maxsize=32)
 def air_mass(basis: Basis, baffled: bool, n_panels: int = PANELS) -> Floats:
-    """Mass of the air at unit density on the unknowns of a basis: (size, size) array, m^3 per unit density.
+    """Mass of the air on both faces at unit density on the unknowns of a basis: (size, size) array, m^3.
 
-    Two lattices, extrapolated to none by the second order of both methods.
-
-    Parameters
-    ----------
-    basis : Basis
-    baffled : bool
-        In a rigid wall, or in the open with all edges free to the air; both faces wet.
-    n_panels : int
-        Of the coarser lattice.
-
-    Returns
-    -------
-    (size, size) array, m^3
+    In a rigid wall, or in the open; two lattices, extrapolated to none by the second order of both methods.
     """
     n_x, n_y = (2 * ((n + 1) // 2) for n in lattice(basis.L_x, basis.L_y, n_panels))
     coarse, fine = _mass(basis, n_x, n_y, baffled), _mass(basis, 3 * n_x // 2, 3 * n_y // 2, baffled)

@@ -250,21 +250,7 @@ class Modes:
 
 
 def solve(plate: Plate, effects: Sequence[Effect] = (), n_modes: int = 24, n: Counts | None = None) -> Modes:
-    """Lowest modes of a plate with effects.
-
-    Parameters
-    ----------
-    plate : Plate
-    effects : sequence of Effect
-    n_modes : int
-        How many, rigid motions counted.
-    n : (int, int), optional
-        Polynomials along x and along y.
-
-    Returns
-    -------
-    Modes
-    """
+    """Lowest modes of a plate with effects, rigid motions counted; n: polynomials along x and along y."""
     for effect in effects:
         plate = effect.changed(plate)
     basis = plate.basis(n)

@@ -25,16 +25,9 @@ Draw = Callable[[np.random.Generator, Design, float], Parameters]
 
 @dataclass(frozen=True)
 class Recipe:
-    """How to draw an effect.
+    """How to draw an effect's parameters at a size, to make it of them, and whether it can act in a setup.
 
-    Attributes
-    ----------
-    draw : callable
-        (rng, design, size) -> parameters in SI units; size multiplies the nominal amplitude, compliance if a spring.
-    make : callable
-        Parameters -> effect.
-    acts : callable
-        Whether it can act in a setup.
+    Size multiplies the nominal amplitude; of a spring, the compliance.
     """
 
     draw: Draw
@@ -58,13 +51,8 @@ def _compliance(parameter: str, nominal: str) -> Draw:
 
 
 def _shear(rng: np.random.Generator, design: Design, size: float) -> Parameters:
-    """Log-normal with the mean and sd of the card, cut at two sd; size divides both.
-
-    An isotropic plate has no others than its G.
-    """
+    """Log-normal with the mean and sd of the card, cut at two sd; size divides both."""
     drawn: Parameters = {}
-    if design.isotropic:
-        return drawn
     for name, (mean, sd) in SHEAR_MEANS.items():
         spread = np.sqrt(np.log1p((sd / mean) ** 2))
         drawn[name] = float(mean * np.exp(spread * np.clip(rng.standard_normal(), -2.0, 2.0) - 0.5 * spread**2) / size)
@@ -153,7 +141,7 @@ def _make(effect: type[NoEffect]) -> Callable[[Parameters], NoEffect]:
 
 LIBRARY: dict[str, Recipe] = {
     "transverse_shear": Recipe(_shear, _make(effects.TransverseShear)),
-    "fluid_loading": Recipe(_air, _make(effects.FluidLoading), lambda setup: not setup.tank),
+    "fluid_loading": Recipe(_air, _make(effects.FluidLoading)),
     "attached_mass": Recipe(_attached, _make(effects.AttachedMass)),
     "exciter": Recipe(_exciter, _make(Exciter)),
     "warp": Recipe(_warp, _make(Warp)),
@@ -192,5 +180,3 @@ OUTSIDE: dict[str, Recipe] = {
 RECIPES = LIBRARY | OUTSIDE
 KNOWN_SIZE = ("transverse_shear", "fluid_loading")
 """Effects whose size nature sets: they are left alone when a size is asked for, unless that is asked for too."""
-OF_WOOD = ("grain_angle", "poisson_ratio", "stiffness_gradient")
-"""Effects that an isotropic plate cannot have: they would leave it one no longer."""

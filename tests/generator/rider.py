@@ -11,15 +11,7 @@ from generator.basis import Floats
 
 @dataclass(frozen=True)
 class Rider:
-    """A body that hangs on the board by a spring and moves by itself: one more coordinate of the pencil.
-
-    Attributes
-    ----------
-    mass : float, kg
-    spring : float, N m^-1
-    moved : (size,) array
-        Deflection of the board's unknowns where the spring is fixed.
-    """
+    """Mass (kg), spring (N/m), and the deflection of the board's unknowns where the spring is fixed, (size,)."""
 
     mass: float
     spring: float

@@ -19,18 +19,7 @@ Place = tuple[float, float]
 
 @dataclass(frozen=True)
 class Ringing:
-    """Damped modes of a board between places.
-
-    Attributes
-    ----------
-    hertz : (n_modes,) array
-        Undamped frequencies.
-    damping : (n_modes,) array
-        Ratio to the critical one.
-    masses : (n_modes,) array, kg
-        Modal masses of the shapes.
-    modes : ritz.Modes
-    """
+    """Damped modes of a board: undamped frequencies, damping ratios and modal masses (kg), each (n_modes,)."""
 
     hertz: Floats
     damping: Floats
@@ -59,20 +48,7 @@ def ringing(
     sensor: Place = (0.0, 0.0),
     sensor_mass: float = 0.0,
 ) -> Ringing:
-    """The lowest modes of a plate that carries a sensor.
-
-    Parameters
-    ----------
-    plate : ritz.Plate
-    n_modes : int
-    damping : (n_modes,) array
-    sensor : (float, float), m
-    sensor_mass : float, kg
-
-    Returns
-    -------
-    Ringing
-    """
+    """The lowest modes of a plate that carries a sensor (m, kg)."""
     basis = ritz.Ritz(plate)
     along_x, along_y = basis.sides
     there = np.kron(along_x.values(np.array([sensor[0]]))[0], along_y.values(np.array([sensor[1]]))[0])
@@ -102,20 +78,7 @@ class Blow:
 def recorded(
     board: Ringing, hammer: Place, sensor: Place, blows: Sequence[Blow], rate: float, duration: float
 ) -> tuple[Floats, Floats]:
-    """Force (N) and acceleration (m/s^2) at the samples of a recording.
-
-    Parameters
-    ----------
-    board : Ringing
-    hammer, sensor : (float, float), m
-    blows : sequence of Blow
-    rate : float, Hz
-    duration : float, s
-
-    Returns
-    -------
-    force, acceleration : (n_samples,) array
-    """
+    """Force (N) and acceleration (m/s^2) at the samples of a recording: two (n_samples,) arrays."""
     times = np.arange(round(duration * rate)) / rate
     force, acceleration = np.zeros_like(times), np.zeros_like(times)
     residues = board.residues(hammer, sensor)

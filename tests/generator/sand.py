@@ -26,24 +26,8 @@ def photograph(
 ) -> Floats:
     """A picture of the sand on a board that rings in one shape, cropped to the board: shades, rows downward.
 
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    shape : callable
-        Deflection at x and y, m, on the grid that they span.
-    sides : (float, float), m
-    turn : float, degrees
-        By up to which the board is turned on the picture.
-    slant : float
-        Share by up to which one end is smaller than the other.
-    missing : float
-        Share of the board that up to so much of the sand has been lost from.
-    grain : float
-        Noise of the picture over the contrast of the sand.
-
-    Returns
-    -------
-    (n_rows, n_columns) array
+    shape: deflection on the grid that x and y (m) span; turned by up to so many degrees, one end smaller by up to the
+    share slant; missing: share of the board that has lost its sand; grain: noise over the contrast of the sand.
     """
     L_x, L_y = sides
     columns, rows = _WIDTH, max(round(_WIDTH * L_y / L_x), 40)

@@ -11,13 +11,7 @@ from generator.basis import Basis, Floats, edge_points, symmetric
 
 @dataclass(frozen=True)
 class Spring:
-    """What holds an edge that is not rigidly clamped; infinity is rigid.
-
-    Attributes
-    ----------
-    rotation : float, N (N m per m and rad)
-    translation : float, N m^-2 (N per m and m)
-    """
+    """What holds an edge: N (N m per m and rad) against rotation, N m^-2 against translation; infinity is rigid."""
 
     rotation: float = np.inf
     translation: float = np.inf

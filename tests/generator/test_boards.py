@@ -11,18 +11,14 @@ import pytest
 
 from bayesplate.board.board import Board
 from bayesplate.board.checks import physical_faults
-from generator.__main__ import main
 from generator.boards import plant
 from generator.card import told
-from generator.designs import DESIGNS, STEEL_DESIGNS
-from generator.effects import FluidLoading
-from generator.naming import frequencies, named
+from generator.designs import DESIGNS
+from generator.naming import named
 from generator.plate import solve
-from generator.recipes import OUTSIDE, RECIPES
+from generator.recipes import RECIPES
 
 FOLDER = Path(__file__).parent
-TRIED = ("clamped-9", "cantilever-6-free-6")
-"""Designs that between them have every kind of edge."""
 
 
 @pytest.fixture
@@ -31,19 +27,23 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(20)
 
 
-@pytest.mark.parametrize("design", [DESIGNS[name] for name in TRIED], ids=TRIED)
-def test_every_effect_of_a_design_moves_its_labelled_modes(design, rng: np.random.Generator) -> None:
-    """By 1 to 150 cents rms at nominal size, air on the light clamped board most; the package reads every card."""
-    for effect in (*design.drawn, *design.drawn_outside):
-        board = plant(rng, design, [effect])
-        shifts = np.array([cents for setup in board.shifts().values() for cents in setup.values()])
-        card = Board.from_text(board.card_text(), "planted.toml")
+@pytest.mark.parametrize("name", ["clamped-9", "cantilever-6-free-6"])
+def test_every_effect_of_a_design_moves_its_labelled_modes(name, rng: np.random.Generator) -> None:
+    """By 1 to 150 cents rms at nominal size, air on the light clamped board most; the package reads every card.
 
-        assert list(board.truth.effects) == [effect]
-        assert board.truth.is_in_library == (effect not in OUTSIDE)
-        assert len(shifts) == sum(len(setup.beams) for setup in design.setups)
-        assert 1.0 < np.sqrt(np.mean(shifts**2)) < 150.0, effect
-        assert not list(physical_faults(card))
+    Warp and exciter come from wide priors: over two boards. The designs have every kind of edge between them.
+    """
+    design = DESIGNS[name]
+    for effect, n in [*((e, 1) for e in (*design.drawn, *design.drawn_outside)), ("warp", 2), ("exciter", 2)]:
+        boards = [plant(rng, design, [effect]) for _ in range(n)]
+        shifts = [cents for board in boards for setup in board.shifts().values() for cents in setup.values()]
+        card = boards[0].card_text()
+
+        assert list(boards[0].truth.effects) == [effect]
+        assert len(shifts) == n * sum(len(setup.beams) for setup in design.setups)
+        assert 1.0 < np.sqrt(np.mean(np.square(shifts))) < 150.0, effect
+        assert "warp_mm" not in card
+        assert not list(physical_faults(Board.from_text(card, "planted.toml")))
 
 
 def test_labels_are_the_lowest_modes_of_the_nominal_cantilever() -> None:
@@ -127,15 +127,6 @@ def test_card_says_what_a_laboratory_would_know(rng: np.random.Generator) -> Non
     assert card["plate"]["length_y_mm"]["at_x_mm"] == [0, 126.5, 253]
     assert card["material"]["poisson_xy"] == 0.4
     assert free["frequencies_hz"]["(1,1)"] == pytest.approx(board.readings["free"][1, 1], rel=1e-8)
-    silent = plant(rng, "cantilever-6", ["attached_mass"], places_known=False)
-    assert "attached" not in silent.card_text()
-
-
-def test_same_seed_same_board() -> None:
-    first, second, other = (plant(np.random.default_rng(seed), "clamped-9", size=None) for seed in (4, 4, 5))
-
-    assert first.card_text() == second.card_text()
-    assert first.card_text() != other.card_text()
 
 
 def test_air_and_shear_keep_their_physical_size_unless_told(rng: np.random.Generator) -> None:
@@ -148,23 +139,13 @@ def test_air_and_shear_keep_their_physical_size_unless_told(rng: np.random.Gener
     assert doubled == pytest.approx(2.4, rel=0.04)
 
 
-@pytest.mark.parametrize("effect", ["membrane_tension", "support_mass", "support_stiffness"])
-def test_an_effect_that_cannot_act_is_refused(effect: str, rng: np.random.Generator) -> None:
-    with pytest.raises(ValueError, match=f"wanted one that acts on cantilever-6, got {effect}"):
+@pytest.mark.parametrize(
+    ("effect", "words"),
+    [("support_mass", "one that acts on cantilever-6, got support_mass"), ("gravity", "one of .*, got gravity")],
+)
+def test_an_effect_that_cannot_act_or_is_unknown_is_refused(effect: str, words: str, rng: np.random.Generator) -> None:
+    with pytest.raises(ValueError, match=f"wanted {words}"):
         plant(rng, "cantilever-6", [effect])
-
-
-def test_an_unknown_effect_is_refused(rng: np.random.Generator) -> None:
-    with pytest.raises(ValueError, match=r"wanted one of transverse_shear, .*, got gravity"):
-        plant(rng, "cantilever-6", ["gravity"])
-
-
-def test_command_prints_a_card(capsys: pytest.CaptureFixture[str]) -> None:
-    main(["--design", "cantilever-6", "--effect", "attached_mass", "--seed", "3", "--truth"])
-    card, truth = capsys.readouterr()
-
-    assert tomllib.loads(card)["setup"][0]["attached"][0]["kind"] == "accelerometer"
-    assert '"attached_mass": {"mass":' in truth
 
 
 def test_nothing_comes_from_the_package() -> None:
@@ -184,22 +165,6 @@ def test_every_recipe_has_a_design() -> None:
     drawn = {effect for design in DESIGNS.values() for effect in (*design.drawn, *design.drawn_outside)}
 
     assert set(RECIPES) - drawn == {"outline_profile", "warp", "exciter"}
-
-
-@pytest.mark.parametrize("effect", ["warp", "exciter"])
-@pytest.mark.parametrize("design", [DESIGNS[name] for name in TRIED], ids=TRIED)
-def test_warp_and_exciter_of_every_design(design, effect: str) -> None:
-    """Rms over two boards of 1 to 150 cents at nominal size: both are drawn from wide priors; the card is silent."""
-    boards = [plant(np.random.default_rng(seed), design, [effect]) for seed in (1, 2)]
-    shifts = np.array([c for board in boards for setup in board.shifts().values() for c in setup.values()])
-    card = tomllib.loads(boards[0].card_text())
-
-    assert 1.0 < np.sqrt(np.mean(shifts**2)) < 150.0
-    assert "warp_mm" not in card["plate"]
-    if effect == "exciter":
-        (x, y), attached = boards[0].truth.effects["exciter"]["places"][0], card["setup"][0]["attached"]
-        assert attached == [{"kind": "exciter", "at_mm": pytest.approx([1e3 * x, 1e3 * y], rel=1e-5)}]
-    assert not list(physical_faults(Board.from_text(boards[0].card_text(), "planted.toml")))
 
 
 def test_card_states_what_scales_and_a_straightedge_say(rng: np.random.Generator) -> None:
@@ -227,38 +192,3 @@ def test_card_states_what_scales_and_a_straightedge_say(rng: np.random.Generator
     assert len(exciter["at_mm"]) == len(sensor["at_mm"]) == 2
     assert card["setup"][0]["fluid"] == {"density_kg_m3": 1.2, "baffle": "none"}
     assert not list(physical_faults(Board.from_text(text, "planted.toml")))
-    somewhere = plant(rng, "clamped-9", ["exciter"], places_known=False)
-    (only,) = tomllib.loads(somewhere.card_text(told(somewhere.truth.effects)))["setup"][0]["attached"]
-    assert "at_mm" not in only
-    assert only["magnet"] == "free"
-    assert "attached" not in tomllib.loads(somewhere.card_text())["setup"][0]
-
-
-@pytest.mark.parametrize("design", STEEL_DESIGNS.values(), ids=STEEL_DESIGNS)
-def test_steel_plates_are_isotropic(design, rng: np.random.Generator) -> None:
-    board = plant(rng, design, ["transverse_shear"], noise_cents=0.0)
-    true = board.truth.constants
-    material = tomllib.loads(board.card_text())["material"]
-
-    assert true["E_x"] == true["E_y"]
-    assert true["G_xy"] == pytest.approx(0.5 * true["E_x"] / (1.0 + true["nu_xy"]))
-    assert material == {"isotropic": True, "poisson_xy": {"mean": 0.29, "sd": 0.01}}
-    assert all(-80.0 < cents < -5.0 for cents in board.shifts()["air"].values())
-    with pytest.raises(ValueError, match="got grain_angle"):
-        plant(rng, design, ["grain_angle"])
-
-
-def test_a_plate_in_a_tank_is_in_water_whatever_is_planted(rng: np.random.Generator) -> None:
-    """Its card says so, and air acts in the other setup alone; a fifth to a third lower than in air."""
-    design = STEEL_DESIGNS["steel-air-water"]
-    board = plant(rng, design, ["fluid_loading"], noise_cents=0.0)
-    in_air, in_water = tomllib.loads(board.card_text())["setup"]
-    setup = design.setups[1]
-    wet = frequencies(design.plate(setup, board.truth.constants), [FluidLoading(997.0, 0.0)], setup.beams)[0]
-
-    assert board.readings["water"] == wet
-    assert in_water["fluid"] == {"density_kg_m3": 997, "baffle": "none"}
-    assert "fluid" not in in_air
-    assert all(0.67 < hz / board.readings["air"][label] < 0.84 for label, hz in wet.items())
-    assert set(board.shifts()["water"].values()) == {0.0}
-    assert all(-5.0 < cents < 0.0 for cents in board.shifts()["air"].values())

@@ -19,7 +19,6 @@ QUARTER = ((0.25 * DRIVEN.L_x, 0.25 * DRIVEN.L_y),)
 THIRD = ((DRIVEN.L_x / 3.0, DRIVEN.L_y / 3.0),)
 MIDDLE = ((0.5 * DRIVEN.L_x, 0.5 * DRIVEN.L_y),)
 TABLE = {
-    "28 Hz": (28.0, QUARTER, [20.3, 11.1, 3.2, -1.9, -1.3, -9.3]),
     "38.6 Hz": (38.6, QUARTER, [46.5, 27.2, 12.7, 14.4, 4.2, -1.8]),
     "a third in": (38.6, THIRD, [154.7, 52.9, 25.5, 14.5, 0.6, -0.1]),
 }
@@ -74,10 +73,10 @@ def test_supported_board_against_its_series_of_modes(magnet: str) -> None:
     assert 1200.0 * np.log2(found / exact) == pytest.approx(0.0, abs=0.2)
 
 
-@pytest.mark.parametrize(("resonance", "places"), [(10.0, QUARTER), (38.6, QUARTER), (38.6, MIDDLE)])
-def test_the_magnets_own_mode_takes_no_label(resonance: float, places) -> None:
+def test_the_magnets_own_mode_takes_no_label() -> None:
     """It bends the board like (0,0): in the middle, by its shape alone, it would take that label from the board."""
-    exciter = Exciter.at_resonance(resonance, 48e-3, places)
+    resonance = 38.6
+    exciter = Exciter.at_resonance(resonance, 48e-3, MIDDLE)
     modes = solve(DRIVEN, [exciter], 14)
     labels = named(modes, DRIVEN.edges)
     lowest = modes.frequencies[0]
@@ -96,12 +95,3 @@ def test_a_magnet_that_swings_with_the_board_leaves_the_label_in_doubt() -> None
     )
 
     assert doubtful < LEAST_CORRELATION < 0.9 < clear
-
-
-def test_a_roving_drive_gives_the_mean_of_its_places() -> None:
-    exciter = Exciter(48e-3, (*QUARTER, *THIRD))
-    apart = [frequencies(DRIVEN, [part], BEAMS["clamped"])[0] for part in exciter.variants()]
-    found = frequencies(DRIVEN, [exciter], BEAMS["clamped"])[0]
-
-    assert found == {mode: pytest.approx(np.mean([hz[mode] for hz in apart])) for mode in BEAMS["clamped"]}
-    assert abs(apart[0][0, 0] - apart[1][0, 0]) > 1.0

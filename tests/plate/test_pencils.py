@@ -89,9 +89,9 @@ def test_a_mass_that_is_singular_but_for_rounding_is_no_number():
     assert np.isnan(found[1:]).all()
 
 
-@pytest.mark.parametrize("nothing", [np.nan, np.inf])
-@pytest.mark.parametrize("n_kept", [N_KEPT, R])
-@pytest.mark.parametrize("spoilt", [0, 1], ids=["stiffness", "mass"])
+@pytest.mark.parametrize(
+    ("nothing", "n_kept", "spoilt"), [(np.nan, N_KEPT, 0), (np.inf, N_KEPT, 1), (np.inf, R, 0), (np.nan, R, 1)]
+)
 def test_weights_that_are_no_numbers_give_none_and_the_other_draws_stay(nothing, n_kept, spoilt):
     """A sampler or a search may ask for any plate; LAPACK refuses all matrices for one of them."""
     own, weights = a_class(*coupled(0.1, 2), n_kept)
@@ -114,9 +114,8 @@ def test_where_nothing_couples_few_vectors_are_exact():
     np.testing.assert_allclose(errors(0.0), 0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("size", [0.1, 0.6])
-def test_eigenvalues_on_few_vectors_are_never_below(size):
-    assert errors(size).min() > -1e-10
+def test_eigenvalues_on_few_vectors_are_never_below():
+    assert errors(0.6).min() > -1e-10
 
 
 def test_a_step_takes_off_what_the_centre_cuts_by_the_ratio_of_wanted_to_cut_modes():

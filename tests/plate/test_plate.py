@@ -18,8 +18,9 @@ from bayesplate.plate.shear import SHEAR_FLEXIBLE, shear_flexible_plate
 from bayesplate.plate.terms import AlongEdges, Amount, AtPlaces, OnDeflections, OverPlate, Parity, Weights
 from bayesplate.plate.thin import THIN, thin_plate
 
-ENDS = list(product(("clamped", "supported", "free"), repeat=2))
-EDGES = [pytest.param(x, y, id="".join(end[0] for end in x + y)) for x, y in product(ENDS, ENDS)]
+WORDS = {"c": "clamped", "s": "supported", "f": "free"}
+EDGES = ("cccc", "ffff", "cfff", "sfff", "ssff", "sfsf", "fcsc", "csfs", "scsf", "fscf")
+"""At x0, x1, y0 and y1: every pair of ends along x, every one along y, and every number of rigid motions."""
 FREE = ("free", "free")
 MESH = (6, 4)
 SPRUCE = Weights(np.array([5.35, 0.75, 0.31, 1.0]), np.ones(1))
@@ -27,16 +28,10 @@ SPRUCE = Weights(np.array([5.35, 0.75, 0.31, 1.0]), np.ones(1))
 # Polynomials f(x) g(y) on the unit square, and by hand: int w_xx^2, int w_yy^2, 2 int w_xx w_yy, int w_xy^2, int w^2.
 ENERGIES = {
     "x^2 + y^2": (4.0, 4.0, 8.0, 0.0, 28 / 45),
-    "xy": (0.0, 0.0, 0.0, 1.0, 1 / 9),
-    "x^2 y": (4 / 3, 0.0, 0.0, 4 / 3, 1 / 15),
-    "x^2 y^2": (4 / 5, 4 / 5, 8 / 9, 16 / 9, 1 / 25),
     "x^3 y^2": (12 / 5, 4 / 7, 8 / 5, 12 / 5, 1 / 35),
 }
 PRODUCTS = {
     "x^2 + y^2": [(2, 0), (0, 2)],
-    "xy": [(1, 1)],
-    "x^2 y": [(2, 1)],
-    "x^2 y^2": [(2, 2)],
     "x^3 y^2": [(3, 2)],
 }
 
@@ -68,9 +63,10 @@ def two_dimensional():
     return BilinearForm(energy).assemble(basis), BilinearForm(lambda u, v, w: u * v).assemble(basis), basis
 
 
-@pytest.mark.parametrize(("ends_x", "ends_y"), EDGES)
-def test_classes_together_have_the_spectrum_of_the_two_dimensional_element(two_dimensional, ends_x, ends_y):
+@pytest.mark.parametrize("edges", EDGES)
+def test_classes_together_have_the_spectrum_of_the_two_dimensional_element(two_dimensional, edges):
     """The element knows nothing of lines, products and symmetry: the classes must lose and add no mode."""
+    ends_x, ends_y = ([WORDS[one] for one in edges[at : at + 2]] for at in (0, 2))
     stiffness, mass, basis = two_dimensional
     held = {"left": ends_x[0], "right": ends_x[1], "bottom": ends_y[0], "top": ends_y[1]}
     along = {"left": "u_y", "right": "u_y", "bottom": "u_x", "top": "u_x"}
@@ -82,19 +78,15 @@ def test_classes_together_have_the_spectrum_of_the_two_dimensional_element(two_d
     kept = np.setdiff1d(np.arange(basis.N), np.concatenate(fixed))
     expected = eigh(stiffness[kept][:, kept].toarray(), mass[kept][:, kept].toarray(), eigvals_only=True)[:12]
 
-    plate = thin_plate(ends_x, ends_y, *MESH)
-    eigenvalues = np.sort(np.concatenate([spectrum(own, SPRUCE) for own in plate.classes]))
+    plate = thin_plate(tuple(ends_x), tuple(ends_y), *MESH)
+    found = [spectrum(own, SPRUCE) for own in plate.classes]
+    eigenvalues = np.sort(np.concatenate(found))
 
     assert eigenvalues.size == kept.size
     # Rigid motions are zero to rounding: 1e-8 of the highest of the twelve.
     np.testing.assert_allclose(eigenvalues[:12], expected, rtol=1e-8, atol=1e-8 * expected[-1])
-
-
-@pytest.mark.parametrize(("ends_x", "ends_y"), EDGES)
-def test_zero_eigenvalues_are_counted_for_every_support(ends_x, ends_y):
     # Lowest elastic eigenvalues of these boards lie above 1; zeros come out below 1e-9.
-    for own in thin_plate(ends_x, ends_y, *MESH).classes:
-        assert np.sum(spectrum(own, SPRUCE) < 1e-4) == own.n_rigid
+    assert [np.sum(one < 1e-4) for one in found] == [own.n_rigid for own in plate.classes]
 
 
 @pytest.mark.parametrize(
@@ -102,7 +94,6 @@ def test_zero_eigenvalues_are_counted_for_every_support(ends_x, ends_y):
     [
         (FREE, ("clamped", "clamped"), [(0, 0), (0, 1), (1, 0), (1, 1)]),
         (("clamped", "free"), FREE, [(0, 0), (0, 1)]),
-        (FREE, ("clamped", "supported"), [(0, 0), (1, 0)]),
         (("clamped", "free"), ("supported", "free"), [(0, 0)]),
     ],
 )
@@ -114,7 +105,7 @@ def test_classes_are_those_of_like_opposite_edges(ends_x, ends_y, parities):
         assert plate.symmetry_class(plate.parity(beams)).parity in parities
 
 
-@pytest.mark.parametrize("parity", [Parity(0, 0), Parity(0, 1), Parity(1, 0), Parity(1, 1)])
+@pytest.mark.parametrize("parity", [Parity(0, 1), Parity(1, 0)])
 def test_deflections_have_the_parity_of_their_class(parity):
     own = thin_plate(FREE, ("clamped", "clamped"), 4, 6).symmetry_class(parity)
     deflections = own.deflections(np.random.default_rng(3).standard_normal((own.n_dof, 2)))
@@ -133,7 +124,7 @@ def _each_its_own(deflections, x, y):
     return np.stack([deflections.on(x[:1], y)[:, 0], deflections.on(x[1:], 1 - y)[:, 0]], axis=1)
 
 
-@pytest.mark.parametrize("parity", [Parity(0, 0), Parity(0, 1), Parity(1, 0), Parity(1, 1)])
+@pytest.mark.parametrize("parity", [Parity(0, 0), Parity(1, 0)])
 @pytest.mark.parametrize("outline", [None, lambda x: (0.1 + 0.0 * x, 0.9 + 0.0 * x)], ids=["rectangle", "outline"])
 def test_integrals_of_deflections_are_sums_over_the_plate(parity, outline):
     x, y = (line(ends, 4, n_points=N_POINTS_CUT) for ends in (("clamped", "clamped"), FREE))
@@ -199,9 +190,8 @@ def test_the_pencil_of_a_class_is_its_terms_on_every_unknown(kinematics, is_spli
             np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("kinematics", [THIN, SHEAR_FLEXIBLE], ids=["thin", "shear-flexible"])
-def test_energies_are_the_diagonals_of_the_terms(kinematics):
-    (own,) = varied(kinematics, is_split=False).classes
+def test_energies_are_the_diagonals_of_the_terms():
+    (own,) = varied(SHEAR_FLEXIBLE, is_split=False).classes
     plate = own.plate.with_terms([OnDeflections(mean_square)], [OnDeflections(mean_square)])
     (own,) = plate.classes
     vectors = np.random.default_rng(6).standard_normal((own.n_dof, 3))
@@ -211,9 +201,8 @@ def test_energies_are_the_diagonals_of_the_terms(kinematics):
         np.testing.assert_allclose(found, diagonals.T, rtol=1e-9, atol=1e-12 * np.abs(diagonals).max())
 
 
-@pytest.mark.parametrize("kinematics", [THIN, SHEAR_FLEXIBLE], ids=["thin", "shear-flexible"])
-def test_pencils_on_a_span_have_the_terms_that_exist_on_deflections_too(kinematics):
-    plate = varied(kinematics, is_split=True)
+def test_pencils_on_a_span_have_the_terms_that_exist_on_deflections_too():
+    plate = varied(SHEAR_FLEXIBLE, is_split=True)
     plate = plate.with_terms([OnDeflections(mean_square)], [OnDeflections(mean_square)])
     own = plate.classes[0]
     draws = [some_weights(plate, seed) for seed in range(3)]
@@ -238,7 +227,7 @@ def test_what_the_masses_give_to_coordinates_beside_the_plate():
     np.testing.assert_allclose(found[-1], [[1.0 + 9.0, 2.0 + 12.0], [14.0, 4.0 + 16.0]])
 
 
-@pytest.mark.parametrize("ends", [("clamped", "free"), ("supported", "clamped"), ("clamped", "clamped")])
+@pytest.mark.parametrize("ends", [("supported", "clamped"), ("clamped", "clamped")])
 def test_at_a_clamp_a_shear_flexible_plate_does_not_turn(ends):
     """Its deflection meets the clamp at the angle of the shear strain, and nothing else holds its slope there."""
     at = tuple(end == "clamped" for end in ends)

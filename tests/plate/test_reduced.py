@@ -29,8 +29,6 @@ WANTED = {
 }
 HALF_WIDTHS = np.array([0.3, 0.3, 0.24])
 """Of ln(D_x / D_s), ln(D_y / D_s) and nu_xy: three standard deviations of a six-mode fit of one board."""
-TOLERANCES = 0.1, 1.0
-"""Cents: of a law for a careful laboratory, and of a usual one, a fifth of 0.3 %."""
 CORNERS = [np.array(signs) for signs in product((-1.0, 1.0), repeat=3)]
 
 
@@ -59,8 +57,8 @@ def named(name):
 
 
 @cache
-def prepared(name, tolerance=TOLERANCES[0]):
-    """The law for a box around the centre."""
+def prepared(name, tolerance=0.1):
+    """The law for a box around the centre, to a tolerance in cents: that of a careful laboratory."""
     board, _ = WANTED[name]
     plate, found = named(name)
     centre, *corners = (weights_at(board, point) for point in (np.zeros(3), *CORNERS))
@@ -81,33 +79,31 @@ def trial(name, n_draws=16):
 
 
 @pytest.mark.parametrize("name", WANTED)
-def test_frequencies_hold_within_half_a_cent_where_nothing_was_trained(name):
-    """Of a law that was asked for a tenth of one."""
-    draws, exact = trial(name)
+def test_frequencies_hold_where_nothing_was_trained(name):
+    """Within half a cent of a law that was asked for a tenth of one; a Ritz value on fewer vectors is never below.
 
-    worst = np.abs(cents(prepared(name).eigenvalues(draws), exact)).max()
+    Sixteen other points may hold a worse one than the few that were held out, but not by more than a factor of 3. The
+    modes at the centre are the first vectors of the basis, and a step from a mode leaves it where it is.
+    """
+    draws, exact = trial(name)
+    reduced = prepared(name)
+    errors = cents(reduced.eigenvalues(draws), exact)
+    worst = np.abs(errors).max()
+    centre = together([weights_at(WANTED[name][0], np.zeros(3))])
+    at_centre = [[mode.eigenvalue for mode in named(name)[1].values()]]
+
     meets("V11", f"full solves at 16 points, {name}", worst, at_most=0.5, unit="cents")
-
-
-@pytest.mark.parametrize("tolerance", TOLERANCES)
-@pytest.mark.parametrize("name", WANTED)
-def test_reported_error_is_honest(name, tolerance):
-    """Sixteen other points may hold a worse one than the few that were held out, but not by more than a factor of 3."""
-    draws, exact = trial(name)
-    reduced = prepared(name, tolerance)
-
-    worst = np.abs(cents(reduced.eigenvalues(draws), exact)).max()
-
-    assert reduced.worst_cents <= tolerance
     meets("V11", f"over the error that the law states, {name}", worst / reduced.worst_cents, at_most=3.0)
+    assert errors.min() > -1e-6
+    assert reduced.worst_cents <= 0.1
+    assert np.abs(cents(reduced.eigenvalues(centre), at_centre)).max() < 1e-5
 
 
-@pytest.mark.parametrize("name", WANTED)
-def test_a_basis_is_no_larger_than_its_tolerance_asks(name):
+def test_a_basis_is_no_larger_than_its_tolerance_asks():
     """Another tolerance is another basis: the widest has fewer vectors than the narrowest, which it misses."""
     sizes, errors = [], []
     for tolerance in (1e-4, 0.1, 1.0, 10.0):
-        reduced = prepared(name, tolerance)
+        reduced = prepared("free", tolerance)
         assert reduced.worst_cents <= tolerance
         sizes.append(sum(own.stiffness.shape[-1] for own in reduced.classes))
         errors.append(reduced.worst_cents)
@@ -162,28 +158,9 @@ def test_further_points_are_solved_where_the_first_ones_will_not_do(tolerance, n
     assert list(dict.fromkeys(checked)) == ([few] if n_solved == 14 else [few, (14, 6), many])
 
 
-@pytest.mark.parametrize("tolerance", TOLERANCES)
-@pytest.mark.parametrize("name", WANTED)
-def test_law_never_lies_below_the_full_solve(name, tolerance):
-    """A Ritz value on fewer vectors is an upper bound."""
-    draws, exact = trial(name)
-
-    assert cents(prepared(name, tolerance).eigenvalues(draws), exact).min() > -1e-6
-
-
-@pytest.mark.parametrize("tolerance", TOLERANCES)
-@pytest.mark.parametrize("name", WANTED)
-def test_law_is_exact_at_the_centre(name, tolerance):
-    """Its modes there are the first vectors of the basis, and a step from a mode leaves it where it is."""
-    centre = together([weights_at(WANTED[name][0], np.zeros(3))])
-    expected = [[mode.eigenvalue for mode in named(name)[1].values()]]
-
-    assert np.abs(cents(prepared(name, tolerance).eigenvalues(centre), expected)).max() < 1e-5
-
-
-@pytest.mark.parametrize("name", WANTED)
-def test_modes_of_draws_are_named_as_those_of_full_solves(name):
+def test_modes_of_draws_are_named_as_those_of_full_solves():
     """The rank of every name that is certain at points around."""
+    name = "free"
     board, names = WANTED[name]
     plate, found = named(name)
     points = [weights_at(board, point) for point in somewhere(12, 8)]
@@ -201,9 +178,9 @@ def test_modes_of_draws_are_named_as_those_of_full_solves(name):
     assert n_named > 0.9 * len(points) * len(names)
 
 
-@pytest.mark.parametrize("name", WANTED)
-def test_a_heavier_plate_has_the_same_names_as_surely(name):
+def test_a_heavier_plate_has_the_same_names_as_surely():
     """Water makes a plate ten times as heavy; a shape fits its name whatever the mass it is normalised in."""
+    name = "free"
     draws, _ = trial(name)
     reduced = prepared(name)
 
@@ -213,8 +190,8 @@ def test_a_heavier_plate_has_the_same_names_as_surely(name):
     assert sum(int(np.sum(own < 8)) for own in ranks.values()) > 0
 
 
-@pytest.mark.parametrize("name", WANTED)
-def test_eigenvalues_are_homogeneous_of_degree_one_in_the_stiffness(name):
+def test_eigenvalues_are_homogeneous_of_degree_one_in_the_stiffness():
+    name = "free"
     draws, _ = trial(name)
     reduced = prepared(name)
 
@@ -223,7 +200,7 @@ def test_eigenvalues_are_homogeneous_of_degree_one_in_the_stiffness(name):
     np.testing.assert_allclose(scaled, reduced.eigenvalues(draws) * 2.7 / 1.3, rtol=1e-10)
 
 
-@pytest.mark.parametrize("n_draws", [0, 1, 16, 511, 513])
+@pytest.mark.parametrize("n_draws", [0, 513])
 def test_many_draws_are_the_draws_one_by_one(n_draws):
     """However many are held at once."""
     draws, _ = trial("free")
@@ -236,8 +213,8 @@ def test_many_draws_are_the_draws_one_by_one(n_draws):
     np.testing.assert_allclose(found, one_by_one[which], rtol=1e-11)
 
 
-@pytest.mark.parametrize("name", WANTED)
-def test_where_there_is_no_plate_there_is_no_number(name):
+def test_where_there_is_no_plate_there_is_no_number():
+    name = "free"
     draws, _ = trial(name)
     reduced = prepared(name)
     spoilt = Weights(draws.stiffness.copy(), draws.mass.copy())
@@ -251,9 +228,9 @@ def test_where_there_is_no_plate_there_is_no_number(name):
     np.testing.assert_allclose(found[rest], reduced.eigenvalues(draws)[rest], rtol=1e-11)
 
 
-@pytest.mark.parametrize("name", WANTED)
-def test_energies_of_a_draw_sum_to_its_eigenvalue(name):
+def test_energies_of_a_draw_sum_to_its_eigenvalue():
     """The sum rule on few vectors: of each wanted mode, in the caller's order."""
+    name = "free"
     draws, _ = trial(name)
     reduced = prepared(name, 1.0)
 
@@ -264,13 +241,12 @@ def test_energies_of_a_draw_sum_to_its_eigenvalue(name):
         np.testing.assert_allclose(mass @ one.mass[0], 1.0, rtol=1e-8)
 
 
-@pytest.mark.parametrize("name", WANTED)
 @pytest.mark.parametrize("term", range(4))
-def test_linear_law_is_the_tangent_of_the_exact_law(name, term):
+def test_linear_law_is_the_tangent_of_the_exact_law(term):
     """By a central difference of the exact law at the centre."""
-    board, names = WANTED[name]
-    _, found = named(name)
-    reduced = prepared(name)
+    board, names = WANTED["cantilever"]
+    _, found = named("cantilever")
+    reduced = prepared("cantilever")
     linear = LinearLaw(np.stack([found[n].stiffness for n in names]), np.stack([found[n].mass for n in names]))
     centre = weights_at(board, np.zeros(3))
 
@@ -284,10 +260,9 @@ def test_linear_law_is_the_tangent_of_the_exact_law(name, term):
     np.testing.assert_allclose(slope(ExactLaw(reduced)) / eigenvalues, slope(linear) / eigenvalues, atol=2e-5)
 
 
-@pytest.mark.parametrize("support", ["free", "cantilever"])
-def test_a_shear_flexible_plate_is_held_within_its_tolerance_too(support):
+def test_a_shear_flexible_plate_is_held_within_its_tolerance_too():
     """Over three masses and six stiffnesses, shear moduli over a factor of two; rigid motions of the free one."""
-    board = replace(ritz.FREE_SPRUCE, edges=ritz.ALL_FREE if support == "free" else ritz.CANTILEVER)
+    board = ritz.FREE_SPRUCE
     mass = np.array([1.0, 1e-4, 1e-3])
     plate = shear_flexible_plate(*board.ends, 10, 10)
     rng = np.random.default_rng(11)
@@ -297,7 +272,7 @@ def test_a_shear_flexible_plate_is_held_within_its_tolerance_too(support):
             np.array([*board.unit_weights, 2e4, 1e3]) * np.exp([0.3, 0.3, 0.2, 0.0, 0.7, 0.7] * shares), mass
         )
 
-    names = [(1, 1), (2, 0), (0, 2), (2, 1)] if support == "free" else [(0, 0), (0, 1), (1, 0), (0, 2)]
+    names = [(1, 1), (2, 0), (0, 2), (2, 1)]
     places = [one.place for one in find(plate, at(np.zeros(6)), names).values()]
     around, held_out, unseen = ([at(s) for s in rng.uniform(-1.0, 1.0, (n, 6))] for n in (16, 6, 10))
 

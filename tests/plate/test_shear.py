@@ -29,10 +29,8 @@ from bayesplate.plate.terms import Weights
 from bayesplate.plate.thin import thin_plate
 
 SUPPORTS = {
-    "clamped": ritz.ALL_CLAMPED,
     "supported": ritz.ALL_SUPPORTED,
     "free": ritz.ALL_FREE,
-    "cantilever": ritz.CANTILEVER,
     "hinged at one edge": {"x0": "supported", "x1": "free", "y0": "free", "y1": "free"},
     "mixed": {"x0": "supported", "x1": "clamped", "y0": "clamped", "y1": "free"},
 }
@@ -139,19 +137,17 @@ def test_energies_of_polynomials_are_those_found_by_hand():
     assert energies == pytest.approx(ENERGIES, rel=1e-12)
 
 
-@pytest.mark.parametrize("powers", [(0, 0), (1, 0), (0, 1)], ids=["shift", "turn along x", "turn along y"])
-def test_rigid_motions_strain_nothing(powers):
-    """No force on any unknown from any term, beside the largest entry of its matrix."""
+def test_rigid_motions_strain_nothing():
+    """A shift and two turns: no force on any unknown from any term, beside the largest entry of its matrix."""
     x, y, own = unsplit()
-    vector = fields(x, y, powers, None, None)
+    motions = np.stack([fields(x, y, powers, None, None) for powers in ((0, 0), (1, 0), (0, 1))], axis=1)
 
     terms = own.project_stiffness(np.eye(own.n_dof))
 
-    assert max(np.abs(term @ vector).max() / np.abs(term).max() for term in terms) < 1e-12
+    assert max(np.abs(term @ motions).max() / np.abs(term).max() for term in terms) < 1e-12
 
 
-@pytest.mark.parametrize(("support", "n_rigid"), [("free", 3), ("hinged at one edge", 1), ("mixed", 0)])
-@pytest.mark.parametrize("slenderness", [20, 2000])
+@pytest.mark.parametrize(("support", "n_rigid", "slenderness"), [("free", 3, 2000), ("hinged at one edge", 1, 20)])
 def test_rigid_motions_are_left_out_and_nothing_else(support, n_rigid, slenderness):
     """Counted in the dense spectrum; the solver's lowest mode is the first one above them."""
     board = replace(with_thickness(ritz.FREE_SPRUCE, ritz.FREE_SPRUCE.L_y / slenderness), edges=SUPPORTS[support])
@@ -170,9 +166,10 @@ def test_rigid_motions_are_left_out_and_nothing_else(support, n_rigid, slenderne
     np.testing.assert_allclose(found.eigenvalues, expected[n_rigid:][:5], rtol=1e-6)
 
 
-@pytest.mark.parametrize("slenderness", [10, 2000])
 @pytest.mark.parametrize(
-    ("board", "shear_moduli"), [(ISOTROPIC, G_ISOTROPIC), (ritz.FREE_SPRUCE, G_SPRUCE)], ids=["isotropic", "spruce"]
+    ("board", "shear_moduli", "slenderness"),
+    [(ISOTROPIC, G_ISOTROPIC, 2000), (ritz.FREE_SPRUCE, G_SPRUCE, 10)],
+    ids=["isotropic", "spruce"],
 )
 def test_supported_plate_has_the_exact_spectrum(board, shear_moduli, slenderness):
     board = replace(with_thickness(board, board.L_y / slenderness), edges=ritz.ALL_SUPPORTED)
@@ -202,17 +199,16 @@ def test_frequencies_at_the_papers_means_are_those_of_its_finite_elements(name):
     np.testing.assert_allclose(frequencies, printed, atol=0.5, rtol=0.002)
 
 
-@pytest.mark.parametrize("support", ["cantilever", "clamped", "free"])
-def test_production_mesh_is_converged(support):
+@pytest.mark.parametrize("board", [ritz.FREE_SPRUCE, ritz.FINNISH], ids=["free", "cantilever"])
+def test_production_mesh_is_converged(board):
     """Six modes to 0.3 cent."""
-    board = {"clamped": ritz.FIEMME, "free": ritz.FREE_SPRUCE, "cantilever": ritz.FINNISH}[support]
 
     production, fine = (solved(board, G_SPRUCE, 6, shape).eigenvalues for shape in (None, (24, 24)))
 
     assert np.abs(cents(production, fine)).max() < 0.3
 
 
-@pytest.mark.parametrize("support", SUPPORTS)
+@pytest.mark.parametrize("support", ["hinged at one edge", "mixed"])
 def test_limit_is_the_thin_plate(support):
     """At h / L_y = 1 / 2000 with stiff shear, six modes to 0.3 cent; both plates on meshes of their own."""
     board = replace(with_thickness(ritz.FREE_SPRUCE, ritz.FREE_SPRUCE.L_y / 2000), edges=SUPPORTS[support])
@@ -223,14 +219,13 @@ def test_limit_is_the_thin_plate(support):
     assert np.abs(cents(solved(board, (10e9, 10e9), 6).eigenvalues, thin.eigenvalues)).max() < 0.3
 
 
-@pytest.mark.parametrize("support", ["clamped", "cantilever", "mixed"])
-def test_nothing_locks(support):
+def test_nothing_locks():
     """On eight elements a side the error stays within twice that of the thin plate, however thin the board is.
 
     Not just that of the thin plate, because elements graded towards free edges are the wider within; an element that
     locks would be hundreds of cents off at h / L = 1 / 20 000.
     """
-    board = replace(ISOTROPIC, edges=SUPPORTS[support])
+    board = replace(ISOTROPIC, edges=SUPPORTS["mixed"])
     weights = thin_part(weights_of(board, *G_ISOTROPIC))
     coarse, fine = (solve(thin_plate(*board.ends, n, n), weights, 3).eigenvalues for n in (8, 24))
     allowed = cents(coarse, fine).max()
@@ -279,20 +274,17 @@ def test_energies_are_the_derivatives_of_the_eigenvalues():
     np.testing.assert_allclose(mass, -modes.mass_coefficients * weights.mass, atol=1e-5)
 
 
-@pytest.mark.parametrize("support", ["clamped", "supported"])
-def test_convergence_is_of_fourth_order(support):
-    board = replace(ISOTROPIC, edges=SUPPORTS[support])
+def test_convergence_is_of_fourth_order():
+    board = replace(ISOTROPIC, edges=SUPPORTS["supported"])
     exact = navier(board, *G_ISOTROPIC, 4)
-    reference = exact if support == "supported" else solved(board, G_ISOTROPIC, 4, (24, 24)).eigenvalues
 
-    coarse, fine = (solved(board, G_ISOTROPIC, 4, (n, n)).eigenvalues / reference - 1.0 for n in (6, 12))
+    coarse, fine = (solved(board, G_ISOTROPIC, 4, (n, n)).eigenvalues / exact - 1.0 for n in (6, 12))
 
     assert np.log2(coarse / fine).min() > 3.7
 
 
-@pytest.mark.parametrize("support", ["cantilever", "mixed"])
-def test_exchanging_x_and_y_changes_nothing(support):
-    board = replace(ritz.FINNISH, edges=SUPPORTS[support])
+def test_exchanging_x_and_y_changes_nothing():
+    board = replace(ritz.FINNISH, edges=SUPPORTS["mixed"])
     exchange = [1, 0, 2, 3, 5, 4]
 
     one = solved(board, G_SPRUCE, 6, (12, 10))
@@ -303,9 +295,8 @@ def test_exchanging_x_and_y_changes_nothing(support):
     np.testing.assert_allclose(other.mass_coefficients[:, [0, 2, 1]], one.mass_coefficients, rtol=1e-5)
 
 
-@pytest.mark.parametrize("name", FINITE_ELEMENTS)
-def test_modes_keep_the_names_of_the_thin_plate(name):
-    board = FINITE_ELEMENTS[name][0]
+def test_modes_keep_the_names_of_the_thin_plate():
+    board = ritz.FINNISH
     weights = weights_of(board, *G_SPRUCE)
     beams = [(0, 0), (0, 1), (1, 0), (0, 2), (1, 1), (1, 2)]
 

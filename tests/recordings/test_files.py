@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from made_recordings import SENSOR, accelerance, board, hits, uff, wav_bytes, write_wav
@@ -39,9 +41,8 @@ def test_times_of_six_digits_give_the_rate_of_the_whole_span(tmp_path, begin):
     assert one.rate == pytest.approx(3.0 * RATE, rel=2e-4)
 
 
-@pytest.mark.parametrize("n_lost", [1, 400])
-def test_times_with_a_gap_are_refused(tmp_path, n_lost):
-    kept = np.r_[0:3000, 3000 + n_lost : HEARD.size]
+def test_times_with_a_gap_are_refused(tmp_path):
+    kept = np.delete(np.arange(HEARD.size), 3000)
 
     with pytest.raises(InputError, match=r"a\.uff set 1 time: wanted evenly spaced samples, got uneven ones"):
         read(tmp_path / "a.uff", uff([TIME | {"x": TIMES[kept], "y": HEARD[kept]}]))
@@ -54,23 +55,19 @@ def test_frequencies_are_in_the_unit_of_the_header(tmp_path, unit, factor):
     np.testing.assert_allclose(one.frequency, HERTZ, rtol=1e-5)
 
 
-REFUSED = {
-    "revolutions": ({"unit": "rpm"}, 'wanted an abscissa in hz, khz, rad/s, rad/sec, got "rpm"'),
-    "a strain": ({"top": 3}, "wanted a force or displacement, velocity, acceleration, pressure, got kind of data 3"),
-    "a motion over a motion": ({"under": 12}, "wanted a motion over a force, got acceleration over acceleration"),
-    "a force over a force": ({"top": 13}, "wanted a motion over a force, got a force over a force"),
-    "magnitudes": ({"y": np.abs(ACCELERANCE)}, "wanted a response with its phase, got one"),
-}
+REFUSED = [
+    ({"unit": "rpm"}, 'wanted an abscissa in hz, khz, rad/s, rad/sec, got "rpm"'),
+    ({"top": 3}, "wanted a force or displacement, velocity, acceleration, pressure, got kind of data 3"),
+    ({"under": 12}, "wanted a motion over a force, got acceleration over acceleration"),
+    ({"top": 13}, "wanted a motion over a force, got a force over a force"),
+    ({"y": np.abs(ACCELERANCE)}, "wanted a response with its phase, got one"),
+]
 
 
-@pytest.mark.parametrize("name", REFUSED)
-def test_a_header_that_cannot_be_honoured_is_refused(tmp_path, name):
-    changed, said = REFUSED[name]
-
-    with pytest.raises(InputError) as refused:
-        take([read(tmp_path / "a.uff", uff([{"kind": 4, "x": HERTZ, "y": ACCELERANCE} | changed]))], 400.0)
-
-    assert said in str(refused.value)
+def test_a_header_that_cannot_be_honoured_is_refused(tmp_path):
+    for changed, said in REFUSED:
+        with pytest.raises(InputError, match=re.escape(said)):
+            take([read(tmp_path / "a.uff", uff([{"kind": 4, "x": HERTZ, "y": ACCELERANCE} | changed]))], 400.0)
 
 
 def test_a_force_over_a_motion_is_turned_over(tmp_path):
@@ -81,13 +78,13 @@ def test_a_force_over_a_motion_is_turned_over(tmp_path):
     assert (one.motion, one.remarks) == ("acceleration", ("a.uff set 1: a force over acceleration, turned over",))
 
 
-@pytest.mark.parametrize("top", [{"top": 13}, {"top": 9}, {"top": 0, "top_unit": "N"}])
-def test_a_force_is_told_by_its_kind_or_its_unit(tmp_path, top):
-    sets = [{"kind": 1, "x": TIMES, "y": FORCE} | top, {"kind": 1, "x": TIMES, "y": HEARD, "top": 11}]
-    (one,) = read(tmp_path / "a.ufb", uff(sets))
+def test_a_force_is_told_by_its_kind_or_its_unit(tmp_path):
+    for top in ({"top": 13}, {"top": 9}, {"top": 0, "top_unit": "N"}):
+        sets = [{"kind": 1, "x": TIMES, "y": FORCE} | top, {"kind": 1, "x": TIMES, "y": HEARD, "top": 11}]
+        (one,) = read(tmp_path / "a.ufb", uff(sets))
 
-    np.testing.assert_allclose(one.force, FORCE, rtol=1e-9)
-    assert one.motion == "velocity"
+        np.testing.assert_allclose(one.force, FORCE, rtol=1e-9)
+        assert one.motion == "velocity"
 
 
 NO_PHASE = {
@@ -151,11 +148,10 @@ def test_a_header_that_lies_is_read_as_far_as_it_goes_with_a_remark(tmp_path, na
     assert told.startswith("a.wav: its header states ")
 
 
-@pytest.mark.parametrize("more", [b"", b"LIST" + (4).to_bytes(4, "little") + b"INFO"])
-def test_a_header_that_is_right_is_no_cause_for_a_remark(tmp_path, more):
-    (one,) = read(tmp_path / "a.wav", wav(HEARD) + more)
-
-    assert (one.response.size, one.remarks) == (HEARD.size, ())
+def test_a_header_that_is_right_is_no_cause_for_a_remark(tmp_path):
+    for more in (b"", b"LIST" + (4).to_bytes(4, "little") + b"INFO"):
+        (one,) = read(tmp_path / "a.wav", wav(HEARD) + more)
+        assert (one.response.size, one.remarks) == (HEARD.size, ())
 
 
 STEREO = {
@@ -165,8 +161,9 @@ STEREO = {
 }
 
 
-@pytest.mark.parametrize("channels", ["force,response", "response,response"])
-@pytest.mark.parametrize("name", STEREO)
+@pytest.mark.parametrize(
+    ("name", "channels"), [*zip(STEREO, ["force,response", "response,response", "force,response"], strict=True)]
+)
 def test_of_a_stereo_file_with_one_sound_that_is_taken(tmp_path, name, channels):
     first, second, said = STEREO[name]
     columns = np.stack([first, second], axis=1) / np.abs(HEARD).max()
@@ -225,15 +222,11 @@ def swept(signal: np.ndarray) -> Recording:
     )
 
 
-@pytest.mark.parametrize(
-    "other",
-    [SWEPT._replace(last=1400.0), SWEPT._replace(first=40.0), SWEPT._replace(duration=6.0)],
-)
-def test_a_sweep_that_was_not_played_is_refused_as_parameters_and_as_a_file(other):
-    heard = swept(SWEPT.signal(3000.0))
+def test_a_sweep_that_was_not_played_is_refused_as_parameters_and_as_a_file():
+    heard, other = swept(SWEPT.signal(3000.0)), SWEPT._replace(first=40.0)
     impulse_response(heard, SWEPT)
 
-    for one in (other, other.signal(3000.0)):
+    for one in (other, other.signal(3000.0), SWEPT._replace(last=1400.0), SWEPT._replace(duration=6.0)):
         with pytest.raises(InputError, match=r"s\.wav: wanted the response to this sweep, got no impulse when it is"):
             impulse_response(heard, one)
 
@@ -246,18 +239,16 @@ def test_a_linear_sweep_is_no_exponential_one():
         impulse_response(swept(linear), SWEPT)
 
 
-@pytest.mark.parametrize("is_first", [True, False])
-def test_a_channel_of_noise_beside_a_response_is_left_out(tmp_path, is_first):
+def test_a_channel_of_noise_beside_a_response_is_left_out(tmp_path):
     """An input to which nothing is connected."""
     noise = 2e-3 * np.random.default_rng(4).standard_normal(HEARD.size) * np.abs(HEARD).max()
-    columns = np.stack([noise, HEARD] if is_first else [HEARD, noise], axis=1)
+    columns = np.stack([HEARD, noise], axis=1)
     wavfile.write(tmp_path / "a b.wav", RATE, np.round(2.0**14 * columns / np.abs(HEARD).max()).astype(np.int16))
 
     taken = take([read(tmp_path / "a b.wav", channels="response,response")], 400.0)
 
     assert len(taken.spectra.names) == 1
-    channel = 1 if is_first else 2
-    assert taken.remarks == (f"a b.wav channel {channel} left out: no hit stands out of its noise (is it connected?)",)
+    assert taken.remarks == ("a b.wav channel 2 left out: no hit stands out of its noise (is it connected?)",)
 
 
 def test_crosstalk_into_a_channel_to_which_nothing_is_connected_is_silence(tmp_path):

@@ -244,17 +244,15 @@ def test_the_board_stands_among_simulated_ones(drawn):
     assert [text.get_text() for text in odds.get_xticklabels()] == ["1 : 100", "1 : 10", "1 : 1", "10 : 1", "100 : 1"]
 
 
-@pytest.mark.parametrize(
-    ("log_odds", "words"), [(np.log(90.0), "90 : 1"), (-np.log(4.0), "1 : 4"), (12_000.0, "10^5212 : 1")]
-)
-def test_odds_are_told_as_odds_to_who_does_not_see_the_axis(log_odds, words):
+def test_odds_are_told_as_odds_to_who_does_not_see_the_axis():
     named = DIAGNOSES["named"]
-    null = replace(named.null_control, log_odds=log_odds, log_odds_needed=np.log(2.0))
-    told = null_picture(replace(named, null_control=null)).alt
-    assert told.startswith(f"odds that something is lacking: this board {words}, limit 2 : 1; left-out error")
+    for log_odds, words in ((np.log(90.0), "90 : 1"), (-np.log(4.0), "1 : 4"), (12_000.0, "10^5212 : 1")):
+        null = replace(named.null_control, log_odds=log_odds, log_odds_needed=np.log(2.0))
+        told = null_picture(replace(named, null_control=null)).alt
+        assert told.startswith(f"odds that something is lacking: this board {words}, limit 2 : 1; left-out error")
 
 
-@pytest.mark.parametrize("log_odds", [12.0, 90.0, 12_000.0])
+@pytest.mark.parametrize("log_odds", [12.0, 12_000.0])
 def test_odds_beyond_all_doubt_are_read_as_powers_of_ten(log_odds):
     """No label runs into the next, even odds that no number holds are drawn, and even odds have a mark."""
     named = DIAGNOSES["named"]
