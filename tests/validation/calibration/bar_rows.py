@@ -270,7 +270,7 @@ SECURITY = (
         "fuzz",
         "Cards, fragments and recordings, mutated",
         "accepted, or refused with a message",
-        tests=("board/test_fuzz_files.py::", "board/test_fuzz.py::", "recordings/test_fuzz.py::"),
+        tests=("board/test_fuzz.py::", "recordings/test_fuzz.py::"),
     ),
     Row("lock", "Dependencies without a locked version", "none", tests=("structure/test_security.py::test_the_lock",)),
 )
