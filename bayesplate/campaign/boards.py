@@ -18,11 +18,13 @@ from bayesplate.posterior.draws import Draws, named_draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains, SamplerSettings, sample
-from bayesplate.posterior.statistics import effective_draws, resampled
+from bayesplate.posterior.statistics import effective_draws, effective_share, resampled
 from bayesplate.posterior.surrogate import Solved, Surrogate, n_terms, with_surrogate
 
 N_SOLVED = 2048
 """Draws of a walk, or taken to other shared parameters, at which the law itself is evaluated."""
+_GOOD_SHARE = 0.9
+"""Of the draws of a surrogate that count under the law, from which on it is taught no further."""
 _MOST_WALKS = 3
 """On surrogates, each fitted to the law where the one before led."""
 _ALONG_BENT = {3: 6}
@@ -65,6 +67,12 @@ class Sample:
     def weights(self) -> Floats:
         """Of the draws: (n,) array that sums to 1."""
         return normalised(self.log_weights)
+
+    @property
+    def serves(self) -> bool:
+        """Whether enough draws count, and nearly all of them: a surrogate that is far off lacks a part of the law."""
+        enough = self.effective(self.weights) >= FEWEST_WEIGHTED_DRAWS
+        return enough and effective_share(self.weights) >= _GOOD_SHARE
 
     def weights_under(self, log_reference: LogDensity) -> Floats:
         """Weights under which r is another density: (n,) array that sums to 1."""
@@ -183,7 +191,7 @@ class Member:
             every = Solved(*(np.concatenate(parts) for parts in zip(*solved, strict=True)))
             if np.isfinite(drawn.log_weights).any():
                 found.append(drawn)
-            if surrogate is None or (found and found[-1].effective(found[-1].weights) >= FEWEST_WEIGHTED_DRAWS):
+            if surrogate is None or (found and found[-1].serves):
                 break
             if np.isfinite(every.log_density).sum() < n_terms(surrogate.columns.size, {}):
                 break
