@@ -36,12 +36,15 @@ def test_every_reading_has_a_pareto_k_and_some_are_beyond_weights(found):
 
 
 def test_weights_agree_with_refits_where_pareto_k_is_low(found):
-    """Both densities are those of one reading given the others; some thousand draws know them to a few hundredths."""
-    serve = [label for label, k in found["pareto_k"].items() if k < 0.5]
+    """Both densities are those of one reading given the others; some thousand draws know them to a few hundredths.
 
-    assert len(serve) >= 2
-    for label in serve:
-        assert found["weighed"][label] == pytest.approx(found["refitted"][label], abs=0.05)
+    Below 0.5 the weights have a variance, up to 0.7 they converge the slower.
+    """
+    serve = {label: k for label, k in found["pareto_k"].items() if k < 0.7}
+
+    assert len(serve) >= 3
+    for label, k in serve.items():
+        assert found["weighed"][label] == pytest.approx(found["refitted"][label], abs=0.05 if k < 0.5 else 0.1)
 
 
 def test_a_reading_without_which_a_constant_is_open_has_the_highest_pareto_k(found):
