@@ -146,10 +146,8 @@ def pilot(
         start, now = None, float(backend.log_prob[-_PILOT_STEPS:].mean())
         is_last = n_rounds == _MOST_ROUNDS or (n_rounds >= fewest_rounds and now - before < _RISE)
         if n_rounds >= due or is_last:
-            mixture, due = (
-                Mixture.fitted(_last_rounds(backend, n_rounds, 2)),
-                max(n_rounds + 1, int(_TEACH_AGAIN * n_rounds)),
-            )
+            mixture = Mixture.fitted(_last_rounds(backend, n_rounds, 2))
+            due = max(n_rounds + 1, int(_TEACH_AGAIN * n_rounds))
         if is_last:
             break
         before = now

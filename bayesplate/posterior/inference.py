@@ -32,9 +32,8 @@ class Inference:
     convergence: Convergence
     theta: Floats  # (n_chains, n_draws, n_dim), thinned, chain = ensemble; of a surrogate drawn again by weight
     log_posterior: Floats  # (n_chains, n_draws)
-    every_log_frequency: tuple[Floats, ...] | None = (
-        None  # of each setup (n_chains * n_draws, n_every), ln Hz, if known
-    )
+    # of each setup (n_chains * n_draws, n_every), ln Hz, if known
+    every_log_frequency: tuple[Floats, ...] | None = None
     surrogate: Surrogate | None = None  # of the exact law, on which the walkers walked
     pareto_k: float | None = None  # k-hat of the weights from the surrogate to the exact law
 

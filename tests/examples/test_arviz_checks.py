@@ -38,13 +38,13 @@ def test_every_reading_has_a_pareto_k_and_some_are_beyond_weights(found):
 def test_weights_agree_with_refits_where_pareto_k_is_low(found):
     """Both densities are those of one reading given the others; some thousand draws know them to a few hundredths.
 
-    Below 0.5 the weights have a variance, up to 0.7 they converge the slower.
+    How many readings are below 0.5 hangs on the draws: one to three of them at ten seeds.
     """
-    serve = {label: k for label, k in found["pareto_k"].items() if k < 0.7}
+    serve = [label for label, k in found["pareto_k"].items() if k < 0.5]
 
-    assert len(serve) >= 3
-    for label, k in serve.items():
-        assert found["weighed"][label] == pytest.approx(found["refitted"][label], abs=0.05 if k < 0.5 else 0.1)
+    assert serve
+    for label in serve:
+        assert found["weighed"][label] == pytest.approx(found["refitted"][label], abs=0.05)
 
 
 def test_a_reading_without_which_a_constant_is_open_has_the_highest_pareto_k(found):
