@@ -3,8 +3,9 @@
 `result.to_arviz()` holds the draws as ArviZ works with them, without a file. It computes its own R-hat and effective
 sizes, says how much a constant moves when the prior or the likelihood is raised to a power a little above or below one,
 and leaves one reading out by weighing the draws. Where a Pareto k exceeds 0.7 the draws cannot stand for a posterior
-that has not seen that reading; with six readings this is common, and it is why the package refits for its own errors.
-Beside the weights stands what a refit without the reading gives, where the other readings determine the constants.
+that has not seen that reading, and their Monte Carlo error is too small as well; with six readings this is common, and
+it is why the package refits for its own errors. Beside the weights stands what a refit without the reading gives, where
+the other readings determine the constants.
 
     python examples/arviz_checks.py pareto.png
 """
@@ -46,8 +47,8 @@ def run(figure: Path | None = None, card: str = CARD, seed: int = 1) -> dict[str
         rhat_max, ess_min: of the constants by ArviZ, and `own` by the package, of the sampled columns; likelihood,
         constants, noise: sensitivity of each constant to the likelihood, and to the prior of either; by reading:
         pareto_k, leverage, weighed and refitted (ln density of the reading given the others, by ArviZ's weights and by
-        refits; None where the others leave a constant open), left_out_cents (the package's own error); and
-        effective_parameters.
+        refits, with its Monte Carlo error; None where the others leave a constant open), left_out_cents (the package's
+        own error); and effective_parameters.
     """
     result = bayesplate.fit(card, seed=seed)
     data = result.to_arviz()
@@ -56,6 +57,7 @@ def run(figure: Path | None = None, card: str = CARD, seed: int = 1) -> dict[str
     loo = left_out(data)
     by_reading = loo.elpd_i if hasattr(loo, "elpd_i") else loo.loo_i  # ArviZ 1.x and 0.23
     own = result.summary.sampler
+    by_draw = data.log_likelihood["frequency"].values.reshape(-1, len(by_reading))
     labels, modes = result.problem.labels, result.summary.modes
     numbers = {
         "rhat_max": float(table["r_hat"].max()),
@@ -63,7 +65,10 @@ def run(figure: Path | None = None, card: str = CARD, seed: int = 1) -> dict[str
         "own": {"rhat_max": own.rhat_max, "ess_min": own.ess_min},
         "pareto_k": dict(zip(labels, (float(k) for k in loo.pareto_k), strict=True)),
         "leverage": {label: mode.leverage for label, mode in zip(labels, modes, strict=True)},
-        "weighed": dict(zip(labels, (float(one) for one in by_reading), strict=True)),
+        "weighed": {
+            label: (float(one), error_of_log_mean(-own_draws, own.ess_min))
+            for label, one, own_draws in zip(labels, by_reading, by_draw.T, strict=True)
+        },
         "refitted": {label: refitted(result.problem, i, seed) for i, label in enumerate(labels)},
         "left_out_cents": {label: mode.left_out_cents for label, mode in zip(labels, modes, strict=True)},
         "effective_parameters": float(getattr(loo, "p_loo", None) or loo.p),
@@ -82,8 +87,17 @@ def left_out(data: Any) -> Any:
         return arviz.loo(data, pointwise=True)
 
 
-def refitted(problem: bayesplate.Problem, index: int, seed: int) -> float | None:
-    """ln density of a reading of a board with one setup, under the posterior of all others; None if that is open."""
+def error_of_log_mean(logs: np.ndarray, n_effective: float) -> float:
+    """Monte Carlo error of the logarithm of the mean of exp(logs), from so many effective draws."""
+    values = np.exp(logs - logs.max())
+    return float(values.std() / values.mean() / np.sqrt(n_effective))
+
+
+def refitted(problem: bayesplate.Problem, index: int, seed: int) -> tuple[float, float] | None:
+    """ln density of a reading of a board with one setup, under the posterior of all others, and its Monte Carlo error.
+
+    None if the others leave a constant open.
+    """
     (setup,) = problem.board.setups
     others = setup.readings[:index] + setup.readings[index + 1 :]
     try:
@@ -92,7 +106,8 @@ def refitted(problem: bayesplate.Problem, index: int, seed: int) -> float | None
         return None
     theta = without.draws.flat
     density = problem.log_likelihood(theta) - without.problem.log_likelihood(theta)
-    return float(np.logaddexp.reduce(density) - np.log(len(density)))
+    log_mean = float(np.logaddexp.reduce(density) - np.log(len(density)))
+    return log_mean, error_of_log_mean(density, without.summary.sampler.ess_min)
 
 
 def sensitivity(data: Any, factor: str) -> dict[str, float]:
@@ -128,8 +143,9 @@ if __name__ == "__main__":
         told = ", ".join(f"{factor} {found[factor][constant]:.3f}" for factor in ("likelihood", "constants", "noise"))
         print(f"{constant:5s} sensitivity to the likelihood and to the priors: {told}")
     for label, k in found["pareto_k"].items():
+        value, error = found["weighed"][label]
         refit = found["refitted"][label]
         print(
-            f"{label} Pareto k {k:.2f}, ln density by weights {found['weighed'][label]:.2f}, by a refit "
-            + ("not to be had: the others leave a constant open" if refit is None else f"{refit:.2f}")
+            f"{label} Pareto k {k:.2f}, ln density by weights {value:.3f} ± {error:.3f}, by a refit "
+            + ("{:.3f} ± {:.3f}".format(*refit) if refit else "not to be had: the others leave a constant open")
         )

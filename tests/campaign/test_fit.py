@@ -157,6 +157,16 @@ def test_members_of_a_ratio_have_the_campaign_s_prior(fitted_campaign):
 
 
 @pytest.mark.slow
+def test_the_shipped_half_tops_pass_the_gate():
+    """Boards of up to 17 parameters: what is proposed to them is learnt from a pilot of their own."""
+    found = bayesplate.fit("spruce-half-tops")
+
+    assert found.summary.converged
+    assert list(found.boards) == [f"spruce-free-{name}" for name in ("1L", "1R", "2L", "2R", "3L", "3R")]
+    assert all(one.summary.sampler.ess_min >= 400 for one in found.alone.values())
+
+
+@pytest.mark.slow
 def test_an_interrupted_campaign_goes_on_to_the_same_bytes(campaign, fitted_campaign, tmp_path):
     def interrupt(progress):
         if progress.stage == "board board-1" and progress.n_steps > 50:
