@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 from pathlib import Path
 
@@ -87,3 +88,13 @@ def test_there_is_something_to_read():
     assert len(PAGES) > 10
     assert len(CARDS) > 3
     assert {path.stem for path in EXAMPLES} >= {"posterior_analysis", "percentile_comparison", "uncertainty_report"}
+
+
+def test_every_page_of_results_has_a_day_and_a_tree():
+    results = ROOT / "docs" / "validation"
+    measured = json.loads((results / "measured.json").read_text(encoding="utf-8"))
+
+    assert {name.partition(", ")[0] for name in measured} == {page.stem for page in results.glob("*.md")} - {
+        "trial-short"
+    }
+    assert all(re.fullmatch(r"\d{4}-\d\d-\d\d", one["date"]) and one["tree"] for one in measured.values())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -316,7 +317,7 @@ def campaign_limits(folder: Path) -> str:
 def long_checks(folder: Path) -> str:
     """Published results of the long checks: a page is linked, a table or what was printed is shown."""
     parts, pages = [], []
-    known = {stem: f"{shows} Made by `{command}`." for stem, command, shows in CHECKS}
+    known = {stem: f"{shows} Made by `{command}`{_measured(stem)}." for stem, command, shows in CHECKS}
     others = {path.stem: "" for path in sorted(RESULTS.glob("*.md")) if path.stem not in known}
     for stem, shows in {**known, **others}.items():
         page, output = RESULTS / f"{stem}.md", RESULTS / f"{stem}.txt"
@@ -333,6 +334,20 @@ def long_checks(folder: Path) -> str:
     if pages:
         parts.append("```{toctree}\n:hidden:\n\n" + "\n".join(pages) + "\n```\n")
     return "\n".join(parts)
+
+
+def _measured(stem: str) -> str:
+    """When a page was measured and on which tree, its parts apart where they were measured apart."""
+    parts: dict[tuple[str, str], list[str]] = {}
+    for name, entry in json.loads((RESULTS / "measured.json").read_text(encoding="utf-8")).items():
+        page, _, part = name.partition(", ")
+        if page == stem:
+            parts.setdefault((entry["date"], entry["tree"]), []).append(part)
+    told = []
+    for (date, tree), names in sorted(parts.items()):
+        which = f"{joined(names)} " if any(names) else ""
+        told.append(f"{which}on {date} (tree {tree})")
+    return f"; measured {'; '.join(told)}" if parts else ""
 
 
 def is_page(path: Path) -> bool:

@@ -25,6 +25,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from validation.benchmarks.ratios import Ratio
 from validation.benchmarks.run import machine
+from validation.measured import note
 
 DESIGN = "cantilever-6"
 WAYS = {"1": "one worker", "2": "two workers", "dask-2": "a Dask cluster of two processes"}
@@ -165,6 +166,7 @@ def main() -> None:
     if arguments.publish is not None:
         arguments.publish.mkdir(parents=True, exist_ok=True)
         (arguments.publish / "batch.md").write_text(page(rows), encoding="utf-8")
+        note(arguments.publish, "batch")
 
 
 GROWTH: tuple[tuple[str, int, float, Callable[[Measured], float]], ...] = (

@@ -12,6 +12,7 @@ from pathlib import Path
 from statistics import median
 
 import ritz
+from validation import measured
 from validation.benchmarks import timing
 
 LINEAR_BOARD, EXACT_BOARD = "fiemme-spruce-clamped", "finnish-spruce-cantilever"
@@ -120,3 +121,4 @@ def publish(rows: list[Ratio], about: dict[str, object], folder: Path) -> None:
     foot = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in about.items())
     text = head + "\n".join(row.row for row in rows) + f"\n\nMeasured with {foot}.\n"
     (folder / "benchmarks.md").write_text(text, encoding="utf-8")
+    measured.note(folder, "benchmarks")

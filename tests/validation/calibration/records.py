@@ -10,6 +10,8 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
+from validation import measured
+
 Record = dict[str, Any]
 
 
@@ -89,3 +91,4 @@ def publish(folder: Path, name: str, title: str, command: str, lines: Sequence[s
     head = [f"# {title}", "", f"Written by `{command}`; do not edit.", "", *([about, ""] if about else [])]
     text = [*head, "```text", *lines, "```", ""]
     (folder / f"{name}.md").write_text("\n".join(text), encoding="utf-8")
+    measured.note(folder, name)

@@ -21,6 +21,7 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # one simulation a core; before numpy is imported
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+from validation import measured
 from validation.calibration import again, bare, campaign_ranks, joint, oracle
 from validation.calibration.layouts import EFFECTS
 from validation.calibration.mutants import FITTED
@@ -347,6 +348,7 @@ def main() -> int:
         print(f"{SECTIONS[name][0]}\n" + "\n".join(lines))
     if arguments["publish"]:
         publish(arguments["publish"], found, every)
+        measured.note(arguments["publish"], *(f"calibration, {name}" for name in arguments["parts"]))
     print(f"{'calibrated' if well else 'NOT CALIBRATED'}, {(time.perf_counter() - started) / 60:.1f} minutes")
     return 0 if well else 1
 

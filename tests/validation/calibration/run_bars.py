@@ -22,6 +22,7 @@ from xml.etree import ElementTree
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from bars import NOTES
+from validation import measured as of_pages
 from validation.calibration.bar_rows import ROWS, Row
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -144,6 +145,7 @@ def main() -> int:
         lines[3:3] = ["", "The slow tests were left out."]
     options.publish.mkdir(parents=True, exist_ok=True)
     (options.publish / "bars.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    of_pages.note(options.publish, "bars")
     missed = [note for note in notes if not note["met"]]
     failed = [name for name, is_passed in tests.items() if not is_passed]
     print(f"{len(notes)} figures and {len(tests)} tests; {len(missed)} bars missed, {len(failed)} tests failed")

@@ -21,6 +21,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # one board a core; before numpy 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+from validation import measured
 from validation.calibration.records import add_to, read_done
 from validation.trial.cells import CELLS, Cell, identity, jobs
 from validation.trial.judge import Record, judge_one
@@ -112,6 +113,8 @@ def main() -> int:
     )
     print(f"{len(records)} boards, {(time.perf_counter() - started) / 60:.1f} minutes")
     summary = write(records, options.base_seed, options.summary)
+    if not options.only_summary:
+        measured.note(options.summary, "trial")
     for bar in summary["bars"]:
         print(f"{'met   ' if bar['met'] else 'MISSED'} {bar['quantity']}: {bar['shown']}")
     return 0 if all(bar["met"] for bar in summary["bars"]) else 1

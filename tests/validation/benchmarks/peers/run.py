@@ -20,6 +20,7 @@ for _library in ("OMP", "OPENBLAS", "MKL"):  # before numpy is imported, and han
 _TESTS = str(Path(__file__).resolve().parents[3])
 sys.path[0] = _TESTS  # in place of this folder
 
+from validation import measured  # noqa: E402
 from validation.benchmarks.peers import environments, measures, statement, trials  # noqa: E402
 from validation.benchmarks.peers.density import Density  # noqa: E402
 from validation.benchmarks.peers.package import COMMANDS  # noqa: E402
@@ -83,6 +84,7 @@ def main(arguments: list[str] | None = None) -> None:
             return
         content = page(current, PEERS, about, statement.BOARD, asked.goal, len(seeds))
         (asked.publish / PAGE).write_text(content, encoding="utf-8")
+        measured.note(asked.publish, "peers")
 
 
 def fingerprint_of(settings: str, what: str) -> str:
