@@ -27,7 +27,7 @@ from bayesplate.posterior.starts import LogDensity, cholesky_factor, guarded
 
 _FIRST_LOOK, _LOOK_AGAIN = 200, 1.15
 _LONG_ENOUGH = 4.0
-"""Times the autocorrelation times that the gate wants, from which on a run that does not pass never will."""
+"""Times the length and the effective draws that the gate wants, from which on a run that does not pass never will."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,8 @@ def sample(
     """Sample until the gate passes or further steps are of no use.
 
     They are of none where `settings.max_steps` are made, where more than twice as many would be needed, and where the
-    chains are four times as long as the gate wants and do not pass: a small acceptance, for one, stays small.
+    chains have four times the length and the effective draws that the gate wants and do not pass: a small acceptance,
+    for one, stays small.
 
     The draws depend on the seed alone: a run that was killed and continued from its checkpoint gives the same bytes.
 
@@ -131,11 +132,10 @@ def sample(
             if n_steps and (is_last or _is_due(n_steps, settings.chunk_steps)):
                 n_taus = length_in_taus(ensembles.chain[:, burn_in:])
                 is_last |= is_hopeless(n_taus, n_steps - burn_in, settings)
-                is_last |= n_taus >= _LONG_ENOUGH * settings.gate.tau_count_min
                 if is_last or n_taus >= settings.gate.tau_count_min:
                     chains = Chains(ensembles.chain, ensembles.log_prob, burn_in)
                     convergence = assess(chains.kept, settings.gate, names=names)
-                    if is_last or convergence.passed:
+                    if is_last or convergence.passed or _is_long_enough(n_taus, convergence.ess_min, settings.gate):
                         if session is not None:
                             session.save()
                         return chains, convergence
@@ -153,6 +153,11 @@ def is_hopeless(n_taus: float, n_kept: int, settings: SamplerSettings) -> bool:
     while a walker has not moved yet, `n_taus` is 0.
     """
     return 0.0 < n_taus * 2 * settings.max_steps < settings.gate.tau_count_min * n_kept
+
+
+def _is_long_enough(n_taus: float, ess_min: float, gate: Gate) -> bool:
+    """Whether more steps would cure nothing that the gate asks for."""
+    return n_taus >= _LONG_ENOUGH * gate.tau_count_min and ess_min >= _LONG_ENOUGH * gate.ess_min
 
 
 def _is_due(n_steps: int, chunk_steps: int) -> bool:

@@ -38,6 +38,15 @@ def test_a_run_four_times_as_long_as_the_gate_wants_ends_though_it_does_not_pass
     assert soon.draws.shape[1] < never.draws.shape[1] <= 2000
 
 
+def test_a_run_that_lacks_effective_draws_alone_goes_on():
+    """Few walkers, of which many draws are asked for: twelve times the autocorrelation times that the gate wants."""
+    gate = Gate(tau_count_min=25.0, ess_min=4000.0)
+    settings = SamplerSettings(seed=3, n_ensembles=2, n_walkers=8, gate=gate)
+    _, convergence = sample(log_normal_density, MEAN, COVARIANCE, settings)
+    assert convergence.passed, convergence.reasons
+    assert convergence.n_taus > 4.0 * gate.tau_count_min
+
+
 def test_a_correlated_normal_is_recovered_and_a_wider_one_is_told_apart():
     settings = SamplerSettings(seed=11, gate=Gate(ess_min=2500))
     chains, convergence = sample(log_normal_density, MEAN, COVARIANCE, settings)

@@ -26,8 +26,8 @@ def pareto(folder: Path) -> str:
             label.partition(" ")[2],
             f"{found['leverage'][label]:.2f}",
             f"**{k:.2f}**" if k > 0.7 else f"{k:.2f}",
-            f"{found['weighed'][label]:.2f}",
-            "open" if found["refitted"][label] is None else f"{found['refitted'][label]:.2f}",
+            _with_error(found["weighed"][label]),
+            "open" if found["refitted"][label] is None else _with_error(found["refitted"][label]),
             f"{found['left_out_cents'][label]:+.0f}",
         )
         for label, k in found["pareto_k"].items()
@@ -36,13 +36,18 @@ def pareto(folder: Path) -> str:
     return table(columns, rows)
 
 
+def _with_error(known: tuple[float, float]) -> str:
+    return f"{known[0]:.2f} ± {known[1]:.2f}"
+
+
 def pareto_told(folder: Path) -> str:
     """The same in a sentence."""
     found = _found()
     high = [label.partition(" ")[2] for label, k in found["pareto_k"].items() if k > 0.7]
     unseen = [label.partition(" ")[2] for label, value in found["refitted"].items() if value is None]
     highest = max(found["pareto_k"].values())
-    worst = max(abs(found["weighed"][one] - value) for one, value in found["refitted"].items() if value is not None)
+    refitted = {label: known[0] for label, known in found["refitted"].items() if known is not None}
+    worst = max(abs(found["weighed"][label][0] - value) for label, value in refitted.items())
     return (
         f"Weights do not serve for {' and '.join(high)}, with a Pareto k of up to {highest:.2f}. "
         f"Without {' and '.join(unseen)} the other readings leave a constant open: `fit` refuses to go on, while the "
