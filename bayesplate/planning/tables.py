@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 
 from bayesplate.board.material import MODULI
-from bayesplate.effects.words import joined
+from bayesplate.effects.words import effect_name, joined
 from bayesplate.planning.gains import CONSTANTS, EXPLANATIONS
 from bayesplate.planning.plan import ExplanationEntry, Gain, Plan, ProposalEntry
 from bayesplate.results.tables import Table
-from bayesplate.results.words import MISSING
+from bayesplate.results.words import MISSING, percent
 
 MOST = 12
 """Proposals that a table lists; plan.json has all."""
@@ -102,8 +102,7 @@ def _of_doubt(gain: Gain, explanations: Sequence[ExplanationEntry], entropy: flo
     drop, error = gain.explanations, gain.explanations_error
     if drop is None or error is None or drop < max(WORTH, _CLEAR * error):
         return ""
-    told = f"{drop:.2f} ± {error:.2f} of {entropy:.2f} nats"
-    return f"the doubt between {_names(explanations)} would fall by {100.0 * drop / entropy:.0f} % ({told})"
+    return f"the doubt between {_names(explanations)} would fall by {percent(drop / entropy)}"
 
 
 def _names(explanations: Sequence[ExplanationEntry]) -> str:
@@ -118,8 +117,8 @@ def _of_intervals(shrunk: Mapping[str, float]) -> str:
     if not shrunk:
         return ""
     noun, verb = ("interval", "it is") if len(shrunk) == 1 else ("intervals", "they are")
-    sizes = joined([f"{value:.2f}" if value >= 0.1 else f"{value:.2g}" for value in shrunk.values()])
-    return f"the {noun} of {joined(list(shrunk))} would shrink to {sizes} of what {verb}"
+    sizes = joined([f"{100.0 * value:.0f}" if value >= 0.1 else f"{100.0 * value:.2g}" for value in shrunk.values()])
+    return f"the {noun} of {joined(list(shrunk))} would shrink to {sizes} % of what {verb}"
 
 
 def _shrunk(gain: Gain, goal: str | None) -> dict[str, float]:
@@ -136,5 +135,5 @@ def _shrunk(gain: Gain, goal: str | None) -> dict[str, float]:
 def shared_words(name: str) -> str:
     """A shared parameter as people read it: "G_xz / E_x" of transverse_shear.G_xz / E_x, "attached mass"."""
     effect, _, key = name.partition(".")
-    words = effect.replace("_", " ")
+    words = effect_name(effect)
     return key if "/" in key else words if words.endswith(key) else f"{key} of {words}"
