@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from bayesplate.board.board import Board
 from bayesplate.board.parameter import Parameter, unit_of_people
@@ -96,7 +96,7 @@ def effects_table(board: Board, summary: Summary) -> Table | None:
         for effect, parameters in effects.items()
         for parameter, entry in parameters.items()
     ]
-    return Table("Declared effects", ("effect", "parameter", "mean ± sd", "unit"), tuple(rows)) if rows else None
+    return Table("Effects in the model", ("effect", "parameter", "mean ± sd", "unit"), tuple(rows)) if rows else None
 
 
 def _named(effect: str, where: str, parameter: str, shape: Parameter | None) -> tuple[str, str]:
@@ -113,8 +113,10 @@ def _measured(entry: Spread) -> tuple[Cell, Cell]:
     return plus_minus(entry, factor), unit or None
 
 
-def effect_sentences(summary: Summary) -> list[str]:
-    return [f"{effect_name(name)}: {EFFECTS[name].sentence}" for name in summary.model.effects]
+def effect_sentences(summary: Summary, told: Sequence[str] = ()) -> list[str]:
+    """What each effect of the model is, but for sentences that the page has told."""
+    every = ((effect_name(name), EFFECTS[name].sentence) for name in summary.model.effects)
+    return [f"{name}: {sentence}" for name, sentence in every if sentence not in told]
 
 
 def budget_table(inference: Inference, draws: Draws, summary: Summary) -> Table:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayesplate.board.material import MODULI
+from bayesplate.campaign.tables import shared_words
 from bayesplate.planning.bench import Bench
 from bayesplate.planning.plan import Plan, ProposalEntry
-from bayesplate.planning.tables import shared_words
 from bayesplate.report.chladni import chladni_sheet
 from bayesplate.report.style import (
     BLUE,
@@ -79,7 +79,7 @@ def _doubt(axes: Axes, plan: Plan, shown: Sequence[ProposalEntry]) -> None:
     rows = np.arange(len(shown))
     axes.barh(rows, values, height=0.5, color=SKY, edgecolor="white", zorder=2)
     axes.errorbar(values, rows, xerr=2.0 * errors, fmt="none", ecolor=DARK, elinewidth=1.0, capsize=2, zorder=3)
-    axes.set(xlim=(0, 100), xlabel="doubt that goes, %")
+    axes.set(xlim=(0, 100), xlabel="doubt falls by, %")
     heading(axes, "Telling explanations apart")
 
 

@@ -7,10 +7,11 @@ from types import SimpleNamespace
 
 import pytest
 
+from bayesplate.campaign.tables import shared_words
 from bayesplate.planning.gains import GOALS
 from bayesplate.planning.plan import ExplanationEntry, Gain, ProposalEntry
 from bayesplate.planning.proposals import Costs
-from bayesplate.planning.tables import first_line, shared_words
+from bayesplate.planning.tables import first_line
 
 
 def explained(words, *effects):
