@@ -66,7 +66,7 @@ def picked_table(report: PickReport) -> Table:
             *([chances(peak.may_be(2))] if has_labels else []),
         ]
         rows.append(tuple(cells))
-    signs, labels = (("sign",) if has_signs else ()), (("mode",) if has_labels else ())
+    signs, labels = (("sign",) if has_signs else ()), (("mode, if it is one",) if has_labels else ())
     return Table("Picked modes", ("frequency, Hz", "damping, %", *signs, "no mode", *labels), tuple(rows))
 
 

@@ -238,18 +238,21 @@ def sentences(report: PickReport) -> tuple[str, ...]:
 
 
 def modes_table(report: PickReport) -> Table:
+    """Each likely mode; without signs where none is known, and without labels where no card was given."""
+    has_signs, has_labels = (any(getattr(peak, key) for peak in report.likely) for key in ("sign", "labels"))
     rows = tuple(
         (
-            Value(peak.hz, peak.sd_hz),
+            Value(peak.hz, peak.sd_hz, unit=" Hz"),
             Value(peak.damping_percent, peak.damping_sd_percent),
-            peak.sign or None,
+            *([peak.sign or None] if has_signs else []),
             f"{peak.amplitude:.3f}",
             percent(peak.spurious_probability, 1),
-            chances(peak.may_be(3)),
+            *([chances(peak.may_be(3))] if has_labels else []),
         )
         for peak in report.likely
     )
-    return Table("Modes", ("frequency, Hz", "damping, %", "sign", "strength", "no mode", "mode"), rows)
+    signs, labels = (["sign"] if has_signs else []), (["mode, if it is one"] if has_labels else [])
+    return Table("Modes", ("frequency", "damping, %", *signs, "strength", "no mode", *labels), rows)
 
 
 def aside_table(aside: list[PickedRow]) -> Table:
