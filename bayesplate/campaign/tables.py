@@ -9,6 +9,7 @@ from bayesplate.campaign.claim import LeftOut, TaughtBoard
 from bayesplate.campaign.common import CommonResidual
 from bayesplate.campaign.diagnosis import CampaignDiagnosis, words_of
 from bayesplate.campaign.summary import CampaignCheck, CampaignSummary, PopulationSummary, SharedNumber
+from bayesplate.effects.words import effect_name
 from bayesplate.results.tables import Row, Table, by_constant
 from bayesplate.results.words import GPA, interval, number, percent, plus_minus
 
@@ -33,9 +34,9 @@ def campaign_check_tables(report: CampaignCheck) -> tuple[Table, ...]:
     shared = []
     for name, one in report.shared.items():
         factor, unit = unit_of_people(one.unit)
-        prior = f"{one.prior_q05 * factor:.3g} to {one.prior_q95 * factor:.3g} {unit}".rstrip()
+        prior = f"{one.prior_q05 * factor:.2g} to {one.prior_q95 * factor:.2g} {unit}".rstrip()
         best = min(one.boards.values(), default=1.0)
-        shared.append((name.replace("_", " ", 1), prior, number(best, 2), number(one.expected_sd, 2)))
+        shared.append((shared_words(name), prior, number(best, 2), number(one.expected_sd, 2)))
     boards: list[Row] = []
     for board, each in report.boards.items():
         expected = (number(share, 1) for _, share in each.expected_sd_percent.items())
@@ -88,10 +89,17 @@ def _p_value(one: LeftOut | TaughtBoard) -> str:
     return f"{one.p_value:.2g}" + (" refuses" if one.refuses else "")
 
 
+def shared_words(name: str) -> str:
+    """A shared parameter as people read it: "G_xz / E_x" of transverse_shear.G_xz / E_x, "attached mass"."""
+    effect, _, key = name.partition(".")
+    words = effect_name(effect)
+    return key if "/" in key else words if words.endswith(key) else f"{key} of {words}"
+
+
 def shared_name(name: str, one: SharedNumber) -> str:
-    """What a shared number is called, with its unit."""
+    """The same with its effect and its unit."""
     unit = unit_of_people(one.all_boards.unit)[1]
-    words = name.replace("_", " ", name.partition(".")[0].count("_")).replace(".", ", ", 1)
+    words = f"{effect_name(name.partition('.')[0])}, {shared_words(name)}" if "/" in name else shared_words(name)
     return f"{words}, {unit}" if unit else words
 
 

@@ -12,7 +12,7 @@ from bayesplate.commands.prepare import Card
 from bayesplate.commands.problem import Problem, as_problem
 from bayesplate.results.references import Section, references
 
-_WIDTH = 100
+_WIDTH = 80
 
 
 @checked()

@@ -11,6 +11,7 @@ import click
 from bayesplate.board.board import Board
 from bayesplate.board.checks import board_mass, faults_of, lighter_than_the_board, on_the_board
 from bayesplate.board.values import Key, Refusal, read_each
+from bayesplate.board.words import did_you_mean, quoted
 from bayesplate.commands.arguments import is_number, is_positive, or_none, read_path, refused, value_shown, word
 from bayesplate.commands.options import FilePath, Option, path_option
 from bayesplate.effects.attached_mass import HEAVIEST_ROVING
@@ -81,7 +82,12 @@ def _read_mass(value: object) -> object:
 
 def _read_channels(value: object) -> object:
     """What two channels are, or the number of one."""
-    return value if isinstance(value, str) and value.isdecimal() and int(value) > 0 else word(*CHANNELS)(value)
+    if isinstance(value, str) and value.isdecimal() and int(value) > 0:
+        return value
+    if value not in CHANNELS:
+        near = did_you_mean(value, CHANNELS) if isinstance(value, str) else ""
+        raise refused(f"{', '.join(map(quoted, CHANNELS))} or the number of one channel", value, near)
+    return value
 
 
 def _read_pictures(value: object) -> object:

@@ -8,7 +8,7 @@ from bayesplate.commands.shown import Shown
 from bayesplate.recordings.contract import PickedRow, PickReport
 from bayesplate.recordings.plausibility import UNLIKE
 from bayesplate.results.tables import Cell, Row, Table
-from bayesplate.results.words import chances, percent, two_digits
+from bayesplate.results.words import Value, chances, percent
 
 MOST_SET_ASIDE = 8
 _LOUD, _RINGS, _MANY = 0.1, 1.0, 3
@@ -59,16 +59,15 @@ def picked_table(report: PickReport) -> Table:
     rows: list[Row] = []
     for peak in report.likely:
         cells: list[Cell] = [
-            f"{peak.hz:.2f}",
-            f"± {two_digits(peak.sd_hz)}",
-            f"{peak.damping_percent:.2f}",
+            Value(peak.hz, peak.sd_hz),
+            Value(peak.damping_percent, peak.damping_sd_percent),
             *([peak.sign or None] if has_signs else []),
             percent(peak.spurious_probability),
             *([chances(peak.may_be(2))] if has_labels else []),
         ]
         rows.append(tuple(cells))
-    signs, labels = (("sign",) if has_signs else ()), (("mode",) if has_labels else ())
-    return Table("Picked modes", ("Hz", "st. error", "damping, %", *signs, "no mode", *labels), tuple(rows))
+    signs, labels = (("sign",) if has_signs else ()), (("mode, if it is one",) if has_labels else ())
+    return Table("Picked modes", ("frequency, Hz", "damping, %", *signs, "no mode", *labels), tuple(rows))
 
 
 def _aside(peak: PickedRow) -> str:

@@ -37,8 +37,8 @@ from bayesplate.results.tables import Table, notebook, render
 from bayesplate.results.words import percent, two_digits
 
 PLAN_REMARK = (
-    "gain: nats, the drop of the doubt between explanations and the mean logarithm by which the intervals shrink, or "
-    "what was asked for"
+    "the highest gain stands first: the drop of the doubt, in nats, and the mean logarithm by which the intervals "
+    "shrink, or what was asked for"
 )
 SEEN_REMARK = "seen: residue of a mode between hammer and sensor, of the largest that its figure could give"
 NOTHING_HELPS = "nothing that was looked at would help by a twentieth"
@@ -172,7 +172,7 @@ def progress_text(progress: Progress, seconds: float = 0.0) -> str:
     if not progress.stage:
         return _sampling_text(progress)
     done = progress.done or 0.0
-    left = f", about {_time_words(seconds * (1.0 - done) / done)} left" if done > 0.0 else ""
+    left = f", about {_time_words(seconds * (1.0 - done) / done)} left" if 0.0 < done < 1.0 else ""
     sampling = f"; {_sampling_text(progress)}" if progress.n_steps else ""
     return f"{100.0 * done:.0f} % done{left}: {progress.stage}{sampling}"
 

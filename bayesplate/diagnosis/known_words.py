@@ -15,7 +15,7 @@ from bayesplate.effects.words import effect_name, effect_names
 from bayesplate.frequencies.laws import cents
 from bayesplate.results.contract import rms
 from bayesplate.results.tables import Row, Table
-from bayesplate.results.words import cents_alike, number
+from bayesplate.results.words import cents_alike, number, percent
 
 _COMPUTED = "Computed at its known size, with nothing fitted but the constants by weighted least squares, "
 AS_IT_STANDS = "as it stands"
@@ -203,5 +203,5 @@ def stated_sentence(one: StatedClaim) -> str:
     )
     if one.holds:
         return f"{told}: error reduced."
-    needs = f"that asks for a fall by {LEAST_FALL:.0%} and a score that rises by more than two standard errors"
+    needs = f"that asks for a fall by {percent(LEAST_FALL)} and a score that rises by more than two standard errors"
     return f"{told}. That an error is reduced is not claimed: {needs}."

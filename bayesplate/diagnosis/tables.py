@@ -23,11 +23,13 @@ from bayesplate.results.contract import Spread
 from bayesplate.results.fit_tables import write_tables
 from bayesplate.results.folder import BEFORE_AFTER, KNOWN_EFFECTS
 from bayesplate.results.tables import Cell, Row, Table, by_constant, constants_table, notebook
-from bayesplate.results.words import GPA, Value, decimals, interval, is_isotropic, number, plus_minus
+from bayesplate.results.words import GPA, Value, decimals, interval, is_isotropic, number, percent, plus_minus, rounded
 
 _WORTH_A_ROW = 0.01
 _UNLIKELY = 0.01
 """Probability below which an exchange of two labels is not worth showing: any two neighbours are a candidate."""
+_NINETY = 1.645
+"""Standard deviations from the middle of a normal distribution to the ends of its 90 % interval."""
 _NARROW = ("effect", "shift", "visible", "size (90 %)", "fate")
 
 
@@ -118,7 +120,7 @@ def answers_table(diagnosis: Diagnosis) -> Table:
     rest = len(diagnosis.answers) - len(shown)
     if rest:
         left = max(1.0 - sum(share for _, share in named), 0.0)
-        named.append((f"any of {rest} other" + "s" * (rest > 1), left))
+        named.append((f"any of {rest} others" if rest > 1 else "one other", left))
     printed = _summing([share for _, share in named])
     rows = tuple((words, share) for (words, _), share in zip(named, printed, strict=True))
     return Table("What may be the case", ("explanation", "probability"), rows)
@@ -152,7 +154,7 @@ def candidates_table(diagnosis: Diagnosis, *, narrow: bool = False) -> Table | N
             "shift": number(one.raw_rms_cents, 1),
             "visible": number(one.visible_rms_cents, 1),
             "E_x / E_y / G_xy off by, %": _bias(one.bias_percent),
-            "inclusion probability": number(one.inclusion_probability, 3),
+            "inclusion probability": percent(one.inclusion_probability, 1),
             "size (90 %)": _size(one.amplitude),
             "looks like": ", ".join(map(effect_name, one.look_alikes)) or None,
             "rejected because": one.rejected_because or None,
@@ -166,25 +168,26 @@ def candidates_table(diagnosis: Diagnosis, *, narrow: bool = False) -> Table | N
 
 
 def _summing(shares: Sequence[float]) -> list[str]:
-    """Shares with three decimals that sum to one as they are printed: the last thousandths go to the largest rests."""
+    """Shares in per cent that sum to a hundred as they are printed: the last tenths go to the largest rests."""
     thousandths = [int(1000.0 * share) for share in shares]
     by_rest = sorted(range(len(shares)), key=lambda i: thousandths[i] - 1000.0 * shares[i])
     for i in by_rest[: 1000 - sum(thousandths)]:
         thousandths[i] += 1
-    return [f"{one / 1000.0:.3f}" for one in thousandths]
+    return [f"{one / 10.0:.1f} %" for one in thousandths]
 
 
 def _bias(bias: Mapping[str, float] | None) -> str | None:
-    return None if bias is None else " / ".join(f"{value:+.1f}" for value in bias.values())
+    return None if bias is None else " / ".join(str(number(value, 1, signed=True)) for value in bias.values())
 
 
 def _size(amplitude: Amplitude | None) -> str | None:
     if amplitude is None:
         return None
     factor, unit = unit_of_people(amplitude.unit)
-    smallest = 1e-3 * (amplitude.q95 - amplitude.q05)
-    every = (value if abs(value) >= smallest else 0.0 for value in (amplitude.q05, amplitude.q50, amplitude.q95))
-    low, middle, high = (f"{v:.0f}" if abs(v) >= 1000.0 else f"{v:.3g}" for v in (factor * value for value in every))
+    spread = (amplitude.q95 - amplitude.q05) / (2.0 * _NINETY)
+    every = (amplitude.q05, amplitude.q50, amplitude.q95)
+    texts = (rounded(factor * value, factor * spread)[0] for value in every)
+    low, middle, high = (text.replace("\N{NARROW NO-BREAK SPACE}", "") for text in texts)  # a line may end there
     range_ = " (fixed)" if amplitude.q05 == amplitude.q95 else f" ({low} to {high})"
     return f"{amplitude.parameter} {middle} {unit}".rstrip() + range_
 

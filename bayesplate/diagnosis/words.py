@@ -55,6 +55,7 @@ VERDICTS: dict[Word, Meaning] = {
     ),
 }
 
+_AVERAGED = "The table of the constants is of the averaged ones; all else below is of"
 IN_PART = "Part of what is missing was found"
 """The heading where a verdict names something in part."""
 
@@ -81,7 +82,7 @@ def _cents(value: float | None) -> Value:
 MERITS = (
     Merit("in the fit", lambda errors: errors.in_sample_rms_cents, _cents, True),
     Merit("of a mode left out", lambda errors: errors.leave_one_out_rms_cents, _cents, True),
-    Merit("left out, search and all", lambda errors: errors.nested_leave_one_out_rms_cents, _cents, True),
+    Merit("left out, the search repeated", lambda errors: errors.nested_leave_one_out_rms_cents, _cents, True),
     Merit("log score", lambda errors: errors.log_score, lambda value: number(value, 2)),
     Merit("readings inside their 90 % intervals", lambda errors: errors.hits_90, percent),
 )
@@ -243,11 +244,11 @@ def alike_sentence(diagnosis: Diagnosis) -> str:
 def shown_model(diagnosis: Diagnosis) -> str:
     """Which model the figures and tables below a verdict belong to; empty where it is the only one."""
     if not diagnosis.is_refitted:
-        return ""
+        return "" if diagnosis.verdict == "unexplained" else f"{_AVERAGED} the fit without a further effect."
     model = f"the model with {diagnosis.refitted_words}"
     if diagnosis.named_in_part:
         return f"The constants and all else below are of {model}, which does not explain the readings either."
-    told = f"The table of the constants is of the averaged ones; all else below is of {model}"
+    told = f"{_AVERAGED} {model}"
     if diagnosis.verdict == "named":
         return f"{told}."
     return f"{told}, which is only one of the explanations. Quote the averaged constants."

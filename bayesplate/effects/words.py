@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 
 def effect_name(name: str) -> str:
-    return name.replace("_", " ")
+    return name.replace("_", " ").replace("poisson", "Poisson")
 
 
 def effect_names(names: Sequence[str], last: str = "and") -> str:

@@ -136,8 +136,8 @@ def carrying_sentence(modes: Sequence[CarryingMode]) -> str:
     for one in modes:
         what = f"the size of {effect_name(one.carries)}" if one.carries in EFFECTS else one.carries
         parts.append(f"mode {one.label}{f' of {one.setup}' if several else ''} alone carries {what}")
-    are = "it is" if len(modes) == 1 else "they are"
-    return f"{joined(parts)}: {are} left out of the left-out error"
+    those = "it does" if len(modes) == 1 else "they do"
+    return f"{joined(parts)}: {those} not count in the left-out error"
 
 
 def _readings(board: Board) -> list[tuple[str, str]]:

@@ -10,7 +10,7 @@ from bayesplate.files import write_text
 from bayesplate.grading.figures import FIGURES, LogFigure, limit_told
 from bayesplate.grading.matching import Grading
 from bayesplate.results.tables import Cell, Row, Table, csv_text
-from bayesplate.results.words import Value, percent
+from bayesplate.results.words import Value, number, percent
 
 GRADING = "grading.csv"
 MOST_LISTED, MOST_ON_TERMINAL = 100, 20
@@ -33,7 +33,7 @@ def grading_tables(graded: Grading, most: int = MOST_LISTED) -> dict[str, Table]
     moduli = {name: FIGURES[name] for name in MODULI}
     tables = {
         "constants": _figures_table(graded, some, f"Constants, median ± sd{which}", moduli),
-        "makers": _figures_table(graded, some, f"Figures of makers, median ± sd{which}", graded.request.figures),
+        "makers": _figures_table(graded, some, f"What makers compare, median ± sd{which}", graded.request.figures),
     }
     trusted = [i for i in order if not graded.doubts[i]]
     if graded.meets_all is not None and trusted:
@@ -91,10 +91,10 @@ def _limits_table(graded: Grading, some: list[int], which: str) -> Table:
     assert graded.meets_all is not None
     limits = [limit_told(name, limit) for name, limit in graded.request.limits.items()]
     each = list(graded.meets.values())
-    rows: list[Row] = [
-        (graded.names[i], *(percent(float(one[i])) for one in each), percent(float(graded.meets_all[i]))) for i in some
-    ]
-    return Table(f"Probability that a board meets the limits{which}", ("board", *limits, "all of them"), tuple(rows))
+    if len(limits) > 1:
+        limits, each = [*limits, "all of them"], [*each, graded.meets_all]
+    rows: list[Row] = [(graded.names[i], *(percent(float(one[i])) for one in each)) for i in some]
+    return Table(f"Probability that a board meets the limits{which}", ("board", *limits), tuple(rows))
 
 
 def _pairs_table(graded: Grading, most: int) -> Table:
@@ -111,7 +111,8 @@ def _apart(graded: Grading, first: int, second: int, name: str) -> str:
     """By how much a constant of the second board differs from the first one's, with the standard deviation."""
     mean, sd = graded.log(FIGURES[name], [first, second])
     ratio = math.exp(mean[1] - mean[0])
-    return f"{100.0 * (ratio - 1.0):+.0f} ± {100.0 * ratio * math.hypot(*sd):.0f} %"
+    apart = number(ratio - 1.0, 0, signed=True, factor=100.0)
+    return f"{apart} ± {100.0 * ratio * math.hypot(*sd):.0f} %"
 
 
 def write_grading(folder: Path, graded: Grading) -> None:

@@ -6,11 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 
 from bayesplate.board.material import MODULI
+from bayesplate.campaign.tables import shared_words
 from bayesplate.effects.words import joined
 from bayesplate.planning.gains import CONSTANTS, EXPLANATIONS
 from bayesplate.planning.plan import ExplanationEntry, Gain, Plan, ProposalEntry
 from bayesplate.results.tables import Table
-from bayesplate.results.words import MISSING
+from bayesplate.results.words import percent
 
 MOST = 12
 """Proposals that a table lists; plan.json has all."""
@@ -30,15 +31,15 @@ def _explanations(plan: Plan) -> Table:
 def _columns(plan: Plan) -> tuple[str, ...]:
     shared = plan.proposals[0].gain.shared if plan.proposals else {}
     names = tuple(shared_words(name) for name in shared) if shared else MODULI
-    doubt = ("doubt, nats",) if len(plan.explanations) > 1 else ()
+    doubt = ("doubt falls by",) if len(plan.explanations) > 1 else ()
     return (*doubt, *names, "min", "gain", "gain /min")
 
 
 def _cells(gain: Gain, cost: float, plan: Plan) -> tuple[str, ...]:
     doubt: tuple[str, ...] = ()
     if len(plan.explanations) > 1:
-        told = gain.explanations is not None and gain.explanations_error is not None
-        doubt = (f"{gain.explanations:.2f} ± {gain.explanations_error:.2f}" if told else MISSING,)
+        drop = gain.explanations
+        doubt = (str(percent(None if drop is None or not plan.entropy else drop / plan.entropy)),)
     left = gain.shared.values() if gain.shared else (getattr(gain, name) for name in MODULI)
     shrunk = tuple(f"{100.0 * value:.0f} %" for value in left)
     return (*doubt, *shrunk, f"{cost:g}", f"{gain.score:.2f}", f"{gain.score_per_minute:.3f}")
@@ -46,7 +47,9 @@ def _cells(gain: Gain, cost: float, plan: Plan) -> tuple[str, ...]:
 
 def _proposals(plan: Plan) -> Table:
     rows = tuple((one.sentence, *_cells(one.gain, one.cost_minutes, plan)) for one in plan.proposals[:MOST])
-    return Table(f"What to measure next on {plan.name}: intervals after, of now", ("proposal", *_columns(plan)), rows)
+    return Table(
+        f"What to measure next on {plan.name}: intervals after, in % of now", ("proposal", *_columns(plan)), rows
+    )
 
 
 def _sequences(plan: Plan) -> Table:
@@ -102,8 +105,7 @@ def _of_doubt(gain: Gain, explanations: Sequence[ExplanationEntry], entropy: flo
     drop, error = gain.explanations, gain.explanations_error
     if drop is None or error is None or drop < max(WORTH, _CLEAR * error):
         return ""
-    told = f"{drop:.2f} ± {error:.2f} of {entropy:.2f} nats"
-    return f"the doubt between {_names(explanations)} would fall by {100.0 * drop / entropy:.0f} % ({told})"
+    return f"the doubt between {_names(explanations)} would fall by {percent(drop / entropy)}"
 
 
 def _names(explanations: Sequence[ExplanationEntry]) -> str:
@@ -118,8 +120,8 @@ def _of_intervals(shrunk: Mapping[str, float]) -> str:
     if not shrunk:
         return ""
     noun, verb = ("interval", "it is") if len(shrunk) == 1 else ("intervals", "they are")
-    sizes = joined([f"{value:.2f}" if value >= 0.1 else f"{value:.2g}" for value in shrunk.values()])
-    return f"the {noun} of {joined(list(shrunk))} would shrink to {sizes} of what {verb}"
+    sizes = joined([f"{100.0 * value:.0f}" if value >= 0.1 else f"{100.0 * value:.2g}" for value in shrunk.values()])
+    return f"the {noun} of {joined(list(shrunk))} would shrink to {sizes} % of what {verb}"
 
 
 def _shrunk(gain: Gain, goal: str | None) -> dict[str, float]:
@@ -131,10 +133,3 @@ def _shrunk(gain: Gain, goal: str | None) -> dict[str, float]:
     left = shared or {name: getattr(gain, name) for name in MODULI}
     least = max(WORTH, _CLEAR * gain.constants_error)
     return {name: value for name, value in left.items() if -math.log(value) >= least}
-
-
-def shared_words(name: str) -> str:
-    """A shared parameter as people read it: "G_xz / E_x" of transverse_shear.G_xz / E_x, "attached mass"."""
-    effect, _, key = name.partition(".")
-    words = effect.replace("_", " ")
-    return key if "/" in key else words if words.endswith(key) else f"{key} of {words}"

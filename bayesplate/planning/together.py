@@ -26,8 +26,8 @@ from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.target import Posterior
 
 LINEAR = (
-    "to first order about each board's least-squares estimate, peaks without a label taken for the modes that are "
-    "expected there"
+    "the plan is computed to first order about each board's least-squares estimate, and peaks without a label are "
+    "taken for the modes that are expected there"
 )
 _STEP = 1e-4
 _A_PEAK_IS = 0.015

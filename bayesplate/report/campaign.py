@@ -20,6 +20,7 @@ from bayesplate.campaign.tables import (
     searched_tables,
     shared_name,
     shared_table,
+    shared_words,
     taught_table,
 )
 from bayesplate.report.constants import modulus_title
@@ -71,12 +72,12 @@ def shared_picture(summary: CampaignSummary, name: str) -> Picture:
     title = shared_name(name, one)
     panel.set(xlabel=in_figure(title))
     keys = [key("the board alone, 90 %", *alone), key("the others, 90 %", *others, mfc="white")]
-    legend_below(figure, 2, *keys, *([key("does not want what they teach", *refusing)] if any(refuses) else []))
+    legend_below(figure, 2, *keys, *([key("disagrees with what they teach", *refusing)] if any(refuses) else []))
     told = "; ".join(f"{board} {plus_minus(own, factor)}" for board, own in one.own.items())
     alt = f"From all boards {plus_minus(one.all_boards, factor)}, 90 % {interval(one.all_boards, factor)}. {told}."
     caption = (
         "Each board by itself, and below it what all the others say. A board whose bar stands clear of the others' "
-        "does not want their value."
+        "disagrees with their value."
     )
     if one.scatter is not None:
         caption += " Boards differ here: the grey band is where their median lies, not each of them."
@@ -195,10 +196,11 @@ def sentences(summary: CampaignSummary, diagnosis: CampaignDiagnosis | None = No
         told += [claim_sentence(diagnosis)]
         told += [] if diagnosis.declared or diagnosis.conditions is None else [f"Why: {diagnosis.reason}."]
     for name, one in summary.shared.items():
-        factor = unit_of_people(one.all_boards.unit)[0]
+        factor, unit = unit_of_people(one.all_boards.unit)
+        unit = f" {unit}" * bool(unit)
         told.append(
-            f"{shared_name(name, one)}: {plus_minus(one.all_boards, factor)} from {len(summary.boards)} boards, nine "
-            f"times in ten {interval(one.all_boards, factor)}."
+            f"From {len(summary.boards)} boards: {shared_words(name)} {plus_minus(one.all_boards, factor, unit)}, nine "
+            f"times in ten {interval(one.all_boards, factor, unit)}."
         )
         if one.scatter is not None:
             told.append(f"The boards' own differ from it by {plus_minus(one.scatter, 100.0)} %.")

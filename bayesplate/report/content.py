@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 from bayesplate.board.board import Board
 from bayesplate.board.parameter import Parameter, unit_of_people
 from bayesplate.board.prior import PriorCard
@@ -17,7 +19,17 @@ from bayesplate.results.contract import Spread
 from bayesplate.results.fit_tables import modes_table, peaks_table
 from bayesplate.results.summary import NONE_JUDGED, TOO_FEW_LEFT, Summary
 from bayesplate.results.tables import Cell, Row, Table, by_constant
-from bayesplate.results.words import CONSTANTS, GPA, Value, constant_name, number, percent, plus_minus, two_digits
+from bayesplate.results.words import (
+    CONSTANTS,
+    GPA,
+    Value,
+    constant_name,
+    decimals,
+    number,
+    percent,
+    plus_minus,
+    two_digits,
+)
 
 _MAKERS = (
     ("wave_speed", "wave speed c", 1.0, "m/s"),
@@ -84,7 +96,7 @@ def effects_table(board: Board, summary: Summary) -> Table | None:
         for effect, parameters in effects.items()
         for parameter, entry in parameters.items()
     ]
-    return Table("Declared effects", ("effect", "parameter", "mean ± sd", "unit"), tuple(rows)) if rows else None
+    return Table("Effects in the model", ("effect", "parameter", "mean ± sd", "unit"), tuple(rows)) if rows else None
 
 
 def _named(effect: str, where: str, parameter: str, shape: Parameter | None) -> tuple[str, str]:
@@ -101,8 +113,10 @@ def _measured(entry: Spread) -> tuple[Cell, Cell]:
     return plus_minus(entry, factor), unit or None
 
 
-def effect_sentences(summary: Summary) -> list[str]:
-    return [f"{effect_name(name)}: {EFFECTS[name].sentence}" for name in summary.model.effects]
+def effect_sentences(summary: Summary, told: Sequence[str] = ()) -> list[str]:
+    """What each effect of the model is, but for sentences that the page has told."""
+    every = ((effect_name(name), EFFECTS[name].sentence) for name in summary.model.effects)
+    return [f"{name}: {sentence}" for name, sentence in every if sentence not in told]
 
 
 def budget_table(inference: Inference, draws: Draws, summary: Summary) -> Table:
@@ -118,15 +132,13 @@ def budget_table(inference: Inference, draws: Draws, summary: Summary) -> Table:
         )
         return ", ".join(told) or None
 
-    return by_constant(
-        "Where the uncertainty comes from",
-        {
-            "sd": lambda name: f"{two_digits(summary.elastic[name].sd / summary.elastic[name].mean, 100)} %",
-            "from the expected noise alone": lambda name: f"{two_digits(alone[name], 100)} %",
-            "share of the variance from inputs": inputs,
-        },
-        isotropic=summary.model.isotropic,
-    )
+    columns: dict[str, Callable[[str], Cell]] = {
+        "sd": lambda name: f"{two_digits(summary.elastic[name].sd / summary.elastic[name].mean, 100)} %",
+        "from the expected noise alone": lambda name: f"{two_digits(alone[name], 100)} %",
+    }
+    if any(map(inputs, CONSTANTS)):
+        columns["share of the variance from inputs"] = inputs
+    return by_constant("Where the uncertainty comes from", columns, isotropic=summary.model.isotropic)
 
 
 def inputs_table(board: Board, summary: Summary) -> Table:
@@ -138,7 +150,9 @@ def inputs_table(board: Board, summary: Summary) -> Table:
         )
         after = None if entry is None or one.prior.is_exact else plus_minus(entry, factor)
         rows.append((f"{words}, {unit}" if unit else words, _stated(one.prior, factor), after))
-    return Table("Inputs", ("quantity", "as stated", "after the fit"), tuple(rows))
+    shown = 3 if any(after is not None for *_, after in rows) else 2
+    columns = ("quantity", "as stated", "after the fit")
+    return Table("Inputs", columns[:shown], tuple(row[:shown] for row in rows))
 
 
 def _stated(quantity: Quantity, factor: float) -> str:
@@ -155,7 +169,7 @@ def setups_table(board: Board) -> Table:
             setup.name,
             ", ".join(f"{edge} {word}" for edge, word in setup.edges.items()),
             f"{setup.resolution:g} Hz" if setup.resolution else "not rounded",
-            f"{100 * setup.noise.median:.2g} %, factor {setup.noise.factor:.3g}",
+            f"{100 * setup.noise.median:.2g} %, to within a factor {setup.noise.factor:.3g}",
         )
         for setup in board.setups
     )
@@ -181,8 +195,8 @@ def modes_tables(summary: Summary) -> list[Table]:
 
 def laws_table(summary: Summary) -> Table:
     columns = {
-        "linear law": lambda name: number(summary.linear_means[name], 3, factor=GPA),
-        "exact law": lambda name: number(summary.exact_means[name], 3, factor=GPA),
+        words: lambda name, means=means: number(means[name], decimals(summary.elastic[name].sd * GPA), factor=GPA)
+        for words, means in (("linear law", summary.linear_means), ("exact law", summary.exact_means))
     }
     return by_constant("Means under both frequency laws, GPa", columns, isotropic=summary.model.isotropic)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,7 +50,9 @@ if TYPE_CHECKING:
 
 MOST_NAMED = 30
 """Boards up to which each has a row with its name; more are drawn in the order of their size, without names."""
-_ROW, _CROWD, _LEFT, _LONGEST = 0.2, 1.6, 1.75, 24
+_ROW, _CROWD, _LONGEST = 0.2, 1.6, 24
+_LEFT, _LEFT_OF_LETTER, _LEFT_OF_CROWD = 1.75, 0.1, 0.75
+"""Inches at the left of a panel: at most for names of boards, for each letter of a name, and for an axis of numbers."""
 _MOST_PAIRS, _MOST_LABELLED, _MOST_BARS = 15, 12, 60
 _ASIDE, _ABOVE, _LINE = 8.0, 3.0, SMALL + 2.0
 """Points from a point to its name, beside and above its bar, and from one name to the next."""
@@ -75,7 +77,8 @@ def sorted_picture(graded: Grading) -> Picture:
     n = len(graded.names)
     is_named = n <= MOST_NAMED
     height = _ROW * n + 0.1 if is_named else _CROWD
-    figure, panels = stacked([height] * 3, left=_LEFT if is_named else 0.75, top=0.3, bottom=0.5, gap=0.75)
+    left = _left(_shown(graded, i) for i in range(n)) if is_named else _LEFT_OF_CROWD
+    figure, panels = stacked([height] * 3, left=left, top=0.3, bottom=0.5, gap=0.75)
     told = []
     for panel, name in zip(panels, MODULI, strict=True):
         middle, low, high = graded.spread(FIGURES[name])
@@ -159,7 +162,8 @@ def limits_picture(graded: Grading) -> Picture:
     order = best_first(graded)[: len(graded.trusted)]
     is_named = len(order) <= MOST_NAMED
     values = 100.0 * graded.meets_all[order]
-    figure, (panel,) = stacked([_ROW * len(order) + 0.1 if is_named else _CROWD], left=_LEFT, bottom=0.5)
+    left = _left(_shown(graded, i) for i in order) if is_named else _LEFT_OF_CROWD
+    figure, (panel,) = stacked([_ROW * len(order) + 0.1 if is_named else _CROWD], left=left, bottom=0.5)
     if is_named:
         colours = [GREEN if value >= 90.0 else VERMILLION if value < 10.0 else SKY for value in values]
         panel.barh(np.arange(len(order)), values, height=0.65, color=colours, edgecolor="black", lw=0.5)
@@ -172,7 +176,7 @@ def limits_picture(graded: Grading) -> Picture:
     panel.axvline(90, color=DARK, lw=0.8, ls="--")
     n_sure = int((graded.meets_all[order] >= 0.9).sum())
     alt = f"{n_sure} of {len(order)} boards meet all limits with 90 % or more."
-    caption = f"{alt}{' Green: 90 % and more; red: less than 10 %.' if is_named else ''}"
+    caption = f"{alt}{' Green: 90 % and more; blue: 10 to 90 %; red: less than 10 %.' if is_named else ''}"
     return Picture("limits", "Which boards meet the specification", alt, caption, figure)
 
 
@@ -181,7 +185,8 @@ def pairs_picture(graded: Grading) -> Picture:
     shown = graded.pairs[:_MOST_PAIRS]
     names = [name for name in MODULI if name in graded.request.match_percent] or list(MODULI)
     both = [[short(drawable(graded.names[i]), _LONGEST) for i in (pair.first, pair.second)] for pair in shown]
-    figure, panel = in_rows(["\n".join(two) for two in both], row=0.42, left=_LEFT, right=0.5, bottom=0.8)
+    left = _left(name for two in both for name in two)
+    figure, panel = in_rows(["\n".join(two) for two in both], row=0.42, left=left, right=0.5, bottom=0.8)
     for row, pair in enumerate(shown):
         at = [pair.first, pair.second]
         for step, name in zip(np.linspace(-0.22, 0.22, len(names)), names, strict=True):
@@ -199,6 +204,11 @@ def pairs_picture(graded: Grading) -> Picture:
     alt = "; ".join(f"{graded.names[p.first]} and {graded.names[p.second]} {percent(p.probability)}" for p in shown)
     caption = "Grey: within the tolerance. Bars: 90 % intervals. A pair matches where all its bars lie in the grey."
     return Picture("pairs", "Pairs that may match", f"Probabilities: {alt}.", caption, figure)
+
+
+def _left(names: Iterable[str]) -> float:
+    """Inches that names need at the left of a panel."""
+    return min(_LEFT, _LEFT_OF_LETTER * max(4, 2 + max(map(len, names))))
 
 
 def _shown(graded: Grading, place: int) -> str:
@@ -287,10 +297,10 @@ def sentences(graded: Grading, summary: BatchSummary) -> tuple[str, ...]:
 
 
 def matching_sentence(graded: Grading) -> str:
-    within = ", ".join(f"{name} within {value:g} %" for name, value in graded.request.match_percent.items())
+    within = ", ".join(f"{name} to within {value:g} %" for name, value in graded.request.match_percent.items())
     return (
-        f"Two boards match where {within}, all at once. The errors of two boards are taken to be independent. The "
-        f"likeliest pair is taken first, then the likeliest of the boards that are left; pairs below "
+        f"Two boards match where they agree in {within}, all at once. The errors of two boards are taken to be "
+        f"independent. The likeliest pair is taken first, then the likeliest of the boards that are left; pairs below "
         f"{percent(LEAST_PROBABILITY)} are not proposed."
     )
 
@@ -302,4 +312,4 @@ def failures_table(summary: BatchSummary) -> Table | None:
     some = summary.failed[:MOST_LISTED]
     which = "" if len(some) == len(summary.failed) else f", the first {MOST_LISTED} of {len(summary.failed)}"
     rows = tuple((one.name, one.outcome, one.message) for one in some)
-    return Table(f"Boards that were not fitted{which}", ("board", "outcome", "message"), rows)
+    return Table(f"Why{which}", ("board", "outcome", "message"), rows)

@@ -115,7 +115,7 @@ def residuals_picture(summary: Summary) -> Picture:
     panel.barh(rows, 2 * noise, left=-noise, height=0.9, color=LIGHT, label="noise, ± its sd")
     if (above > below).any():
         panel.hlines(rows, residual + below, residual + above, color=ORANGE, lw=5, label="what rounding may hide")
-    panel.hlines(rows, low, high, color=BLUE, lw=1.4, label="its 90 % interval")
+    panel.hlines(rows, low, high, color=BLUE, lw=1.4, label="error of the fit, 90 %")
     panel.plot(residual, rows, "o", color=BLUE, ms=6, mec="black", mew=0.6, label="error of the fit")
     panel.plot(left_out, rows, "D", mfc="white", mec="black", ms=5, label="error if left out of the fit")
     panel.axvline(0, color=DARK, lw=0.8)

@@ -139,7 +139,7 @@ def fit_page(
         sentences=short_sentences(summary, diagnosis),
         warnings=page_warnings(summary, diagnosis),
         weak=summary.identifiability,
-        effects=content.effect_sentences(summary),
+        effects=content.effect_sentences(summary, () if diagnosis is None else diagnosis.sentences),
         diagnosis=None if diagnosis is None else diagnosis_section(diagnosis),
         pictures=dict.fromkeys(PLACES, ()) | dict(shown),
         tables={

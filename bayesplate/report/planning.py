@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayesplate.board.material import MODULI
+from bayesplate.campaign.tables import shared_words
 from bayesplate.planning.bench import Bench
 from bayesplate.planning.plan import Plan, ProposalEntry
-from bayesplate.planning.tables import shared_words
 from bayesplate.report.chladni import chladni_sheet
 from bayesplate.report.style import (
     BLUE,
@@ -29,6 +29,7 @@ from bayesplate.report.style import (
     legend_below,
     placed,
 )
+from bayesplate.results.words import percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,7 +65,7 @@ def gains_picture(plan: Plan) -> Picture:
             fontsize=SMALL - 0.5, linespacing=1.15, parse_math=False,
         )  # fmt: skip
     legend_below(figure, 3)
-    told = "; ".join(f"{one.sentence}: {_told(one)}" for one in shown)
+    told = "; ".join(f"{one.sentence}: {_told(one, plan.entropy)}" for one in shown)
     caption = (
         "The best first. An interval at 50 % is half as wide as now. Doubt at 100 % would be gone: one explanation "
         "would be left."
@@ -79,7 +80,7 @@ def _doubt(axes: Axes, plan: Plan, shown: Sequence[ProposalEntry]) -> None:
     rows = np.arange(len(shown))
     axes.barh(rows, values, height=0.5, color=SKY, edgecolor="white", zorder=2)
     axes.errorbar(values, rows, xerr=2.0 * errors, fmt="none", ecolor=DARK, elinewidth=1.0, capsize=2, zorder=3)
-    axes.set(xlim=(0, 100), xlabel="doubt that goes, %")
+    axes.set(xlim=(0, 100), xlabel="doubt falls by, %")
     heading(axes, "Telling explanations apart")
 
 
@@ -107,11 +108,12 @@ def _label(one: ProposalEntry) -> str:
     return "\n".join(lines)
 
 
-def _told(one: ProposalEntry) -> str:
+def _told(one: ProposalEntry, entropy: float) -> str:
     gain = one.gain
-    doubt = "" if gain.explanations is None else f"doubt falls by {gain.explanations:.2f} nats, "
-    left = ", ".join(f"{name} {getattr(gain, name):.2f}" for name in MODULI)
-    return f"{doubt}intervals shrink to {left}, in {one.cost_minutes:g} minutes"
+    told = gain.explanations is not None and entropy > 0.0
+    doubt = f"doubt falls by {percent((gain.explanations or 0.0) / entropy)}, " if told else ""
+    left = ", ".join(f"{name} {percent(getattr(gain, name))}" for name in MODULI)
+    return f"{doubt}intervals shrink to {left} of now, in {one.cost_minutes:g} minutes"
 
 
 def bench_sheet(bench: Bench) -> Figure:

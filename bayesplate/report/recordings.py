@@ -37,7 +37,7 @@ from bayesplate.report.style import (
     upright_names,
 )
 from bayesplate.results.tables import Table
-from bayesplate.results.words import chances, percent, two_digits
+from bayesplate.results.words import Value, chances, percent
 
 MOST_PLACES = 8
 _STEP = 30.0
@@ -226,7 +226,7 @@ def sentences(report: PickReport) -> tuple[str, ...]:
         doubt = sum(peak.spurious_probability for peak in report.likely)
         told.append(
             f"Half of the frequencies are known to {100.0 * share[len(share) // 2]:.2g} % or better, the worst to "
-            f"{100.0 * share[-1]:.2g} %. Of these modes, {doubt:.1f} are expected to be none."
+            f"{100.0 * share[-1]:.2g} %. Of these peaks, {doubt:.1f} are expected to be no mode of the board."
         )
     if report.polarity:
         told.append(
@@ -238,18 +238,21 @@ def sentences(report: PickReport) -> tuple[str, ...]:
 
 
 def modes_table(report: PickReport) -> Table:
+    """Each likely mode; without signs where none is known, and without labels where no card was given."""
+    has_signs, has_labels = (any(getattr(peak, key) for peak in report.likely) for key in ("sign", "labels"))
     rows = tuple(
         (
-            f"{peak.hz:.3f} ± {two_digits(peak.sd_hz)}",
-            f"{peak.damping_percent:.3f} ± {two_digits(peak.damping_sd_percent)}",
-            peak.sign or None,
+            Value(peak.hz, peak.sd_hz, unit=" Hz"),
+            Value(peak.damping_percent, peak.damping_sd_percent),
+            *([peak.sign or None] if has_signs else []),
             f"{peak.amplitude:.3f}",
             percent(peak.spurious_probability, 1),
-            chances(peak.may_be(3)),
+            *([chances(peak.may_be(3))] if has_labels else []),
         )
         for peak in report.likely
     )
-    return Table("Modes", ("frequency, Hz", "damping, %", "sign", "strength", "no mode", "label"), rows)
+    signs, labels = (["sign"] if has_signs else []), (["mode, if it is one"] if has_labels else [])
+    return Table("Modes", ("frequency", "damping, %", *signs, "strength", "no mode", *labels), rows)
 
 
 def aside_table(aside: list[PickedRow]) -> Table:

@@ -185,7 +185,7 @@ def better_theory(thin: TheoryRow, sheared: TheoryRow) -> BetterTheory:
     if abs(after - before) < SAME_CENTS:
         better, word = None, "changes nothing"
     else:
-        better, word = ("shear-flexible", "makes it better") if after < before else ("thin", "makes it worse")
+        better, word = ("shear-flexible", "lowers the error") if after < before else ("thin", "raises the error")
     sentence = f"Transverse shear {word}: {before:.1f} -> {after:.1f} cents for modes left out of the fit"
     in_sample = (thin.error.in_sample_rms_cents, sheared.error.in_sample_rms_cents)
     return BetterTheory(better, f"{sentence}, {in_sample[0]:.1f} -> {in_sample[1]:.1f} for those in it.")

@@ -34,7 +34,7 @@ def fitted_constants(summary: Summary) -> Table:
     return constants_table(
         f"Elastic constants of {summary.name}, GPa",
         summary.elastic,
-        {"sd, %": share, "weighted": weighted},
+        {"sd, %": share, "weighted least squares": weighted},
         isotropic=summary.model.isotropic,
     )
 
@@ -50,7 +50,7 @@ def compared_constants(summary: Summary, title: str) -> Table:
         summary.elastic,
         {
             "paper's least squares": lambda name: point(summary.least_squares, name),
-            "weighted": lambda name: point(summary.weighted_least_squares, name),
+            "weighted least squares": lambda name: point(summary.weighted_least_squares, name),
             "percentile method": lambda name: _trimmed(summary.percentile, name),
         },
         isotropic=summary.model.isotropic,

@@ -87,6 +87,7 @@ SYMBOL = re.compile(_SYMBOL)
 """A symbol of ours: every medium that can sets its index lower."""
 GREEK = {"nu": ("ν", r"\nu")}
 _POWER = re.compile(r"(?<=[a-z])\^(-?\d)")
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _TOGETHER = re.compile(r"(?<=[\d±]) (?=[±%])|(?<=±) (?=\d)")
 _STARTS_A_FORMULA = ("=", "+", "-", "@")
 _IN_LATEX = {
@@ -148,7 +149,8 @@ def _escaped_html(text: str) -> Markup:
     lowered = SYMBOL.sub(
         lambda found: f"<i>{GREEK.get(found['letter'], found['letter'])[0]}</i><sub>{found['index']}</sub>", together
     )
-    return Markup(_POWER.sub(r"<sup>\1</sup>", lowered))  # what was escaped, and tags of our own
+    raised = _POWER.sub(lambda found: found[1].translate(_RAISED), lowered)
+    return Markup(raised)  # what was escaped, and tags of our own
 
 
 def _latex_of(found: re.Match[str]) -> str:

@@ -62,8 +62,8 @@ def test_shear_is_reported_better_and_worse(comparisons):
             assert theory["error"]["leave_one_out_rms_cents"] == pytest.approx(left_out, abs=1.0)
         assert [theory["theory"] for theory in found["theories"]] == ["thin", "shear-flexible"]
         assert found["verdict"]["better"] == better
-        word = "worse" if better == "thin" else "better"
-        assert found["verdict"]["sentence"].startswith(f"Transverse shear makes it {word}: ")
+        word = "raises" if better == "thin" else "lowers"
+        assert found["verdict"]["sentence"].startswith(f"Transverse shear {word} the error: ")
 
 
 def test_every_method_stands_under_both_theories(comparisons):

@@ -31,7 +31,7 @@ def test_the_line_tells_the_share_and_the_time_left_and_after_a_part_its_samplin
         (0.0, 3.0, "0 % done: search"),
         (0.25, 10.0, "25 % done, about 30 s left: search"),
         (0.1, 60.0, "10 % done, about 9 min left: search"),
-        (1.0, 60.0, "100 % done, about 1 s left: search"),
+        (1.0, 60.0, "100 % done: search"),
     ):
         assert progress_text(Progress(0, 0, None, "search", done), seconds) == words
     text = progress_text(Progress(25, 20_000, None, "fit", 0.5), 10.0)

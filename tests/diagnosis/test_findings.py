@@ -532,7 +532,7 @@ def test_modes_that_alone_carry_something_count_neither_before_nor_after():
     assert told.before.log_score != pytest.approx(log_score(found.ground, 0, found.residual))
     assert [one["label"] for one in diagnosis_json(told)["carrying_modes"]] == ["(2,0)", "(5,0)"]
     sentence = (
-        "Mode (2,0) alone carries E_y and mode (5,0) alone carries E_y: they are left out of the left-out error, "
+        "Mode (2,0) alone carries E_y and mode (5,0) alone carries E_y: they do not count in the left-out error, "
         "before and after alike."
     )
     assert sentence in verdict_sentences(told)

@@ -147,7 +147,9 @@ def test_the_page_says_what_its_constants_are():
     assert remarks(replace(NAMED, notes=("mind this",))) == ["The reason: the reason of it.", "mind this"]
     assert shown_model(NAMED).endswith("averaged ones; all else below is of the model with membrane tension.")
     assert "only one of the explanations. Quote the averaged" in shown_model(DIAGNOSES["indistinguishable group"])
-    assert shown_model(DIAGNOSES["none needed"]) == shown_model(DIAGNOSES["unexplained"]) == ""
+    # the averaged constants stand beside figures of the fit alone
+    assert shown_model(DIAGNOSES["none needed"]).endswith("below is of the fit without a further effect.")
+    assert shown_model(DIAGNOSES["unexplained"]) == ""
     for word, one in DIAGNOSES.items():
         assert ("averaged" in headline_sentence(one)) is (word != "unexplained")
         assert ("averaged" in averaged_table(one).title) is (word != "unexplained")
@@ -199,11 +201,11 @@ def test_the_probabilities_sum_to_one_as_they_are_printed():
     table = answers_table(NAMED)
     assert (table.columns, table.texts) == (
         ("explanation", "probability"),
-        (("nothing is lacking", "0.020"), ("membrane tension", "0.970"), ("any of 2 others", "0.010")),
+        (("nothing is lacking", "2.0 %"), ("membrane tension", "97.0 %"), ("any of 2 others", "1.0 %")),
     )
     thirds = [replace(NAMED.answers[0], probability=share, words=f"{i}") for i, share in enumerate((1 / 3, 1 / 3))]
     shares = [row[1] for row in answers_table(replace(NAMED, probability_of_none=1 / 3, answers=tuple(thirds))).texts]
-    assert sorted(shares) == ["0.333", "0.333", "0.334"]
+    assert sorted(shares) == ["33.3 %", "33.3 %", "33.4 %"]
     for share, n_rows in ((0.0099, 3), (0.01, 4)):  # worth a row of its own from one per cent on
         one = (NAMED.answers[0], replace(NAMED.answers[0], words="x", probability=share))
         assert len(answers_table(replace(NAMED, answers=(*one, *NAMED.answers[1:]))).texts) == n_rows
@@ -223,13 +225,17 @@ def test_what_looks_like_the_named_effect_is_told():
 
 
 SIZES = [
-    ("kg", (1e-4, 8e-4, 1.8e-3), "mass 0.8 g (0.1 to 1.8)"),
-    ("rad", (0.01745329, 0.03490659, 0.05235988), "mass 2 degrees (1 to 3)"),
+    ("kg", (1e-4, 8e-4, 1.8e-3), "mass 0.80 g (0.10 to 1.80)"),
+    ("rad", (0.01745329, 0.03490659, 0.05235988), "mass 2.00 degrees (1.00 to 3.00)"),
     ("Pa", (6.2e8, 6.2e8, 6.2e8), "mass 0.62 GPa (fixed)"),
-    ("m", (1e-4, 2e-4, 3e-4), "mass 0.2 mm (0.1 to 0.3)"),
-    ("1", (0.1, 0.2, 0.3), "mass 0.2 (0.1 to 0.3)"),
-    ("kg", (2.5, 8.3, 44.5), "mass 8300 g (2500 to 44500)"),
-    ("1", (-0.1, 1e-9, 0.1), "mass 0 (-0.1 to 0.1)"),
+    ("m", (1e-4, 2e-4, 3e-4), "mass 0.200 mm (0.100 to 0.300)"),
+    ("1", (0.1, 0.2, 0.3), "mass 0.200 (0.100 to 0.300)"),
+    (
+        "kg",
+        (2.5, 8.3, 44.5),
+        "mass 8000 g (2000 to 44000)",
+    ),
+    ("1", (-0.1, 1e-9, 0.1), "mass 0.000 (-0.100 to 0.100)"),
 ]
 
 
@@ -266,7 +272,7 @@ def test_errors_before_and_after_or_as_they_are():
     assert both.texts == (
         ("error in the fit, rms cents", "21.2", "4.2"),
         ("error of a mode left out, rms cents", "46.5", "9.5"),
-        ("error left out, search and all, rms cents", "46.5", "12.5"),
+        ("error left out, the search repeated, rms cents", "46.5", "12.5"),
         ("log score", "-24.75", "-15.50"),
         ("readings inside their 90 % intervals", "50 %", "100 %"),
     )
@@ -288,7 +294,7 @@ def test_candidates_stand_in_the_order_of_their_probability():
 
     assert list(by_name) == ["membrane tension", "relabelling (1,0) and (0,1)", "fluid loading", "grain angle"]
     assert by_name["membrane tension"] == {
-        "effect": "membrane tension", "shift": "45.0", "visible": "12.5", "inclusion probability": "0.970",
+        "effect": "membrane tension", "shift": "45.0", "visible": "12.5", "inclusion probability": "97.0 %",
         "E_x / E_y / G_xy off by, %": "+1.5 / -2.5 / +0.5", "size (90 %)": "tension 120 N/m (10 to 230)",
         "looks like": "–", "rejected because": "–",
     }  # fmt: skip

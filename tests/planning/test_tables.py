@@ -7,10 +7,11 @@ from types import SimpleNamespace
 
 import pytest
 
+from bayesplate.campaign.tables import shared_words
 from bayesplate.planning.gains import GOALS
 from bayesplate.planning.plan import ExplanationEntry, Gain, ProposalEntry
 from bayesplate.planning.proposals import Costs
-from bayesplate.planning.tables import first_line, shared_words
+from bayesplate.planning.tables import first_line
 
 
 def explained(words, *effects):
@@ -42,11 +43,11 @@ def test_doubt_and_intervals_are_told_with_their_numbers():
     one = gain((0.5, 0.8, 0.99), 0.3, 0.01)
 
     assert line("Do it", one, TWO, None) == (
-        "Do it: the doubt between no effect and fluid loading would fall by 50 % (0.30 ± 0.01 of 0.60 nats) and the "
-        "intervals of E_x and E_y would shrink to 0.50 and 0.80 of what they are."
+        "Do it: the doubt between no effect and fluid loading would fall by 50 % and the "
+        "intervals of E_x and E_y would shrink to 50 and 80 % of what they are."
     )
     assert line("Do it", without_doubt(one), ONE, None) == (
-        "Do it: the intervals of E_x and E_y would shrink to 0.50 and 0.80 of what they are."
+        "Do it: the intervals of E_x and E_y would shrink to 50 and 80 % of what they are."
     )
 
 
@@ -80,7 +81,7 @@ def test_one_interval_that_shrinks_is_told_and_many_small_gains_are_not_told_wit
     one, small = gain((1.0, 0.88, 1.0)), gain((0.96, 0.96, 0.96), 0.04)
 
     assert (
-        line("Do it", without_doubt(one), ONE, None) == "Do it: the interval of E_y would shrink to 0.88 of what it is."
+        line("Do it", without_doubt(one), ONE, None) == "Do it: the interval of E_y would shrink to 88 % of what it is."
     )
     assert line("Do it", small, TWO, None) == ""
 
@@ -102,9 +103,9 @@ def test_a_campaign_is_told_what_its_boards_share_or_their_constants():
     hardly = without_doubt(gain((0.5, 1.0, 1.0), shared={"fluid_loading.density": 0.96}))
 
     assert line("Weigh it", told, ONE, None) == (
-        "Weigh it: the intervals of G_xz / E_x and attached mass would shrink to 0.90 and 0.034 of what they are."
+        "Weigh it: the intervals of G_xz / E_x and attached mass would shrink to 90 and 3.4 % of what they are."
     )
-    of_constants = "Weigh it: the interval of E_x would shrink to 0.50 of what it is."
+    of_constants = "Weigh it: the interval of E_x would shrink to 50 % of what it is."
     assert line("Weigh it", bare, ONE, None) == of_constants
     assert line("Weigh it", told, ONE, "E_x") == line("Weigh it", told, ONE, "constants") == of_constants
     assert line("Weigh it", hardly, ONE, None) == line_of([], ONE) == ""
@@ -116,5 +117,5 @@ def test_the_first_line_is_of_the_best_proposal_that_would_help():
     small, one = gain((0.96, 0.96, 0.96), 0.04), gain((1.0, 0.88, 1.0))
 
     found = line_of([("Do this", small), ("Do that", one)], TWO)
-    assert found == "Do that: the interval of E_y would shrink to 0.88 of what it is."
+    assert found == "Do that: the interval of E_y would shrink to 88 % of what it is."
     assert line_of([("Do this", small)], TWO) == line_of([], TWO) == ""

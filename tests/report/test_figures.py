@@ -56,7 +56,7 @@ def test_residuals_lie_where_the_summary_says(drawn, clamped):
     np.testing.assert_allclose(lines["error of the fit"][:, 0], [mode.residual_cents for mode in modes])
     np.testing.assert_allclose(lines["error if left out of the fit"][:, 0], [mode.left_out_cents for mode in modes])
     bars = {one.get_label(): np.array([path[:, 0] for path in one.get_segments()]) for one in panel.collections}
-    np.testing.assert_allclose(bars["its 90 % interval"], [mode.residual_interval_cents for mode in modes])
+    np.testing.assert_allclose(bars["error of the fit, 90 %"], [mode.residual_interval_cents for mode in modes])
     rounded = [[mode.residual_cents + end for end in mode.rounding_cents] for mode in modes]
     np.testing.assert_allclose(bars["what rounding may hide"], rounded)
     assert [tick.get_text() for tick in panel.get_yticklabels()] == [mode.label for mode in modes]

@@ -98,7 +98,7 @@ def test_a_mode_that_alone_carries_a_constant_is_named_and_left_out_of_the_left_
     assert summary.error.leave_one_out_rms_cents == pytest.approx(np.sqrt(np.mean(np.square(others))))
     (own,) = (row.left_out_cents for row in summary.modes if row.label == LABEL)
     assert abs(own) > 3.0 * summary.error.leave_one_out_rms_cents  # it would show
-    sentence = f"mode {LABEL} alone carries {CARRIES}: it is left out of the left-out error"
+    sentence = f"mode {LABEL} alone carries {CARRIES}: it does not count in the left-out error"
     assert sentence in summary.identifiability
     assert sentence in show_fit(summary).remarks
     assert json.loads(json_text(summary))["carrying_modes"][0]["carries"] == CARRIES
