@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from bayesplate.board.parameter import unit_of_people
 from bayesplate.diagnosis.known_words import known_table
 from bayesplate.diagnosis.result import Amplitude, Diagnosis, EffectEntry, Finalist
@@ -184,8 +186,8 @@ def _size(amplitude: Amplitude | None) -> str | None:
     if amplitude is None:
         return None
     factor, unit = unit_of_people(amplitude.unit)
-    spread = (amplitude.q95 - amplitude.q05) / (2.0 * _NINETY)
     every = (amplitude.q05, amplitude.q50, amplitude.q95)
+    spread = min((gap for gap in np.diff(every) if gap > 0.0), default=0.0) / _NINETY  # of the narrower side
     texts = (rounded(factor * value, factor * spread)[0] for value in every)
     low, middle, high = (text.replace("\N{NARROW NO-BREAK SPACE}", "") for text in texts)  # a line may end there
     range_ = " (fixed)" if amplitude.q05 == amplitude.q95 else f" ({low} to {high})"

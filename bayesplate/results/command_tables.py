@@ -167,7 +167,7 @@ def proposal_remarks(report: ModesReport) -> tuple[str, ...]:
 
 
 def _sheet_table(name: str, setup: SheetReport) -> Table:
-    """The lowest modes of a setup: frequency and energies."""
+    """The lowest modes of a setup: frequency, energies, the paper's coefficients."""
     has_effects = any(mode.share_percent.effects for mode in setup.modes)
     rows = tuple(
         (
@@ -175,16 +175,17 @@ def _sheet_table(name: str, setup: SheetReport) -> Table:
             number(mode.hz, 1),
             _reading(mode),
             " / ".join(str(share) for share in _shares(mode.share_percent, has_effects)),
+            *(f"{coefficient:.4g}" for coefficient in (mode.a, mode.b, mode.c)),
         )
         for mode in setup.modes
     )
-    energy = "energy in D_x/D_y/D_s" + ("/rest" if has_effects else "") + ", %"
+    energy = "% in D_x/D_y/D_s" + ("/rest" if has_effects else "")
     is_expected = any(mode.likely_hz for mode in setup.modes)
     is_read = any(mode.measured_hz for mode in setup.modes) or not is_expected
     read = " or\n".join(["measured"] * is_read + ["likely"] * is_expected) + " Hz"
     return Table(
         f"Lowest modes of {name}, setup {setup.setup}, {setup.theory} plate",
-        ("mode", "Hz", read, energy),
+        ("mode", "Hz", read, energy, "a", "b", "c"),
         rows,
     )
 

@@ -125,8 +125,8 @@ def test_modes_are_shown_with_their_reading_or_their_range():
     )
     (table,) = sheet_tables(report)
 
-    assert table.columns[2:4] == ("measured or\nlikely Hz", "energy in D_x/D_y/D_s, %")
-    assert table.texts[0] == ("(1,0)", "51.4", "52", "100 / 0 / 0")
+    assert table.columns[2:4] == ("measured or\nlikely Hz", "% in D_x/D_y/D_s")
+    assert table.texts[0] == ("(1,0)", "51.4", "52", "100 / 0 / 0", "3.232", "-0.3164", "0.01128")
     assert table.texts[1][2] == "800 to 836"
     low = replace(report, setups=(replace(report.setups[0], modes=(replace(rows[1], likely_hz=(8.84, 9.13)),)),))
     assert sheet_tables(low)[0].texts[0][2] == "8.8 to 9.1"
