@@ -109,7 +109,7 @@ def hit_at(given: tuple[tuple[float, float], ...]) -> Picked:
 
 
 def test_places_that_contradict_every_label_say_nothing_and_are_asked_about(tmp_path):
-    """Grain along either side makes two plates of nearly these peaks: places in a wrong order may name the wrong one."""
+    """Grain along either side makes two plates of nearly these peaks, and a wrong order may name the other."""
     (tmp_path / "planted.toml").write_text(CARD.replace("poisson_xy = 0.4", 'prior = "spruce"'))
     prepared = prepare(tmp_path / "planted.toml", may_lack_frequencies=True)
     names = ["({},{})".format(*name) for name, _ in board().modes.names()[:6]]
