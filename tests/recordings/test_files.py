@@ -41,6 +41,21 @@ def test_times_of_six_digits_give_the_rate_of_the_whole_span(tmp_path, begin):
     assert one.rate == pytest.approx(3.0 * RATE, rel=2e-4)
 
 
+def test_sets_of_other_kinds_are_passed_over(tmp_path):
+    """Analysers put a set 1858 behind each 58, which the library does not know."""
+    content = uff([TIME | {"x": TIMES}]) + b"    -1\n  1858\n         1         0\nNONE\n    -1\n"
+    (one,) = read(tmp_path / "a.uff", content)
+
+    assert one.response.size == HEARD.size
+
+
+def test_a_file_that_was_cut_off_in_its_only_set_says_so(tmp_path):
+    content = uff([TIME | {"x": TIMES}])
+
+    with pytest.raises(InputError, match=r"a\.uff: wanted data sets .*, got no set that is whole \(was it cut"):
+        read(tmp_path / "a.uff", content[: len(content) // 2])
+
+
 def test_times_with_a_gap_are_refused(tmp_path):
     kept = np.delete(np.arange(HEARD.size), 3000)
 
