@@ -42,7 +42,7 @@ from bayesplate.recordings.picking import HIGHEST, LOWEST, Picked, pick_modes
 from bayesplate.recordings.reading import read_recordings
 from bayesplate.recordings.sand import read_picture
 from bayesplate.recordings.signals import Recording
-from bayesplate.recordings.sweeps import Sweep, impulse_response, read_sweep
+from bayesplate.recordings.sweeps import band_of, impulse_response, read_sweep
 from bayesplate.recordings.taking import Heard, take, take_impulses
 from bayesplate.results.contract import json_text
 from bayesplate.results.folder import FIGURES
@@ -160,7 +160,12 @@ def pick(
         [replace(one, hammer=struck, sensor=listened) for one in own]
         for own, (struck, listened) in zip(read, given_places(hammer, sensor, read), strict=True)
     ]
-    heard = take(read, highest) if sweep is None else take_impulses(_impulses(read, sweep), highest)
+    if sweep is None:
+        heard = take(read, highest)
+    else:
+        impulses, (first, last) = _impulses(read, sweep, highest)
+        lowest, highest = max(lowest, first), min(highest, last)
+        heard = take_impulses(impulses, highest)
     picked = pick_modes(heard.spectra, lowest, highest)
     summary = _summary(files, heard, picked, prepared, polarity, pictures, sensor_mass)
     if out is not None:
@@ -176,16 +181,19 @@ def _one_setup(prepared: Prepared) -> Prepared:
     return prepared
 
 
-def _impulses(read: Sequence[Sequence[Read]], sweep: str) -> list[tuple[Recording, Hit]]:
-    """Impulse responses in place of recordings of a sweep, each as if the board had been hit once."""
+def _impulses(
+    read: Sequence[Sequence[Read]], sweep: str, highest: float
+) -> tuple[list[tuple[Recording, Hit]], tuple[float, float]]:
+    """Impulse responses in place of recordings of a sweep, each as if the board had been hit once; and its band, Hz."""
     recordings = [one for own in read for one in own if isinstance(one, Recording) and one.force is None]
     wrong = [one.name for own in read for one in own if one not in recordings]
     if wrong:
         wanted = "one channel with the response to the sweep"
         raise InputError([Fault(name, wanted, "another kind of file", "leave --sweep out for hits") for name in wrong])
-    played: Sweep | Floats
+    played: list[Floats]
     if not os.path.exists(sweep):
-        played = read_sweep(sweep)
+        stated = read_sweep(sweep)
+        played = [stated.signal(one.rate) for one in recordings]
     else:
         ((itself, *_),) = read_recordings([sweep], was_played=True)
         if not isinstance(itself, Recording):
@@ -194,16 +202,17 @@ def _impulses(read: Sequence[Sequence[Read]], sweep: str) -> list[tuple[Recordin
         if off:
             wanted = f"{itself.rate:g} Hz, as the sweep"
             raise InputError([Fault(f"{one.name} rate", wanted, f"{one.rate:g} Hz") for one in off])
-        played = itself.response
+        played = [itself.response] * len(recordings)
     found, faults = [], list[Fault]()
-    for one in recordings:
+    for one, signal in zip(recordings, played, strict=True):
         try:
-            found.append(impulse_response(one, played))
+            found.append(impulse_response(one, signal, highest))
         except InputError as error:
             faults += error.faults
     if faults:
         raise InputError(faults)
-    return found
+    bands = [band_of(signal, one.rate) for one, signal in zip(recordings, played, strict=True)]
+    return found, (max(first for first, _ in bands), min(last for _, last in bands))
 
 
 def _summary(

@@ -45,6 +45,13 @@ _OFF = 0.03
 """Relative distance up to which a picture of sand belongs to a peak."""
 _OBLONG = 0.01
 """Product of the logarithms of two aspect ratios from which on it matters that one is oblong the other way."""
+_CONTRADICTED = -12.0
+"""ln of how much likelier all peaks are with their residues than without, below which the places must be wrong: more
+than one peak contradicts every way to label them."""
+_OTHER_PLACES = (
+    "the residues are those of no modes between these places, and say nothing of the labels: are hammer and sensor "
+    "where the files say, in mm from the corner of x0 and y0, and in the order of the files?"
+)
 _MOST_COMPLEX = 45.0
 """Degrees by which a residue may be complex whose sign tells the polarity."""
 
@@ -56,7 +63,7 @@ class Labels:
     probabilities: tuple[dict[str, float], ...]  # of each likely peak: its labels, the most probable first
     by_evidence: tuple[dict[str, float], ...]  # from sand and residues alone; empty where neither tells anything
     flips: bool | None  # whether force and response have opposite polarity; None if that does not show
-    doubts: tuple[str, ...] = ()  # pictures that show another mode than their frequency says
+    doubts: tuple[str, ...] = ()  # places or pictures that contradict the frequencies
 
     def stated(self, peak: int) -> tuple[str, float] | None:
         """The label that a card may state, and the confidence in it; None where it is left to the fit.
@@ -89,12 +96,16 @@ def label_peaks(
         raise NotIdentifiableError("no plate of these sizes and edges has such peaks")
     known = [MostlyKnown.of(way, _bare(board, likely)) for way, _ in ways]
     shares = np.array([share for _, share in ways])
+    doubts = []
+    if max(one.gain(_of_residues(one, picked)) for one in known) < _CONTRADICTED:
+        doubts.append(_OTHER_PLACES)
+        picked = replace(picked, spectra=replace(picked.spectra, between=((None, None),) * len(picked.spectra.between)))
     if flips is None:
         flips = _flips(known, shares, picked)
     if flips is not None:
         signs = [picked.sign(answer, flips) for answer in picked.likely_answers]
         known = [one.with_peaks(_bare(board, likely, signs)) for one in known]
-    doubts = tuple(_other_modes(known[int(np.argmax(shares))], likely, pictures))
+    doubts += _other_modes(known[int(np.argmax(shares))], likely, pictures)
     evidence = [_evidence(one, picked, pictures) for one in known]
     weights = np.log(shares) + [one.gain(own) for one, own in zip(known, evidence, strict=True)]
     shares = np.exp(weights - weights.max())
@@ -102,7 +113,7 @@ def label_peaks(
     every = [*zip(known, evidence, shares, strict=True)]
     by_all = _by_name([(one.names, share * one.probabilities(own)) for one, own, share in every])
     alone = _by_name([(one.names, share * _alone(own, one, likely)) for one, own, share in every])
-    return Labels(by_all, alone, flips, doubts)
+    return Labels(by_all, alone, flips, tuple(doubts))
 
 
 def _bare(board: Board, peaks: Sequence[PickedRow], signs: Sequence[str] | None = None) -> Board:
@@ -148,6 +159,14 @@ def _residue_evidence(known: MostlyKnown, picked: Picked, residues: Floats) -> t
     return residue_evidence(measured, sd, residues, known.largest, known.probabilities(None))
 
 
+def _of_residues(known: MostlyKnown, picked: Picked) -> Floats:
+    """ln of what the residues say of each pair of a likely peak and a mode: (n_likely, n_modes) array."""
+    residues = _residues(known, picked)
+    if residues is None:
+        return np.zeros((len(picked.likely), len(known.names)))
+    return _residue_evidence(known, picked, residues)[0]
+
+
 def _flips(known: Sequence[MostlyKnown], shares: Floats, picked: Picked) -> bool | None:
     """Whether force and response have opposite polarity, where the signs leave no doubt."""
     odds = 0.0
@@ -165,10 +184,7 @@ def _flips(known: Sequence[MostlyKnown], shares: Floats, picked: Picked) -> bool
 
 def _evidence(known: MostlyKnown, picked: Picked, pictures: Mapping[int, Sequence[Floats]]) -> Floats:
     """ln of what residues and sand say of each pair of a likely peak and a mode: (n_likely, n_modes) array."""
-    residues = _residues(known, picked)
-    evidence = np.zeros((len(picked.likely), len(known.names)))
-    if residues is not None:
-        evidence += _residue_evidence(known, picked, residues)[0]
+    evidence = _of_residues(known, picked)
     for peak, own in pictures.items():
         for picture in own:
             evidence[peak] += sand_evidence(picture, known.shapes(_GRID))

@@ -146,7 +146,7 @@ def only_way(ways: Sequence[Way]) -> Way:
     (first, _), (second, _), *_ = possible
     raise NotIdentifiableError(
         f"{first.board.name}: its peaks are modes of plates that lie far apart, {' or '.join(each)}; "
-        f"{_deciding_label(first, second)}name a prior of the material or give the label of a mode"
+        f"{_deciding_label(first, second)}give the label of a mode, or a prior that tells the material better"
     )
 
 

@@ -39,8 +39,10 @@ def read_uff(path: Path, shown: str, rate: float | None, channels: str, motion: 
         raise InputError(Fault(shown, "pyuff installed, which reads UFF", "none", remedy)) from None
     sets = []
     try:
-        every = pyuff.UFF(str(path)).read_sets()
-        sets = [one for one in (every if isinstance(every, list) else [every]) if one.get("type") == 58]
+        file = pyuff.UFF(str(path))
+        kinds = [int(kind) for kind in file.get_set_types()]
+        # one by one: the library reads no file that holds a set unknown to it
+        sets = [file.read_sets(number) for number, kind in enumerate(kinds) if kind == 58]
         found = [*_of_sets(sets, shown, motion)]
     except InputError:
         raise
@@ -48,7 +50,8 @@ def read_uff(path: Path, shown: str, rate: float | None, channels: str, motion: 
         wanted = "whole data sets 58" if sets else "a UFF file"
         raise InputError(Fault(shown, wanted, f"a broken one ({type(error).__name__})")) from None
     if not found:
-        raise InputError(Fault(shown, "data sets 58 or 58b with a time or a frequency response", f"{len(sets)} others"))
+        got = f"{len(kinds)} others" if kinds else "no set that is whole (was it cut off?)"
+        raise InputError(Fault(shown, "data sets 58 or 58b with a time or a frequency response", got))
     return found
 
 

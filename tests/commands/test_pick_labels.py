@@ -6,13 +6,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from generator.sand import photograph
-from made_recordings import CARD, SIDES, board
+from made_recordings import CARD, SENSOR, SIDES, board
 
 from bayesplate.commands.pick_labels import Labels, label_peaks, pictures_of
 from bayesplate.commands.pick_words import moved_between_hits
 from bayesplate.commands.prepare import prepare
 from bayesplate.recordings.contract import LabelChance, PickedRow
+from bayesplate.recordings.picking import Picked
 from bayesplate.recordings.sand import straightened
+from bayesplate.recordings.spectra import Spectra
+from bayesplate.recordings.strength import Answer
 from bayesplate.results.words import chances
 
 CASES = {
@@ -86,6 +89,41 @@ def test_false_peaks_among_the_lowest_do_not_change_the_labels_of_the_others(tmp
 
     right = [labels.probabilities[i].get(name, 0.0) > 0.95 for i, (_, _, name) in enumerate(every) if name]
     assert all(right)
+
+
+HAMMERS = ((0.03, 0.02), (0.29, 0.02), (0.145, 0.19), (0.43, 0.1))
+
+
+def hit_at(given: tuple[tuple[float, float], ...]) -> Picked:
+    """What was picked with a force, the hammer at four places of which others may be given."""
+    ring = board()
+    hz = ring.damped[:6]
+    residues = np.stack([ring.residues(hammer, SENSOR)[:6] for hammer in HAMMERS], axis=1)
+    answers = tuple(Answer(row + 0j, np.full(4, 0.01 * np.abs(residues).max()), 1.0) for row in residues)
+    lines, n = np.linspace(0.0, 500.0, 9), np.arange(4)
+    spectra = Spectra(
+        lines, np.ones((9, 4), dtype=complex), np.ones((9, 4), dtype=complex), ("a", "b", "c", "d"), n, n,
+        tuple((hammer, SENSOR) for hammer in given), "acceleration", 2.0,
+    )  # fmt: skip
+    return Picked(tuple(replace(PEAK, hz=one, sd_hz=1e-3 * one) for one in hz), answers, spectra, (), 20.0, 500.0)
+
+
+def test_places_that_contradict_every_label_say_nothing_and_are_asked_about(tmp_path):
+    """Grain along either side makes two plates of nearly these peaks, and a wrong order may name the other."""
+    (tmp_path / "planted.toml").write_text(CARD.replace("poisson_xy = 0.4", 'prior = "spruce"'))
+    prepared = prepare(tmp_path / "planted.toml", may_lack_frequencies=True)
+    names = ["({},{})".format(*name) for name, _ in board().modes.names()[:6]]
+
+    right, wrong = (
+        label_peaks(prepared.card, prepared.prior, hit_at(given), None, {}) for given in (HAMMERS, HAMMERS[::-1])
+    )
+
+    for labels in (right, wrong):
+        assert [next(iter(own)) for own in labels.probabilities] == names
+    assert not right.doubts
+    assert right.flips is False
+    assert wrong.doubts[0].startswith("the residues are those of no modes between these places")
+    assert wrong.flips is None
 
 
 ROW = PickedRow(

@@ -12,7 +12,7 @@ from scipy.io import wavfile
 from bayesplate.errors import InputError
 from bayesplate.recordings.reading import read_recordings
 from bayesplate.recordings.signals import Read, Recording
-from bayesplate.recordings.sweeps import Sweep, impulse_response
+from bayesplate.recordings.sweeps import Sweep, band_of, impulse_response, read_sweep
 from bayesplate.recordings.taking import take
 
 RATE = 6000
@@ -39,6 +39,21 @@ def test_times_of_six_digits_give_the_rate_of_the_whole_span(tmp_path, begin):
     (one,) = read(tmp_path / "a.uff", uff([TIME | {"x": TIMES / 3.0 + begin}]))
 
     assert one.rate == pytest.approx(3.0 * RATE, rel=2e-4)
+
+
+def test_sets_of_other_kinds_are_passed_over(tmp_path):
+    """Analysers put a set 1858 behind each 58, which the library does not know."""
+    content = uff([TIME | {"x": TIMES}]) + b"    -1\n  1858\n         1         0\nNONE\n    -1\n"
+    (one,) = read(tmp_path / "a.uff", content)
+
+    assert one.response.size == HEARD.size
+
+
+def test_a_file_that_was_cut_off_in_its_only_set_says_so(tmp_path):
+    content = uff([TIME | {"x": TIMES}])
+
+    with pytest.raises(InputError, match=r"a\.uff: wanted data sets .*, got no set that is whole \(was it cut"):
+        read(tmp_path / "a.uff", content[: len(content) // 2])
 
 
 def test_times_with_a_gap_are_refused(tmp_path):
@@ -210,25 +225,50 @@ def test_compressed_sound_is_refused_by_its_name(tmp_path):
 SWEPT = Sweep(25.0, 900.0, 3.0)
 
 
-def swept(signal: np.ndarray) -> Recording:
-    """What a board answers to a signal."""
+def swept(signal: np.ndarray, noise: float = 1e-3) -> Recording:
+    """What a board answers to a signal, with noise over the largest value."""
     rate = 3000.0
     times = np.arange(round(1.5 * rate)) / rate
     poles = 2.0 * np.pi * (-board().hertz * board().damping + 1j * board().damped)
     impulse = board().residues((0.15, 0.19), SENSOR) @ np.imag(np.exp(poles[:, None] * times))
     heard = np.convolve(signal, impulse)
     return Recording(
-        "s.wav", rate, heard + 1e-3 * np.abs(heard).max() * np.random.default_rng(2).standard_normal(heard.size)
+        "s.wav", rate, heard + noise * np.abs(heard).max() * np.random.default_rng(2).standard_normal(heard.size)
     )
 
 
 def test_a_sweep_that_was_not_played_is_refused_as_parameters_and_as_a_file():
     heard, other = swept(SWEPT.signal(3000.0)), SWEPT._replace(first=40.0)
-    impulse_response(heard, SWEPT)
+    impulse_response(heard, SWEPT.signal(3000.0), 700.0)
 
-    for one in (other, other.signal(3000.0), SWEPT._replace(last=1400.0), SWEPT._replace(duration=6.0)):
+    for one in (other, SWEPT._replace(last=1400.0), SWEPT._replace(duration=6.0)):
         with pytest.raises(InputError, match=r"s\.wav: wanted the response to this sweep, got no impulse when it is"):
-            impulse_response(heard, one)
+            impulse_response(heard, one.signal(3000.0), 700.0)
+
+
+@pytest.mark.parametrize("noise", [1e-3, 0.05])
+def test_a_sweep_that_hardly_raises_high_modes_is_known_in_noise(noise):
+    """A sensor of displacement: the low modes alone are loud, and highest together only after they set in."""
+    sweep = Sweep(45.0, 1400.0, 3.0).signal(3000.0)
+    displacement = np.cumsum(swept(sweep, 0.0).response)
+    level = noise * np.abs(displacement).max()
+    heard = displacement + level * np.random.default_rng(7).standard_normal(displacement.size)
+
+    response, hit = impulse_response(Recording("s.wav", 3000.0, heard), sweep, 300.0)
+
+    assert np.sum(response.response[: hit.onset] ** 2) < 0.1 * np.sum(response.response**2)
+
+
+def test_nothing_is_looked_for_where_a_sweep_did_not_go():
+    first, last = band_of(Sweep(45.0, 600.0, 3.0).signal(3000.0), 3000.0)
+
+    assert 42.0 < first < 48.0
+    assert 560.0 < last < 600.0
+
+
+def test_a_sweep_that_fits_into_no_memory_is_refused():
+    with pytest.raises(InputError, match="sweep: wanted two rising frequencies in Hz and a time in s, up to 600, got"):
+        read_sweep("20,2000,1e9")
 
 
 def test_a_linear_sweep_is_no_exponential_one():
@@ -236,7 +276,7 @@ def test_a_linear_sweep_is_no_exponential_one():
     linear = np.sin(2.0 * np.pi * (25.0 * times + 0.5 * 875.0 / 3.0 * times**2))
 
     with pytest.raises(InputError, match="got no impulse when it is turned back"):
-        impulse_response(swept(linear), SWEPT)
+        impulse_response(swept(linear), SWEPT.signal(3000.0), 700.0)
 
 
 def test_a_channel_of_noise_beside_a_response_is_left_out(tmp_path):
