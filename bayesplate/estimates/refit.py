@@ -101,7 +101,7 @@ def most_likely(
         if bounds is None or bounds.are_open:
             return np.asarray(least_squares(residuals, start, jacobian, method="lm", xtol=1e-10, ftol=1e-10).x)
         limits = (bounds.lower, bounds.upper)
-        return np.asarray(least_squares(residuals, start, jacobian, bounds=limits, x_scale="jac").x)
+        return np.asarray(least_squares(residuals, start, jacobian, bounds=limits, x_scale="jac", ftol=1e-6).x)
 
 
 def has_come_to_rest(fitted: Floats, starts: Floats, n: int) -> Bools:

@@ -82,11 +82,23 @@ class SymmetryClass:
         values = np.concatenate([self._values(elements, both) for both in self._field_pairs])
         stored = np.bincount(stored_at, values[kept], indices.size)
         matrix = csc_array((stored, indices, indptr), shape=(self.n_dof, self.n_dof))
-        for term, weight in elements.elsewhere:
-            left, right, shares = self._rows[term]
-            form = csc_array(left.T) @ csc_array((weight * shares)[:, None] * right)
-            matrix = matrix + 0.5 * (form + form.T)
-        return matrix
+        if not elements.elsewhere:
+            return matrix
+        left, right, at = self._stacked
+        scales = np.concatenate([weight * self._rows[term][2] for term, weight in elements.elsewhere])
+        rows = np.concatenate([at[term] for term, _ in elements.elsewhere])[scales != 0.0]
+        form = left[rows].T @ (right[rows] * scales[scales != 0.0][:, None])
+        return csc_array(matrix + 0.5 * (form + form.T))
+
+    @cached_property
+    def _stacked(self) -> tuple[Any, Any, dict[Term, Indices]]:
+        """What is multiplied by all terms of `_rows` together, sparse: (n, n_dof) arrays, and the rows of each term."""
+        from scipy.sparse import csr_array
+
+        left, right = (csr_array(np.concatenate([rows[i] for rows in self._rows.values()])) for i in (0, 1))
+        ends = np.cumsum([shares.size for _, _, shares in self._rows.values()])
+        at = (np.arange(end - shares.size, end) for end, (_, _, shares) in zip(ends, self._rows.values(), strict=True))
+        return left, right, dict(zip(self._rows, at, strict=True))
 
     @property
     def _field_pairs(self) -> list[tuple[str, str]]:
