@@ -174,9 +174,10 @@ def _clamps(board: Board, setup: Setup, where: str) -> Iterator[Row]:
 
 def _labels(setup: Setup, where: str) -> Iterator[Row]:
     first = setup.first_label
+    lowest = [min((getattr(label, order) for label in setup.labels), default=0) for order in ("m", "n")]
+    remedy = f"first_label = [{min(lowest[0], first.m)}, {min(lowest[1], first.n)}]?"
     for label in setup.labels:
         holds = label.m >= first.m and label.n >= first.n
-        remedy = f"first_label = [{min(label.m, first.m)}, {min(label.n, first.n)}]?"
         yield f'{where} frequencies_hz."{label}"', holds, f"labels not below first_label, {first}", str(label), remedy
     ascending = sorted((reading.frequency.mean, reading.label) for reading in setup.readings)
     for (low, below), (high, above) in itertools.pairwise(ascending):

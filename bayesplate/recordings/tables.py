@@ -91,15 +91,29 @@ def _columns(path: Path, shown: str, names: list[str], skipped: int) -> dict[str
         with path.open(encoding="utf-8-sig") as lines, warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # that there are no numbers is told below
             values = np.loadtxt(islice(lines, skipped, None), delimiter=",", ndmin=2, comments="#")
-    except ValueError as error:  # no numbers, or no UTF-8
-        wanted, remedy = f"{len(names)} numbers on each line", "mend or cut that line"
-        raise InputError(Fault(shown, wanted, str(error)[:120], remedy)) from None
+    except ValueError:  # no numbers, or no UTF-8
+        raise InputError(_wrong_line(path, shown, len(names), skipped)) from None
     if not values.size:
         raise InputError(Fault(shown, "samples below the header", "none", "record it again"))
     if values.shape[1] != len(names):
         raise InputError(Fault(shown, f"{len(names)} columns, as the header names", str(values.shape[1])))
     # of two columns that mean the same the first counts
     return {_KEYS[name]: np.ascontiguousarray(values[:, k]) for k, name in reversed([*enumerate(names)])}
+
+
+def _wrong_line(path: Path, shown: str, n: int, skipped: int) -> Fault:
+    """The first line after those that are skipped which does not hold n numbers."""
+    wanted, remedy = f"{n} number{'s' * (n > 1)} on each line", "mend or cut that line"
+    with path.open(encoding="utf-8-sig", errors="replace") as lines:
+        for number, line in enumerate(islice(lines, skipped, None), start=skipped + 1):
+            told = line.partition("#")[0].strip()
+            try:
+                is_right = len([float(cell) for cell in told.split(",")]) == n
+            except ValueError:
+                is_right = not told
+            if not is_right:
+                return Fault(f"{shown} line {number}", wanted, f'"{told[:60]}"', remedy)
+    return Fault(shown, wanted, "other lines", remedy)
 
 
 def _response(columns: dict[str, Floats], shown: str, motion: Motion) -> FrequencyResponse:

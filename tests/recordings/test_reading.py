@@ -131,6 +131,7 @@ def test_every_fault_of_every_file_is_told_at_once(tmp_path):
     (tmp_path / "typo.csv").write_text("force,accelleration\n1,2\n")
     (tmp_path / "rate.csv").write_text("acceleration\n" + "0.1\n0.2\n" * 9000)
     (tmp_path / "words.csv").write_text("acceleration\nloud\n")
+    (tmp_path / "short.csv").write_text("# a hit\nforce,acceleration\n1,2\n3\n")
     said = [
         *FAULTS.values(),
         "empty.wav: wanted a recording, got an empty file",
@@ -142,7 +143,8 @@ def test_every_fault_of_every_file_is_told_at_once(tmp_path):
         "comma.csv line 1: wanted commas between columns, got semicolons or tabs",
         "typo.csv line 1: wanted columns among time, time_s, t, force, response, sound, acceleration",
         "rate.csv rate: wanted a column time, or --rate, got neither (--rate 48000)",
-        "words.csv: wanted 1 numbers on each line, got",
+        'words.csv line 2: wanted 1 number on each line, got "loud" (mend or cut that line)',
+        'short.csv line 4: wanted 2 numbers on each line, got "3" (mend or cut that line)',
         "gone.wav: wanted a recording, got no such file",
     ]
     names = [f"{name}.wav" for name in FAULTS] + [line.partition(":")[0].split()[0] for line in said[len(FAULTS) :]]
