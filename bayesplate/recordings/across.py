@@ -37,6 +37,8 @@ modes may differ by that are matched."""
 _FEWEST, _CANDIDATES = 3, 5
 """How many likely modes tell of a recording, and how many of the fullest recordings are tried as the one over which the
 others are laid."""
+_OF_ONE_BOARD = 0.02
+"""Difference in frequency up to which one board may change from day to day, with the air or where it is held."""
 _NOTED = 1e-3
 """Relative difference of a recording from the others from which on it is told."""
 _MOST_NAMED = 4
@@ -209,4 +211,5 @@ def _differences(names: Sequence[str], groups: Sequence[Group], n_records: int) 
     are_hits = any(" hit " in name for name in names)
     which = f"each of the {len(names)} clearest" if are_hits and len(names) < n_records else "each"
     what = "hits" if are_hits else "recordings"
-    return f"the {what} differ {how}: {which} was searched by itself, and the errors hold by what a mode scatters"
+    ask = "; are they of one board, held and loaded alike?" if max(told, default=(0.0, ""))[0] > _OF_ONE_BOARD else ""
+    return f"the {what} differ {how}: {which} was searched by itself, and the errors hold by what a mode scatters{ask}"
