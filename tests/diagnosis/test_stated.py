@@ -65,7 +65,7 @@ def test_a_claim_in_words():
     )
     told = stated_sentence(replace(STATED[0], holds=False, predicts="water"))
     assert "takes the error of setup 'water', predicted by the constants of the first setup alone, from 61.0" in told
-    assert "That an error is reduced is not claimed: that asks for a fall by 20%" in told
+    assert "That an error is reduced is not claimed: that asks for a fall by 20 %" in told
     assert "error reduced." not in told
 
 
