@@ -319,7 +319,7 @@ def main() -> int:
     parser.add_argument("--resolution", type=float, default=1.0, help="Hz; 0 for readings that are not rounded")
     parser.add_argument("--without-effect", action="store_true", help="no size of an effect among the ranks")
     parser.add_argument("--base-seed", type=int, default=1)
-    parser.add_argument("--publish", type=Path, help="folder for a page of what was found")
+    parser.add_argument("--publish", type=Path, help="folder for a page of the parts that were computed")
     arguments = vars(parser.parse_args())
     if arguments["generator"] == "ritz" and not arguments["without_effect"]:
         parser.error("the independent solver knows no effects: --without-effect")
@@ -347,8 +347,9 @@ def main() -> int:
     for name, lines in found.items():
         print(f"{SECTIONS[name][0]}\n" + "\n".join(lines))
     if arguments["publish"]:
-        publish(arguments["publish"], found, every)
-        measured.note(arguments["publish"], *(f"calibration, {name}" for name in arguments["parts"]))
+        asked = [name for name in arguments["parts"] if name in found]
+        publish(arguments["publish"], {name: found[name] for name in asked}, {name: every[name] for name in asked})
+        measured.note(arguments["publish"], *(f"calibration, {name}" for name in asked))
     print(f"{'calibrated' if well else 'NOT CALIBRATED'}, {(time.perf_counter() - started) / 60:.1f} minutes")
     return 0 if well else 1
 
