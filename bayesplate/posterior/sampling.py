@@ -27,7 +27,7 @@ from bayesplate.posterior.starts import LogDensity, cholesky_factor, guarded
 
 _FIRST_LOOK, _LOOK_AGAIN = 200, 1.15
 _LONG_ENOUGH = 4.0
-"""Times the length and the effective draws that the gate wants, from which on a run that does not pass never will."""
+"""Times the length that the gate wants, from which on a small acceptance stays small."""
 
 
 @dataclass(frozen=True)
@@ -108,8 +108,8 @@ def sample(
     """Sample until the gate passes or further steps are of no use.
 
     They are of none where `settings.max_steps` are made, where more than twice as many would be needed, and where the
-    chains have four times the length and the effective draws that the gate wants and do not pass: a small acceptance,
-    for one, stays small.
+    chains are four times as long as the gate wants and accept too few proposals. All else may pass later: effective
+    draws add up, and a walker that sits in a narrow place leaves it.
 
     The draws depend on the seed alone: a run that was killed and continued from its checkpoint gives the same bytes.
 
@@ -135,7 +135,9 @@ def sample(
                 if is_last or n_taus >= settings.gate.tau_count_min:
                     chains = Chains(ensembles.chain, ensembles.log_prob, burn_in)
                     convergence = assess(chains.kept, settings.gate, names=names)
-                    if is_last or convergence.passed or _is_long_enough(n_taus, convergence.ess_min, settings.gate):
+                    is_long = n_taus >= _LONG_ENOUGH * settings.gate.tau_count_min
+                    is_last |= is_long and convergence.acceptance < settings.gate.acceptance_min
+                    if is_last or convergence.passed:
                         if session is not None:
                             session.save()
                         return chains, convergence
@@ -153,11 +155,6 @@ def is_hopeless(n_taus: float, n_kept: int, settings: SamplerSettings) -> bool:
     while a walker has not moved yet, `n_taus` is 0.
     """
     return 0.0 < n_taus * 2 * settings.max_steps < settings.gate.tau_count_min * n_kept
-
-
-def _is_long_enough(n_taus: float, ess_min: float, gate: Gate) -> bool:
-    """Whether more steps would cure nothing that the gate asks for."""
-    return n_taus >= _LONG_ENOUGH * gate.tau_count_min and ess_min >= _LONG_ENOUGH * gate.ess_min
 
 
 def _is_due(n_steps: int, chunk_steps: int) -> bool:
