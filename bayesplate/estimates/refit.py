@@ -31,6 +31,10 @@ _REACH = 7.0
 _EDGE = 0.9
 """Share of it beyond which a fit has not come to rest: readings that leave a constant open lead there."""
 
+_LEAST_GAIN = 1e-6
+"""Share of the misfit that a step within bounds has to gain: less moves a parameter by a small part of its standard
+error, and along a bent valley there are hundreds of such steps."""
+
 
 def n_constants(predict: Predict) -> int:
     """How many of the parameters are logarithms of free rigidities, which have no priors in a fit."""
@@ -101,7 +105,7 @@ def most_likely(
         if bounds is None or bounds.are_open:
             return np.asarray(least_squares(residuals, start, jacobian, method="lm", xtol=1e-10, ftol=1e-10).x)
         limits = (bounds.lower, bounds.upper)
-        return np.asarray(least_squares(residuals, start, jacobian, bounds=limits, x_scale="jac", ftol=1e-6).x)
+        return np.asarray(least_squares(residuals, start, jacobian, bounds=limits, x_scale="jac", ftol=_LEAST_GAIN).x)
 
 
 def has_come_to_rest(fitted: Floats, starts: Floats, n: int) -> Bools:
