@@ -30,7 +30,6 @@ _REACH = 7.0
 """Change of ln D, from where a fit begins, up to which constants are looked for: a thousandfold."""
 _EDGE = 0.9
 """Share of it beyond which a fit has not come to rest: readings that leave a constant open lead there."""
-
 _LEAST_GAIN = 1e-6
 """Share of the misfit that a step within bounds has to gain: less moves a parameter by a small part of its standard
 error, and along a bent valley there are hundreds of such steps."""
