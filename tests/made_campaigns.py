@@ -1,4 +1,4 @@
-"""Simulated campaigns: boards with one accelerometer, by the independent generator."""
+"""Campaigns: a card, and simulated boards with one accelerometer, by the independent generator."""
 
 from __future__ import annotations
 
@@ -10,6 +10,24 @@ MASS = 0.003
 """kg, of the accelerometer."""
 SHEAR = {"G_xz": 0.65e9, "G_yz": 0.03e9}
 """Pa, of boards that have shear."""
+
+TWO_BOARDS = """\
+format = 1
+name = "my-campaign"
+title = "Two boards"
+boards = ["spruce-free-2L", "./my-board.toml"]
+
+[[shared]]
+effect = "attached_mass"
+
+[[shared]]
+effect = "transverse_shear"
+as = "ratio"
+
+[population]
+prior = "spruce"
+"""
+"""A card of a campaign that says all that one may."""
 
 
 def write_campaign(folder, masses=(MASS,) * 3, seed=5, population="spruce", noise_cents=5.0, has_shear=False):

@@ -5,28 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from made_campaigns import TWO_BOARDS as CAMPAIGN
 
 from bayesplate.board.board import Board
 from bayesplate.board.campaign import is_campaign, load_campaign
 from bayesplate.board.shelf import card_names, shelf_folder
 from bayesplate.errors import InputError
-
-CAMPAIGN = """\
-format = 1
-name = "my-campaign"
-title = "Two boards"
-boards = ["spruce-free-2L", "./my-board.toml"]
-
-[[shared]]
-effect = "attached_mass"
-
-[[shared]]
-effect = "transverse_shear"
-as = "ratio"
-
-[population]
-prior = "spruce"
-"""
 
 
 def written(tmp_path: Path, text: str = CAMPAIGN) -> Path:

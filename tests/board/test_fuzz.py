@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from fuzzing import accepted_or_refused, fuzzed, stopped_if_it_hangs
 from hypothesis import strategies as st
+from made_campaigns import TWO_BOARDS as CAMPAIGN
 
 from bayesplate.board.board import Board
 from bayesplate.board.campaign import load_campaign
@@ -25,19 +26,6 @@ from bayesplate.errors import Fault, InputError
 BOARD = "finnish-spruce-cantilever"
 CARD = (shelf_folder("boards") / f"{BOARD}.toml").read_text(encoding="utf-8")
 TEMPLATE = CARD.partition("[setup.frequencies_hz]")[0].replace(BOARD, "template")
-CAMPAIGN = """\
-format = 1
-name = "together"
-title = "Two boards"
-boards = ["spruce-free-2L", "./my-board.toml"]
-[[shared]]
-effect = "attached_mass"
-[[shared]]
-effect = "transverse_shear"
-as = "ratio"
-[population]
-prior = "spruce"
-"""
 FRAGMENT = """\
 # Picked from hit1.wav
 [setup]
@@ -234,7 +222,7 @@ def test_what_is_spoilt_here_was_sound():
     """The negative control."""
     whole, _ = merged(SOUND, "board.toml", written("fragment.toml", FRAGMENT))
     assert len(Board.from_text(toml_text(whole), BOARD).setups[0].readings) == 1
-    assert load_campaign(written("together.toml", CAMPAIGN)).name == "together"
+    assert load_campaign(written("my-campaign.toml", CAMPAIGN)).name == "my-campaign"
     boards, _ = boards_of(written("boards.csv", ROWS), BENCH["folder"] / "template.toml")
     assert [board.card().name for board in boards] == ["a", "b"]
 

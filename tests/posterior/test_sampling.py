@@ -47,6 +47,15 @@ def test_a_run_that_lacks_effective_draws_alone_goes_on():
     assert convergence.n_taus > 4.0 * gate.tau_count_min
 
 
+def test_a_run_goes_on_while_single_walkers_hardly_move():
+    """More steps may free them, where a small acceptance of all stays small: here none moves as often as is wanted."""
+    settings = SamplerSettings(seed=3, max_steps=3000, gate=Gate(walker_acceptance_min=0.99))
+    chains, convergence = sample(log_normal_density, MEAN, COVARIANCE, settings)
+    assert not convergence.passed
+    assert convergence.ess_min > 4.0 * settings.gate.ess_min
+    assert chains.draws.shape[1] == 3000
+
+
 def test_a_correlated_normal_is_recovered_and_a_wider_one_is_told_apart():
     settings = SamplerSettings(seed=11, gate=Gate(ess_min=2500))
     chains, convergence = sample(log_normal_density, MEAN, COVARIANCE, settings)

@@ -12,7 +12,7 @@ from scipy.signal import fftconvolve
 from bayesplate.recordings.picking import Picked, pick_modes
 from bayesplate.recordings.signals import FrequencyResponse, Recording
 from bayesplate.recordings.spectra import response_spectra
-from bayesplate.recordings.sweeps import Sweep, impulse_response
+from bayesplate.recordings.sweeps import Sweep, impulse_response, read_sweep
 from bayesplate.recordings.taking import Heard, take, take_impulses
 from bayesplate.report.recordings import averaged
 
@@ -124,6 +124,7 @@ def test_a_sweep_gives_the_frequencies_of_the_board_by_its_parameters_as_by_itse
     waves = np.exp(-decay[:, None] * times) * np.sin(omega[:, None] * times) * omega[:, None]
     impulse = board().residues(HAMMERS[0], SENSOR) @ waves / rate
     played = sweep.signal(rate)
+    np.testing.assert_array_equal(read_sweep("20,800,3").signal(rate), played)
     response = fftconvolve(played + 0.05 * played**2, impulse)
     response = response + 1e-3 * np.abs(response).max() * np.random.default_rng(3).standard_normal(response.size)
     heard = Recording("sweep", rate, response)
