@@ -8,10 +8,8 @@ it stopped if it is given the same file.
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +22,8 @@ import numpy as np
 from scipy import stats
 from validation.calibration.cases import CASES, effect_of
 from validation.calibration.planted import Settings, cover_one, identity
-from validation.calibration.records import Record, add_to, publish, read_done
+from validation.calibration.records import Record
+from validation.calibration.study import Page, Study, arguments, carry_out
 
 NOMINAL = 0.90
 LEAST, MOST = 0.84, 0.95
@@ -33,11 +32,6 @@ POOLED_FROM = 200
 FAMILY_LEVEL = 0.05
 """Chance that a fit that is right leaves any of the bands; each band takes its share."""
 CONSTANTS = ("E_x", "E_y", "G_xy")
-PAGES = {
-    "coverage": "Coverage: how many 90 % intervals hold the planted value of a declared effect",
-    "two-setups": "Coverage: a board clamped and free, with a clamp that gives and whose grip is not known",
-}
-"""Titles of what may be published, by the name of the page and of the command."""
 ABOUT = (
     "Allowed: counts that a fit which is right keeps to; the chance that it leaves any of these bands, "
     f"{100 * FAMILY_LEVEL:g} %, is shared among all rows. The rows pooled "
@@ -45,6 +39,11 @@ ABOUT = (
     "parameter. The last column is how much the readings narrow a parameter: the posterior's standard deviation over "
     "the prior's, the median of the boards. The control, intervals of half the width, must fail."
 )
+PAGES = {
+    "coverage": "Coverage: how many 90 % intervals hold the planted value of a declared effect",
+    "two-setups": "Coverage: a board clamped and free, with a clamp that gives and whose grip is not known",
+}
+"""Titles of what may be published, by the name of the page and of the command."""
 
 Interval = dict[str, float]
 
@@ -158,45 +157,23 @@ def _line(count: Count, level: float) -> str:
     return f"  {count.effect:30} {count.name:42} {_share(count):20} {band:18}{narrowing}{mark}"
 
 
-def run(
-    settings: Settings, effects: Sequence[str], n_boards: int, workers: int, out: Path, *, quiet: bool = False
-) -> list[Record]:
-    """Do what is not done yet, and return the records of all boards asked for, effect after effect."""
-    records = read_done(out, identity(settings))
-    done = {(record["effect"], record["board"]) for record in records}
+def study(settings: Settings, effects: Sequence[str], n_boards: int) -> Study:
+    """So many boards of each effect, or five times as many."""
     wanted = [(effect, i) for effect in effects for i in range(n_boards * CASES[effect].times)]
-    jobs = [(settings, *one) for one in sorted(wanted, key=lambda one: one[1]) if one not in done]
-    records += add_to(out, cover_one, jobs, workers, quiet=quiet)
-    by_board = {(record["effect"], record["board"]): record for record in records}
-    return [by_board[one] for one in wanted]
+    wanted.sort(key=lambda one: one[1])
+    jobs = [({"effect": effect, "board": i}, (settings, effect, i)) for effect, i in wanted]
+    return Study(cover_one, identity(settings), jobs, judge)
 
 
 def main() -> int:
     """Run the command."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument(
-        "--boards",
-        type=int,
-        default=40,
-        help="of each effect, or five times as many",
-    )
+    parser = arguments(__doc__, 40, "boards", "of each effect, or five times as many")
     parser.add_argument("--effect", action="append", choices=list(CASES), help="repeat for several; absent: all")
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--out", type=Path, required=True, help="JSON lines; gone on with if it exists")
     parser.add_argument("--base-seed", type=int, default=1)
-    parser.add_argument("--publish", type=Path, help="folder for a page of what was found")
     parser.add_argument("--page", choices=list(PAGES), default="coverage", help="which page it is")
     options = parser.parse_args()
-    started = time.perf_counter()
-    settings = Settings(base_seed=options.base_seed)
-    records = run(settings, options.effect or list(CASES), options.boards, options.workers, options.out)
-    lines, well = judge(records)
-    print("\n".join(lines))
-    if options.publish:
-        page = "\n".join(lines).splitlines()
-        publish(options.publish, options.page, PAGES[options.page], f"make {options.page}", page, ABOUT)
-    print(f"{(time.perf_counter() - started) / 60:.1f} minutes")
-    return 0 if well else 1
+    asked = study(Settings(base_seed=options.base_seed), options.effect or list(CASES), options.n)
+    return carry_out(asked, Page(options.page, PAGES[options.page], ABOUT), options)
 
 
 if __name__ == "__main__":

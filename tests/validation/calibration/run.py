@@ -13,8 +13,8 @@ import argparse
 import os
 import sys
 import time
-from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from validation.calibration.mutants import FITTED
 from validation.calibration.pictures import ALT, draw
 from validation.calibration.records import Record, add_to, read_done
 from validation.calibration.sbc import identity, simulate_one
+from validation.calibration.study import Study, numbered
 from validation.calibration.table import (
     COVERAGE_LEVEL,
     FAMILY_LEVEL,
@@ -109,41 +110,6 @@ SECTIONS = {
 """Parts of the page: their titles and what they are."""
 
 
-@dataclass(frozen=True)
-class Part:
-    """One part: what is computed, what a file of it must agree in, and what the records say.
-
-    Attributes
-    ----------
-    simulate : callable
-        Of the items of a job.
-    identity : dict
-    jobs : list of (key, job)
-        A record holds the items of its key.
-    judge : callable
-        Records to lines and whether all is well.
-    """
-
-    simulate: Callable[..., Record]
-    identity: Record
-    jobs: Sequence[tuple[Record, tuple[Any, ...]]]
-    judge: Callable[[Sequence[Record]], tuple[list[str], bool]]
-
-    def run(self, out: Path, workers: int, *, quiet: bool = False) -> list[Record]:
-        """Do what is not done yet, and return the records of all jobs."""
-        done = read_done(out, self.identity)
-        open_ones = [job for key, job in self.jobs if not any(key.items() <= record.items() for record in done)]
-        return self._asked_for(done + add_to(out, self.simulate, open_ones, workers, quiet=quiet))
-
-    def done(self, out: Path) -> list[Record]:
-        """The records of those jobs that were done before."""
-        return self._asked_for(read_done(out, self.identity)) if out.exists() else []
-
-    def _asked_for(self, done: Sequence[Record]) -> list[Record]:
-        found = (next((one for one in done if key.items() <= one.items()), None) for key, _ in self.jobs)
-        return [one for one in found if one is not None]
-
-
 MODELS = {
     "linear": Design(law="fixed-linear", resolution=0.0),
     "exact": Design(),
@@ -153,7 +119,7 @@ MODELS = {
 """Models that are ranked without mutants, by the name of their part."""
 
 
-def parts(sets: int, simulations: int, steps: int, ranked: int) -> dict[str, Part]:
+def parts(sets: int, simulations: int, steps: int, ranked: int) -> dict[str, Study]:
     """The parts beside the ranks with mutants, of so many data sets of each kind, simulations at each board, steps,
     and simulations of each further model.
     """
@@ -165,25 +131,25 @@ def parts(sets: int, simulations: int, steps: int, ranked: int) -> dict[str, Par
         ({"mutant": mutant, "steps": steps}, (joint.N_CHAINS, steps, 1, mutant)) for mutant in ("", *joint.MUTANTS)
     ]
     models = {
-        name: Part(simulate_one, identity(design), [({"simulation": i}, (design, i)) for i in range(ranked)], ranks_of)
+        name: Study(simulate_one, identity(design), numbered(design, n=ranked), ranks_of)
         for name, design in MODELS.items()
     }
     return models | {
-        "bare": Part(
+        "bare": Study(
             bare.simulate_one,
             bare.identity(),
-            [({"simulation": i}, (i,)) for i in range(ranked)],
+            numbered(n=ranked),
             lambda records: judge(list(records), {bare.HALF_NOISE: ranked}),
         ),
-        "campaign": Part(
+        "campaign": Study(
             campaign_ranks.simulate_one,
             campaign_ranks.identity(),
-            [({"simulation": i}, (i,)) for i in range(ranked)],
+            numbered(n=ranked),
             lambda records: judge(list(records), {campaign_ranks.TWICE: ranked}),
         ),
-        "oracle": Part(oracle.check_one, oracle.identity(), of_sets, oracle.judge),
-        "boards": Part(again.simulate_again, again.identity(), of_boards, again.judge),
-        "joint": Part(joint.check_one, joint.identity(), chains, joint.judge),
+        "oracle": Study(oracle.check_one, oracle.identity(), of_sets, oracle.judge),
+        "boards": Study(again.simulate_again, again.identity(), of_boards, again.judge),
+        "joint": Study(joint.check_one, joint.identity(), chains, joint.judge),
     }
 
 

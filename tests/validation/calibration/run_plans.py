@@ -8,7 +8,6 @@ the same file.
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from collections import Counter
@@ -36,7 +35,8 @@ from validation.calibration.plans import (
     simulate_one,
     wrongly,
 )
-from validation.calibration.records import Record, add_to, publish, read_done
+from validation.calibration.records import Record
+from validation.calibration.study import Page, Study, arguments, carry_out, numbered
 
 from bayesplate.diagnosis.verdict import WITHIN
 
@@ -49,6 +49,7 @@ ABOUT = (
     "explanations than two, or fewer, or not the true one, or had a label in doubt. The doubt is the entropy of the "
     "probabilities of the two."
 )
+PAGE = Page("plans", "Plans, calibrated", ABOUT)
 _WORDS = {
     "first": "the plan's first proposal",
     "random": "a random proposal",
@@ -57,17 +58,14 @@ _WORDS = {
 }
 
 
-def run(settings: Settings, n_boards: int, workers: int, out: Path, *, quiet: bool = False) -> list[Record]:
-    """Do what is not done yet, and return the records of all boards asked for, in their order."""
+def study(settings: Settings, n_boards: int) -> Study:
+    """So many boards."""
     asked = {design: list(effects) for design, effects in ASKED.items()}
     identity = {
         "format": 6, "settings": asdict(settings), "designs": list(CHOSEN), "asked": asked, "noise_cents": NOISE_CENTS,
     }  # fmt: skip
-    records = read_done(out, identity)
-    done = {record["simulation"] for record in records}
-    jobs = [(settings, i) for i in range(n_boards) if i not in done]
-    records += add_to(out, simulate_one, jobs, workers, quiet=quiet)
-    return sorted((one for one in records if one["simulation"] < n_boards), key=lambda one: one["simulation"])
+    jobs = numbered(settings, n=n_boards)
+    return Study(simulate_one, identity, jobs, lambda records: (told(records), all(bars(records).values())))
 
 
 def told(records: Sequence[Record]) -> list[str]:
@@ -112,7 +110,7 @@ def _counted(records: Sequence[Record], way: str) -> str:
     return ", ".join(f"{what} {n}" for what, n in counts.most_common())
 
 
-def draw(records: Sequence[Record], path: Path) -> None:
+def draw(records: Sequence[Record], folder: Path) -> None:
     """The calibration plot: realised against expected drop, and the share that each way settles."""
     from matplotlib.figure import Figure
 
@@ -133,27 +131,17 @@ def draw(records: Sequence[Record], path: Path) -> None:
     right.invert_yaxis()
     right.set(xlabel="boards settled, %", xlim=(0, 100))
     right.set_title("Which explanation is true, settled", fontsize=9)
-    figure.savefig(path, dpi=150, metadata={"Software": None})
+    figure.savefig(folder / "plans.png", dpi=150, metadata={"Software": None})
+    with (folder / "plans.md").open("a", encoding="utf-8") as page:
+        page.write("\n![Realised against expected drop of the doubt, and boards settled](plans.png)\n")
 
 
 def main() -> int:
     """Run the command."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--boards", type=int, default=200)
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--out", type=Path, required=True, help="JSON lines; gone on with if it exists")
+    parser = arguments(__doc__, 200, "boards")
     parser.add_argument("--base-seed", type=int, default=SEED)
-    parser.add_argument("--publish", type=Path, help="folder of the page")
     options = parser.parse_args()
-    records = run(Settings(options.base_seed), options.boards, options.workers, options.out)
-    lines = told(records)
-    print("\n".join(lines))
-    if options.publish is not None:
-        publish(options.publish, "plans", "Plans, calibrated", "make plans", lines, ABOUT)
-        draw(records, options.publish / "plans.png")
-        with (options.publish / "plans.md").open("a", encoding="utf-8") as page:
-            page.write("\n![Realised against expected drop of the doubt, and boards settled](plans.png)\n")
-    return 0 if all(bars(records).values()) else 1
+    return carry_out(study(Settings(options.base_seed), options.n), PAGE, options, beside=draw)
 
 
 if __name__ == "__main__":

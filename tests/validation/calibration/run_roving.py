@@ -8,7 +8,6 @@ was interrupted goes on where it stopped if it is given the same file.
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import tempfile
@@ -22,14 +21,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import numpy as np
 import ritz
 from generator.ringing import Blow, Ringing, recorded, ringing, with_noise
-from validation.calibration.records import add_to, publish, read_done
+from validation.calibration.records import Record
+from validation.calibration.study import Page, Study, arguments, carry_out, numbered
 
 import bayesplate
 from bayesplate.recordings.picking import pick_modes
 from bayesplate.recordings.signals import Recording
 from bayesplate.recordings.taking import take
-
-Record = dict[str, Any]
 
 BASE_SEED, RATE, HIGHEST, NEAR = 60, 6000.0, 600.0, 5e-3
 SIDES, THICKNESS, DENSITY = (0.580, 0.217), 4.2e-3, 420.0
@@ -40,6 +38,7 @@ ABOUT = (
     "The sensor lowers each mode otherwise at each of its places, by up to half a per cent. A mode's frequency is the "
     "mean over the places and its error holds their scatter, so that more errors lie within it than a normal law has."
 )
+PAGE = Page("roving", "A sensor that roves: is each mode picked once, and do constants hold the truth?", ABOUT)
 CARD = """\
 format = 1
 name = "roved"
@@ -117,14 +116,9 @@ def simulate_one(base_seed: int, index: int) -> Record:
     }
 
 
-def run(n_boards: int, workers: int, out: Path, *, quiet: bool = False) -> list[Record]:
-    """Do what is not done yet, and return the records of all boards asked for."""
-    records = read_done(out, {"format": 1, "seed": BASE_SEED})
-    done = {record["simulation"] for record in records}
-    records += add_to(
-        out, simulate_one, [(BASE_SEED, i) for i in range(n_boards) if i not in done], workers, quiet=quiet
-    )
-    return sorted((one for one in records if one["simulation"] < n_boards), key=lambda one: one["simulation"])
+def study(n_boards: int) -> Study:
+    """So many boards."""
+    return Study(simulate_one, {"format": 1, "seed": BASE_SEED}, numbered(BASE_SEED, n=n_boards), told)
 
 
 def told(records: Sequence[Record]) -> tuple[list[str], bool]:
@@ -144,18 +138,8 @@ def told(records: Sequence[Record]) -> tuple[list[str], bool]:
 
 def main() -> int:
     """Run the command."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--boards", type=int, default=50)
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--out", type=Path, required=True, help="JSON lines; gone on with if it exists")
-    parser.add_argument("--publish", type=Path, help="folder of the page")
-    options = parser.parse_args()
-    lines, is_right = told(run(options.boards, options.workers, options.out))
-    print("\n".join(lines))
-    if options.publish is not None:
-        title = "A sensor that roves: is each mode picked once, and do constants hold the truth?"
-        publish(options.publish, "roving", title, "make roving", lines, ABOUT)
-    return 0 if is_right else 1
+    options = arguments(__doc__, 50, "boards").parse_args()
+    return carry_out(study(options.n), PAGE, options)
 
 
 if __name__ == "__main__":

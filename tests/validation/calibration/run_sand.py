@@ -8,7 +8,6 @@ degrees and seen from the side, made from the generator's shapes and scored agai
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from collections.abc import Sequence
@@ -22,7 +21,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import numpy as np
 import ritz
 from generator.sand import photograph
-from validation.calibration.records import Record, add_to, publish, read_done
+from validation.calibration.records import Record
+from validation.calibration.study import Page, Study, arguments, carry_out
 
 from bayesplate.commands.prepare import prepare
 from bayesplate.frequencies.spectrum import spectrum
@@ -36,6 +36,7 @@ ABOUT = (
     f"{100 * NEAR:g} % of the frequency; stated: the mean probability of the right mode among these. Wanted outside "
     f"the veering pair: top-1 on {100 * TOP_1:g} % at least, top-2 on {100 * TOP_2:g} %."
 )
+PAGE = Page("sand", "Labels from sand", ABOUT)
 BOARDS = {"finnish-spruce-cantilever": ritz.FINNISH, "fiemme-spruce-clamped": ritz.FIEMME}
 VEERING = {"finnish-spruce-cantilever": ((1, 0), (0, 2)), "fiemme-spruce-clamped": ()}
 """Orders of the beam functions of the pair that mixes: (2,0) and (1,2) in the paper's labels."""
@@ -72,14 +73,15 @@ def simulate_one(name: str, mode: int, number: int) -> Record:
     }
 
 
-def run(n_pictures: int, workers: int, out: Path, *, quiet: bool = False) -> list[Record]:
-    """Do what is not done yet, and return all records asked for."""
-    records = read_done(out, {"format": 1, "seed": BASE_SEED, "modes": N_MODES})
-    done = {record["simulation"] for record in records}
+def study(n_pictures: int) -> Study:
+    """So many pictures of each mode."""
     jobs = [(name, mode, k) for name in BOARDS for mode in range(N_MODES) for k in range(n_pictures)]
-    wanted = {f"{name} {mode} {k}" for name, mode, k in jobs}
-    records += add_to(out, simulate_one, [j for j in jobs if "{} {} {}".format(*j) not in done], workers, quiet=quiet)
-    return sorted((one for one in records if one["simulation"] in wanted), key=lambda one: one["simulation"])
+    return Study(
+        simulate_one,
+        {"format": 1, "seed": BASE_SEED, "modes": N_MODES},
+        [({"simulation": "{} {} {}".format(*job)}, job) for job in jobs],
+        lambda records: (told(records), is_right(records)),
+    )
 
 
 def told(records: Sequence[Record]) -> list[str]:
@@ -108,18 +110,8 @@ def is_right(records: Sequence[Record]) -> bool:
 
 def main() -> int:
     """Run the command."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--pictures", type=int, default=20, help="of each mode")
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--out", type=Path, required=True, help="JSON lines; gone on with if it exists")
-    parser.add_argument("--publish", type=Path, help="folder of the page")
-    options = parser.parse_args()
-    records = run(options.pictures, options.workers, options.out)
-    lines = told(records)
-    print("\n".join(lines))
-    if options.publish is not None:
-        publish(options.publish, "sand", "Labels from sand", "make sand", lines, ABOUT)
-    return 0 if is_right(records) else 1
+    options = arguments(__doc__, 20, "pictures", "of each mode").parse_args()
+    return carry_out(study(options.n), PAGE, options)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ hold the truth, beside the control that takes the most probable assignment for s
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from collections.abc import Sequence
@@ -18,7 +17,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # one board a core; before numpy 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from validation.calibration.planted import Settings
-from validation.calibration.records import Record, add_to, publish, read_done
+from validation.calibration.records import Record
 from validation.calibration.spectra import (
     ALLOWED,
     COVERED,
@@ -33,25 +32,24 @@ from validation.calibration.spectra import (
     simulate_one,
     taken_for_sure,
 )  # fmt: skip
+from validation.calibration.study import Page, Study, arguments, carry_out, numbered
 
-TITLE = "Fits of bare peaks: are their probabilities as stated?"
 ABOUT = (
     "Of pairs that are given a probability, a share as large should be true; the standard error beside it is that of "
     f"independent pairs, and {ALLOWED:g} of them, and one pair, are allowed. Intervals of 90 % should hold the truth "
     "on {:.0f} to {:.0f} % of the boards, as far as their number tells (one-sided bounds of 95 %). Boards in doubt are "
     "those on which half a peak or more is expected to be taken wrongly."
 ).format(*(100.0 * share for share in COVERED))
+PAGE = Page("spectra", "Fits of bare peaks: are their probabilities as stated?", ABOUT)
 
 
-def run(settings: Settings, n_boards: int, workers: int, out: Path, *, quiet: bool = False) -> list[Record]:
-    """Do what is not done yet, and return the records of all boards asked for, in their order."""
+def study(n_boards: int) -> Study:
+    """So many boards."""
+    settings = Settings()
     identity = {"format": 2, "settings": asdict(settings), "modes": N_MODES, "missed": MISSED, "labelled": N_LABELLED}
-    records = read_done(out, identity)
-    done = {record["simulation"] for record in records}
-    records += add_to(
-        out, simulate_one, [(settings, i) for i in range(n_boards) if i not in done], workers, quiet=quiet
+    return Study(
+        simulate_one, identity, numbered(settings, n=n_boards), lambda records: (told(records), is_calibrated(records))
     )
-    return sorted((one for one in records if one["simulation"] < n_boards), key=lambda one: one["simulation"])
 
 
 def told(records: Sequence[Record]) -> list[str]:
@@ -90,18 +88,8 @@ def told(records: Sequence[Record]) -> list[str]:
 
 def main() -> int:
     """Run the command."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--boards", type=int, default=200)
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--out", type=Path, required=True, help="JSON lines; gone on with if it exists")
-    parser.add_argument("--publish", type=Path, help="folder of the page")
-    options = parser.parse_args()
-    records = run(Settings(), options.boards, options.workers, options.out)
-    lines = told(records)
-    print("\n".join(lines))
-    if options.publish is not None:
-        publish(options.publish, "spectra", TITLE, "make spectra", lines, ABOUT)
-    return 0 if is_calibrated(records) else 1
+    options = arguments(__doc__, 200, "boards").parse_args()
+    return carry_out(study(options.n), PAGE, options)
 
 
 if __name__ == "__main__":

@@ -56,7 +56,7 @@ def test_a_run_that_is_not_whole_says_so(tmp_path, capsys, monkeypatch):
     out = tmp_path / "campaigns.jsonl"
     monkeypatch.setattr("sys.argv", ["run_campaigns.py", "--workers", "0", "--boards", "3", "--out", str(out)])
     assert main() == 1
-    assert "not whole: 0 of 300 campaigns were run" in capsys.readouterr().out
+    assert "not whole: 0 of 300 were run" in capsys.readouterr().out
     assert read_done(out, identity(CampaignDesign(n_boards=3))) == []
 
 

@@ -10,7 +10,7 @@ import pytest
 from generator.designs import DESIGNS, MEDIANS
 from scipy import stats
 from validation.calibration.cases import CASES, effect_of
-from validation.calibration.coverage import NOMINAL, Count, counts, holds, judge, run
+from validation.calibration.coverage import NOMINAL, Count, counts, holds, judge, study
 from validation.calibration.planted import (
     Settings,
     cover_one,
@@ -78,7 +78,7 @@ def test_an_interrupted_run_goes_on(boards, tmp_path):
     out = tmp_path / "coverage.jsonl"
     lines = [json.dumps(identity(SHORT)), *(json.dumps(record) for record in boards)]
     out.write_text("\n".join(lines) + "\n" + lines[-1][:50])  # killed while it wrote another
-    assert run(SHORT, EFFECT_NAMES, 1, 1, out, quiet=True) == boards
+    assert study(SHORT, EFFECT_NAMES, 1).run(out, 1, quiet=True) == boards
     with pytest.raises(SystemExit, match="made with another design"):
         read_done(out, identity(Settings()))
 

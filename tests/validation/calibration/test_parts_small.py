@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from validation.calibration import again, bare, campaign_ranks, joint, oracle
 from validation.calibration.records import add_to, read_done
-from validation.calibration.run import SECTIONS, Part, page, parts
+from validation.calibration.run import SECTIONS, page, parts
+from validation.calibration.study import Study
 from validation.calibration.table import is_calibrated, is_caught, rows
 
 N_STEPS = 200
@@ -164,7 +165,7 @@ def doubled(kind, number):
 
 def test_a_part_goes_on_where_it_stopped(tmp_path):
     jobs = [({"kind": "a", "set": i}, ("a", i)) for i in range(3)]
-    part = Part(doubled, {"part": "made"}, jobs, lambda records: ([], True))
+    part = Study(doubled, {"part": "made"}, jobs, lambda records: ([], True))
     out = tmp_path / "made.jsonl"
     out.write_text("\n".join([json.dumps({"part": "made"}), json.dumps(doubled("a", 1) | {"kept": True}), ""]))
 

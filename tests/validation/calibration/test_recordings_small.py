@@ -15,9 +15,9 @@ pytestmark = pytest.mark.slow
 def records(tmp_path_factory):
     """Two recordings, the second made by a run that goes on."""
     out = tmp_path_factory.mktemp("recordings") / "recordings.jsonl"
-    run_recordings.run(1, 1, out, quiet=True)
+    run_recordings.study(1).run(out, 1, quiet=True)
     before = out.read_text()
-    found = run_recordings.run(2, 1, out, quiet=True)
+    found = run_recordings.study(2).run(out, 1, quiet=True)
     assert out.read_text().startswith(before)
     return found
 

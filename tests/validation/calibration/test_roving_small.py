@@ -8,7 +8,7 @@ from validation.calibration import run_roving
 
 @pytest.mark.slow
 def test_a_roving_sensor_gives_each_mode_once_and_the_constants(tmp_path):
-    (record,) = run_roving.run(1, 1, tmp_path / "roving.jsonl", quiet=True)
+    (record,) = run_roving.study(1).run(tmp_path / "roving.jsonl", 1, quiet=True)
 
     assert (record["twice"], record["false"]) == (0, 0)
     assert record["missed"] <= 1
