@@ -11,7 +11,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: fit test slow docs lock audit calibration spectra campaigns plans recordings roving sand measured bars coverage two-setups \
+.PHONY: fit test slow docs lock audit calibration spectra campaigns plans recordings roving sand measured limits coverage two-setups \
 	trial benchmarks peers batch
 
 fit: $(VENV)/installed
@@ -60,8 +60,8 @@ sand: $(VENV)/tested-with
 measured: $(VENV)/tested-with
 	$(BIN)/python tests/validation/calibration/run_measured.py --folder $(RECORDINGS) --publish docs/validation
 
-bars: $(VENV)/tested-with
-	$(BIN)/python tests/validation/calibration/run_bars.py --publish docs/validation --workers 2
+limits: $(VENV)/tested-with
+	$(BIN)/python tests/validation/calibration/run_limits.py --publish docs/validation --workers 2
 
 plans: $(VENV)/tested-with
 	$(BIN)/python tests/validation/calibration/run_plans.py --boards 214 --workers 2 --out results/plans.jsonl --publish docs/validation

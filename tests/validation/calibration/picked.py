@@ -150,14 +150,14 @@ def told(records: Sequence[Record]) -> list[str]:
     stated = sum(mode["spurious"] for mode in modes) + sum(sum(record["false"]) for record in records)
     lines += [
         "",
-        f"bias of the frequencies {100 * bias:+.4f} +- {100 * se:.4f} % (bar: {100 * BIAS:g} %)",
+        f"bias of the frequencies {100 * bias:+.4f} +- {100 * se:.4f} % (acceptance limit: {100 * BIAS:g} %)",
         f"median error {100 * float(np.median(np.abs(relative))):.4f} %",
         f"false peaks among the likely ones: {n_false}; expected by their probabilities: {stated:.1f}",
         f"modes missed: {sum(r['missed'] for r in records)} of {sum(r['audible'] for r in records)}; of those with a "
         f"neighbour within {100 * LONELY:g} %: {sum(r['close_missed'] for r in records)} of "
         f"{sum(r['close'] for r in records)}",
         "",
-        *(f"{'met' if is_met else 'MISSED'}: {words}" for words, is_met in bars(records).items()),
+        *(f"{'met' if is_met else 'MISSED'}: {words}" for words, is_met in limits(records).items()),
     ]
     return lines
 
@@ -195,8 +195,8 @@ def _within(words: str, errors: Sequence[float]) -> str:
     return f"{words:34s} {100 * np.mean(sizes <= 1.0):15.1f} % {100 * np.mean(sizes <= 2.0):6.1f} %"
 
 
-def bars(records: Sequence[Record], key: str = "z") -> dict[str, bool]:
-    """Each bar, and whether it is met.
+def limits(records: Sequence[Record], key: str = "z") -> dict[str, bool]:
+    """Each limit, and whether it is met.
 
     Three Monte Carlo standard errors are allowed each; those of the shares are taken from how recordings differ, for
     the errors of one recording have much in common.
@@ -216,5 +216,5 @@ def bars(records: Sequence[Record], key: str = "z") -> dict[str, bool]:
 
 
 def is_calibrated(records: Sequence[Record], key: str = "z") -> bool:
-    """Whether every one of the bars is met."""
-    return all(bars(records, key).values())
+    """Whether every one of the limits is met."""
+    return all(limits(records, key).values())

@@ -352,7 +352,7 @@ def is_calibrated(records: Sequence[Record]) -> bool:
     return all(abs(row["realised"] - row["expected"]) <= 3.0 * row["sd"] for row in calibration(records))
 
 
-def bars(records: Sequence[Record]) -> dict[str, bool]:
+def limits(records: Sequence[Record]) -> dict[str, bool]:
     """What must hold."""
     found = shares(records)
     return {

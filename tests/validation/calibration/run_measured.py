@@ -119,7 +119,7 @@ def compared(
         "the labels are those of the listing": not wrong,
         f"{MOST_FURTHER} further peaks at most": len(further) <= MOST_FURTHER,
     }
-    lines += [f"  {'met' if is_met else 'MISSED'}: {bar}" for bar, is_met in held.items()]
+    lines += [f"  {'met' if is_met else 'MISSED'}: {limit}" for limit, is_met in held.items()]
     return lines, all(held.values())
 
 

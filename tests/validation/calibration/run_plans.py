@@ -1,7 +1,7 @@
 """Calibrate plans: `python tests/validation/calibration/run_plans.py --boards 200 --out results/plans.jsonl`.
 
 Prints how often the first proposal of a plan settles which of two explanations is true, beside a random proposal, a
-random line of the plan and the next modes up, and whether expected gains are realised. Exit code 0: every bar met; 1:
+random line of the plan and the next modes up, and whether expected gains are realised. Exit code 0: every limit met; 1:
 some are missed, and stay there as missed; 2: usage. A run that was interrupted goes on where it stopped if it is given
 the same file.
 """
@@ -25,11 +25,11 @@ from validation.calibration.plans import (
     NOISE_CENTS,
     WAYS,
     Settings,
-    bars,
     calibration,
     foremost,
     is_group,
     judged,
+    limits,
     settled,
     shares,
     simulate_one,
@@ -65,7 +65,7 @@ def study(settings: Settings, n_boards: int) -> Study:
         "format": 6, "settings": asdict(settings), "designs": list(CHOSEN), "asked": asked, "noise_cents": NOISE_CENTS,
     }  # fmt: skip
     jobs = numbered(settings, n=n_boards)
-    return Study(simulate_one, identity, jobs, lambda records: (told(records), all(bars(records).values())))
+    return Study(simulate_one, identity, jobs, lambda records: (told(records), all(limits(records).values())))
 
 
 def told(records: Sequence[Record]) -> list[str]:
@@ -101,7 +101,7 @@ def told(records: Sequence[Record]) -> list[str]:
     lines += ["drop of the doubt, share of the entropy: first and random proposals and lines", "  expected  realised"]
     lines += [f"  {row['expected']:8.3f}  {row['realised']:8.3f} +- {row['sd']:.3f}  n = {row['n']}"
               for row in calibration(records)]  # fmt: skip
-    lines += ["", *(f"{'met   ' if met else 'MISSED'} {bar}" for bar, met in bars(records).items())]
+    lines += ["", *(f"{'met   ' if met else 'MISSED'} {limit}" for limit, met in limits(records).items())]
     return [*lines, "first error: " + failed[0]["error"][:200]] if failed else lines
 
 

@@ -19,9 +19,9 @@ from validation.calibration.study import Page, Study, arguments, carry_out, numb
 
 BASE_SEED = 22
 ABOUT = (
-    "The bars on standard errors ask for at least as many errors within them as a normal law has, so that errors "
-    "stated somewhat too large meet them. The probability of no mode is a cautious figure, not a calibrated one: its "
-    "bar asks for no more false peaks among the likely ones than it states, and fewer meet it."
+    "The acceptance limits on standard errors ask for at least as many errors within them as a normal law has, so that "
+    "errors stated somewhat too large meet them. The probability of no mode is a cautious figure, not a calibrated "
+    "one: its limit asks for no more false peaks among the likely ones than it states, and fewer meet it."
 )
 PAGE = Page("recordings", "Picked modes of recordings: are their errors as stated?", ABOUT)
 

@@ -125,7 +125,7 @@ def told(records: Sequence[Record]) -> tuple[list[str], bool]:
     """What came out, line by line, and whether it is as stated."""
     modes, constants = (np.abs(np.concatenate([one[key] for one in records])) for key in ("modes", "constants"))
     twice, false, missed = (sum(one[key] for one in records) for key in ("twice", "false", "missed"))
-    # errors of one board have much in common: the bar counts boards
+    # errors of one board have much in common: the limit counts boards
     beyond = sum(max(np.abs(one["constants"])) > 3.0 for one in records)
     lines = [
         f"{len(records)} boards, {modes.size} modes: within 1 standard error {100 * np.mean(modes <= 1):.0f} %, "

@@ -103,7 +103,7 @@ def told(records: Sequence[Record]) -> list[str]:
 
 
 def is_right(records: Sequence[Record]) -> bool:
-    """Whether the bars are met outside the veering pair."""
+    """Whether the limits are met outside the veering pair."""
     ranks = np.array([one["near"] for one in records if not one["veers"]])
     return bool(np.mean(ranks == 1) >= TOP_1 and np.mean(ranks <= 2) >= TOP_2)
 

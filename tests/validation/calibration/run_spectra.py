@@ -24,10 +24,10 @@ from validation.calibration.spectra import (
     MISSED,
     N_LABELLED,
     N_MODES,
-    bars,
     coverage,
     doubtful,
     is_calibrated,
+    limits,
     reliability,
     simulate_one,
     taken_for_sure,
@@ -82,7 +82,7 @@ def told(records: Sequence[Record]) -> list[str]:
         for name, (hits, n) in summed.items():
             sure, m = control[name]
             lines.append(f"{name:8s} {hits:4d} of {n:4d} {sure:10d} of {m:4d}")
-    lines += ["", *(f"{'met' if is_met else 'MISSED'}: {words}" for words, is_met in bars(records).items())]
+    lines += ["", *(f"{'met' if is_met else 'MISSED'}: {words}" for words, is_met in limits(records).items())]
     return [*lines, "first error: " + failed[0]["error"][:200]] if failed else lines
 
 

@@ -150,7 +150,7 @@ def reliability(
     return table
 
 
-def bars(records: Sequence[Record]) -> dict[str, bool]:
+def limits(records: Sequence[Record]) -> dict[str, bool]:
     """What must hold: every bin right within four standard errors, and no interval certainly outside 85 to 95 %."""
     bins = reliability(records)
     held = coverage(records, "holds").values()
@@ -166,8 +166,8 @@ def bars(records: Sequence[Record]) -> dict[str, bool]:
 
 
 def is_calibrated(records: Sequence[Record]) -> bool:
-    """Whether both bars are met."""
-    return all(bars(records).values())
+    """Whether both limits are met."""
+    return all(limits(records).values())
 
 
 def _may_be(hits: int, n: int, low: float, high: float) -> bool:

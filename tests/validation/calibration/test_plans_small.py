@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from validation.calibration.plans import WAYS, bars, calibration, is_calibrated, settled, wrongly
+from validation.calibration.plans import WAYS, calibration, is_calibrated, limits, settled, wrongly
 
 from bayesplate.board.material import ORTHOTROPIC
 from bayesplate.planning.beliefs import Belief, Beliefs, entropy
@@ -103,7 +103,7 @@ def test_settled_is_ten_times_as_probable_as_the_other():
         ((5, 8, 8, 1), [False, False, True]),
     ],
 )
-def test_bars_are_those_of_the_page(settled_of_ten, met):
+def test_limits_are_those_of_the_page(settled_of_ten, met):
     counts = [[0.99] * n + [0.5] * (10 - n) for n in settled_of_ten]
-    found = bars([made(*each) for each in zip(*counts, strict=True)])
+    found = limits([made(*each) for each in zip(*counts, strict=True)])
     assert list(found.values())[:3] == met

@@ -1,4 +1,4 @@
-"""Why a bar is missed, counted from the records: who is taken for whom, which class is weakest, what is overlooked."""
+"""Why a limit is missed, counted from the records: who is taken for whom, the weakest class, what is overlooked."""
 
 from __future__ import annotations
 

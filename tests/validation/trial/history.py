@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 BEFORE = (
-    "All boards are new: the run before this one missed 36 of the same 85 bars, and two rules of `diagnose` were "
+    "All boards are new: the run before this one missed 36 of the same 85 limits, and two rules of `diagnose` were "
     "mended after it, before any board of this run was planted ([history](#history))."
 )
 
 CHANGED: tuple[str, ...] = (
     "## History",
     "",
-    "The run before this one (base seed 6, as many boards) missed 36 of the same 85 bars. Two rules were mended after "
-    "it, before any board of this run was planted; cells, sizes and bars are as they were:",
+    "The run before this one (base seed 6, as many boards) missed 36 of the same 85 limits. Two rules were mended "
+    "after it, before any board of this run was planted; cells, sizes and limits are as they were:",
     "",
     "- All boards are new: base seed 7.",
     "- Where noise is drawn from its prior, boards of two setups that lack nothing were called unexplained too often: "
@@ -33,5 +33,5 @@ CHANGED: tuple[str, ...] = (
     "trace; cells of size 2x at 5 cents were made three times as large. Then null cells were added in which the true "
     "noise is drawn from its prior, is known, or readings are rounded; a stiffness gradient joined the library; an "
     "effect is needed at a false-alarm rate of 2 % and named only if the name survives other priors, another noise and "
-    "the exact law; the most probable answer may be that nothing is lacking, and bars count all classes.",
+    "the exact law; the most probable answer may be that nothing is lacking, and limits count all classes.",
 )

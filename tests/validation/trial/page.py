@@ -9,10 +9,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from validation.trial.bars import PLANNED
 from validation.trial.cells import CELLS, Cell
 from validation.trial.counts import CONSTANTS, Record
 from validation.trial.history import BEFORE, CHANGED
+from validation.trial.limits import PLANNED
 from validation.trial.published import publish_records
 from validation.trial.summary import COLUMNS, CONDITIONS, summarise
 
@@ -39,10 +39,11 @@ WORDS: tuple[str, ...] = (
     "- *after tracing*: constants averaged over all hypotheses, each by its probability; *without tracing*: those of "
     "the ideal plate.",
     "",
-    "Bounds in brackets are 95 % bounds, those of shares exact (Clopper and Pearson). A bar is an upper or a lower "
-    "limit, or a range. It is met if both bounds keep to it, and not the estimate alone: with 300 boards, a bar of "
-    "2 % is met if at most one is named. One that is missed stays here as missed. A bar counts all classes of effects "
-    "that are planted; what the classes that were planned first would give by themselves stands in the notes: "
+    "Bounds in brackets are 95 % bounds, those of shares exact (Clopper and Pearson). An acceptance limit is an "
+    "upper or a lower one, or a range. It is met if both bounds keep to it, and not the estimate alone: with 300 "
+    "boards, a limit of 2 % is met if at most one is named. One that is missed stays here as missed. A limit counts "
+    "all classes of effects that are planted; what the classes that were planned first would give by themselves stands "
+    "in the notes: "
     f"{', '.join(sorted(PLANNED))}.",
     "",
     "`diagnose` solves two plausible effects together, for their shifts need not add. The trial does not: that would "
@@ -65,24 +66,24 @@ def write(records: Sequence[Record], base_seed: int, folder: Path, cells: Sequen
 
 def in_short(summary: Mapping[str, Any]) -> str:
     """What a reader asks first, in sentences: false names, right ones, and the constants."""
-    bars = {bar["quantity"]: bar for bar in summary["bars"]}
-    nothing = [bar for name, bar in bars.items() if name.startswith("null") and name.endswith("uniquely named")]
+    limits = {limit["quantity"]: limit for limit in summary["limits"]}
+    nothing = [limit for name, limit in limits.items() if name.startswith("null") and name.endswith("uniquely named")]
 
     def share(name: str) -> str:
-        known = bars[name]["share"]
+        known = limits[name]["share"]
         return "a share not known yet" if known is None else f"{100 * known:.1f} %"
 
     right = "top-1, {}, 5 cents, 2x"
     sentences = (
-        f"Of {sum(bar['n'] for bar in nothing)} simulated boards that lack nothing, an effect was named on "
-        f"{sum(bar['count'] for bar in nothing):.0f} and claimed on {bars['claim made on a null']['count']:.0f}.",
+        f"Of {sum(limit['n'] for limit in nothing)} simulated boards that lack nothing, an effect was named on "
+        f"{sum(limit['count'] for limit in nothing):.0f} and claimed on {limits['claim made on a null']['count']:.0f}.",
         "With one large effect, the most probable answer is the right one on "
         f"{share(right.format('cantilever-6'))} of the boards by six modes of a cantilever, and on "
         f"{share(right.format('cantilever-6-free-6'))} with six of the free board as well.",
         "Intervals of 90 % for the constants, averaged over the effects, hold the truth on "
         f"{share('constants after tracing, cantilever-6, 2x: 90 % intervals')}, those of the ideal plate on "
         f"{share('constants without tracing, cantilever-6, 2x: visibly worse')}{_held_outside(summary)}.",
-        f"{sum(not bar['met'] for bar in bars.values())} of {len(bars)} acceptance limits are missed.",
+        f"{sum(not limit['met'] for limit in limits.values())} of {len(limits)} acceptance limits are missed.",
     )
     return textwrap.fill(" ".join(sentences), 139, break_on_hyphens=False)
 
@@ -131,9 +132,9 @@ def page(summary: Mapping[str, Any]) -> list[str]:
         *(f"- no answer: {one['cell']}, board {one['index']}: {one['error']}" for one in summary["failures"]),
         *_records(summary),
         "",
-        "## Bars",
+        "## Acceptance limits",
         "",
-        *_table(("quantity", "bar", "found", "", "note"), map(_bar_row, summary["bars"])),
+        *_table(("quantity", "acceptance limit", "found", "", "note"), map(_limit_row, summary["limits"])),
         *_confusions(summary),
         *_cells(summary),
         *_constants(summary),
@@ -154,8 +155,8 @@ def _records(summary: Mapping[str, Any]) -> Iterable[str]:
     yield from ("", f"The records of all boards: {lines}, {where}.")
 
 
-def _bar_row(bar: Mapping[str, Any]) -> tuple[str, ...]:
-    return bar["quantity"], bar["bar"], bar["shown"], "met" if bar["met"] else "**missed**", bar["note"]
+def _limit_row(limit: Mapping[str, Any]) -> tuple[str, ...]:
+    return limit["quantity"], limit["limit"], limit["shown"], "met" if limit["met"] else "**missed**", limit["note"]
 
 
 def _confusions(summary: Mapping[str, Any]) -> Iterable[str]:

@@ -3,7 +3,7 @@
 Plants boards with the independent generator, cell by cell of `cells`, judges each as `diagnose` would, and writes what
 came out to docs/validation/trial.json and trial.md; beside them the records of a whole trial, compressed, or their
 digest. An interrupted run goes on where it stopped if it is given the same file; if the code has changed since, one
-board of each cell is judged again, and must come out as it did. Exit code 0: every bar met; 1: some are missed, and
+board of each cell is judged again, and must come out as it did. Exit code 0: every limit met; 1: some are missed, and
 stay there as missed; 2: usage.
 """
 
@@ -115,9 +115,9 @@ def main() -> int:
     summary = write(records, options.base_seed, options.summary)
     if not options.only_summary:
         measured.note(options.summary, "trial")
-    for bar in summary["bars"]:
-        print(f"{'met   ' if bar['met'] else 'MISSED'} {bar['quantity']}: {bar['shown']}")
-    return 0 if all(bar["met"] for bar in summary["bars"]) else 1
+    for limit in summary["limits"]:
+        print(f"{'met   ' if limit['met'] else 'MISSED'} {limit['quantity']}: {limit['shown']}")
+    return 0 if all(limit["met"] for limit in summary["limits"]) else 1
 
 
 if __name__ == "__main__":

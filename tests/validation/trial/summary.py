@@ -1,4 +1,4 @@
-"""What the records of a trial add up to: the bars, and the tables that explain them."""
+"""What the records of a trial add up to: the limits, and the tables that explain them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any, get_args
 
 import numpy as np
-from validation.trial.bars import bars
 from validation.trial.cells import CELLS, Cell
 from validation.trial.counts import (
     CONSTANTS,
@@ -29,6 +28,7 @@ from validation.trial.counts import (
     share,
     truth,
 )
+from validation.trial.limits import limits
 from validation.trial.sizes import errors
 
 from bayesplate.diagnosis.claim import ConditionName
@@ -47,7 +47,7 @@ def summarise(records: Sequence[Record], base_seed: int, cells: Sequence[Cell] =
     Parameters
     ----------
     records : sequence of dict
-        Those with an error count as boards without an answer only in their own list: the bars are of the others.
+        Those with an error count as boards without an answer only in their own list: the limits are of the others.
     base_seed : int
     cells : sequence of Cell
     """
@@ -60,7 +60,7 @@ def summarise(records: Sequence[Record], base_seed: int, cells: Sequence[Cell] =
         "base_seed": base_seed,
         "boards": {"judged": len(good), "failed": len(failed), "wanted": wanted},
         "failures": [{key: r[key] for key in ("cell", "index", "error")} | r["truth"] for r in failed],
-        "bars": bars(cells, by_cell),
+        "limits": limits(cells, by_cell),
         "cells": {cell.name: _cell(cell, by_cell[cell.name]) for cell in cells if by_cell[cell.name]},
         "confusion": {name: confusion(by_cell[name]) for name in MATRICES if by_cell.get(name)},
         "amplitudes": _amplitudes(by_cell),

@@ -40,7 +40,7 @@ def by_hand():
 def test_sums_by_hand(by_hand):
     summary = summarise(by_hand, 1, (ONE, NULL))
     one, null = summary["cells"][ONE.name], summary["cells"][NULL.name]
-    found = {bar["quantity"]: bar for bar in summary["bars"]}
+    found = {limit["quantity"]: limit for limit in summary["limits"]}
 
     assert one["top_1"]["count"] == 2  # boards 0 and 4: the verdict does not matter
     assert null["top_1"]["count"] == 3  # nothing is an answer, and the right one

@@ -1,4 +1,4 @@
-"""The rows of the page of bars: what must hold, in what words, and which commands or tests measure it."""
+"""The rows of the page of acceptance limits: what must hold, in what words, and which commands or tests measure it."""
 
 from __future__ import annotations
 
@@ -15,16 +15,17 @@ class Row:
         Key, under which tests note what they measure.
     words : str
         What is compared with what.
-    bar : str
+    limit : str
     tests : tuple of str
-        Tests that hold or do not, by file and the beginning of the name; others note what they measure (`bars.meets`).
+        Tests that hold or do not, by file and the beginning of the name; others note what they measure
+        (`limits.meets`).
     page : str
         Page of long runs on which its figures are.
     """
 
     check: str
     words: str
-    bar: str
+    limit: str
     tests: tuple[str, ...] = ()
     page: str = ""
 

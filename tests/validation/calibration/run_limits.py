@@ -1,8 +1,8 @@
-"""Write the page of all bars: `python tests/validation/calibration/run_bars.py --publish docs/validation`.
+"""Write the page of acceptance limits: `python tests/validation/calibration/run_limits.py --publish docs/validation`.
 
-Runs the tests that measure something against a bar, quick and slow ones, and writes every bar with the worst value that
-was measured beside it. A bar that no test measures is printed as not measured. Exit code 0: every bar is met; 1: some
-are missed, and stay on the page as missed; 2: usage.
+Runs the tests that measure something against a limit, quick and slow ones, and writes every limit with the worst value
+that was measured beside it. A limit that no test measures is printed as not measured. Exit code 0: every limit is met;
+1: some are missed, and stay on the page as missed; 2: usage.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from bars import NOTES
 from validation import measured as of_pages
-from validation.calibration.bar_rows import ROWS, Row
+from validation.calibration.limit_rows import ROWS, Row
 
 ROOT = Path(__file__).resolve().parents[3]
 Note = dict[str, Any]
-COMMAND = "make bars"
+COMMAND = "make limits"
 
 
 def measuring() -> list[Path]:
-    """Test files that hold something against a bar."""
+    """Test files that hold something against a limit."""
     every = sorted((ROOT / "tests").rglob("test_*.py"))
     files = {file for file in every if "from bars import" in file.read_text(encoding="utf-8")}
     named = (test.partition("::")[0] for rows in ROWS.values() for row in rows for test in row.tests)
@@ -75,14 +75,20 @@ def page(notes: Sequence[Note], tests: Mapping[str, bool]) -> list[str]:
     if unknown:
         raise ValueError(f"no row for {', '.join(sorted(unknown))}")
     lines = [
-        "# Every bar, and what was measured",
+        "# Acceptance limits, and what was measured",
         "",
-        f"Written by `{COMMAND}`; do not edit. Each figure was measured by the test that asserts its bar; of several "
+        f"Written by `{COMMAND}`; do not edit. Each figure was measured by the test that asserts its limit; of several "
         "boards, edges or parameters the worst is shown. The trial of `diagnose`, the calibration of recordings and "
         "that of spectra have pages of their own.",
     ]
     for heading, rows in ROWS.items():
-        lines += ["", f"## {heading}", "", "| what must hold | bar | measured | |", "| --- | --- | --- | --- |"]
+        lines += [
+            "",
+            f"## {heading}",
+            "",
+            "| what must hold | acceptance limit | measured | |",
+            "| --- | --- | --- | --- |",
+        ]
         lines += [line for row in rows for line in _lines(row, notes, tests)]
     return lines
 
@@ -93,7 +99,7 @@ def _lines(row: Row, notes: Sequence[Note], tests: Mapping[str, bool]) -> Iterab
     if row.page:
         found.append((f"[on a page of its own]({row.page}.md)", ""))
     for number, (words, state) in enumerate(found or [("", "not measured")]):
-        said = (row.words, row.bar) if number == 0 else ("", "")
+        said = (row.words, row.limit) if number == 0 else ("", "")
         yield f"| {' | '.join(said)} | {words} | {state} |"
 
 
@@ -105,7 +111,7 @@ def _of_tests(row: Row, tests: Mapping[str, bool]) -> Iterable[tuple[str, str]]:
 
 
 def _of_notes(own: Sequence[Note]) -> Iterable[tuple[str, str]]:
-    """The worst value of each quantity, and whether all are within their bars."""
+    """The worst value of each quantity, and whether all are within their limits."""
     for quantity in dict.fromkeys(note["quantity"] for note in own):
         same = [note for note in own if note["quantity"] == quantity]
         many = f", worst of {len(same)}" if len(same) > 1 else ""
@@ -115,7 +121,7 @@ def _of_notes(own: Sequence[Note]) -> Iterable[tuple[str, str]]:
 
 def _how_near(note: Note) -> float:
     """How near a value lies to the bound that it could break; larger is worse, and no number the worst."""
-    low, high = note["bar"]
+    low, high = note["limit"]
     if math.isnan(note["value"]):
         return math.inf
     below = math.inf if high is None else high - note["value"]
@@ -124,7 +130,7 @@ def _how_near(note: Note) -> float:
 
 
 def _shown(note: Mapping[str, Any]) -> str:
-    low, high = note["bar"]
+    low, high = note["limit"]
     scale, unit = (100.0, " %") if note["unit"] == "%" else (1.0, f" {note['unit']}" if note["unit"] else "")
     bounds = " and ".join(
         f"{word} {scale * bound:.4g}" for word, bound in (("at least", low), ("at most", high)) if bound is not None
@@ -144,11 +150,11 @@ def main() -> int:
     if options.quick:
         lines[3:3] = ["", "The slow tests were left out."]
     options.publish.mkdir(parents=True, exist_ok=True)
-    (options.publish / "bars.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    of_pages.note(options.publish, "bars")
+    (options.publish / "limits.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    of_pages.note(options.publish, "limits")
     missed = [note for note in notes if not note["met"]]
     failed = [name for name, is_passed in tests.items() if not is_passed]
-    print(f"{len(notes)} figures and {len(tests)} tests; {len(missed)} bars missed, {len(failed)} tests failed")
+    print(f"{len(notes)} figures and {len(tests)} tests; {len(missed)} limits missed, {len(failed)} tests failed")
     print("\n".join(failed))
     return 1 if missed or failed else 0
 

@@ -1,12 +1,12 @@
-"""Every bar of the trial at its edge: as many boards as its bound allows meet it, one more misses it."""
+"""Every limit of the trial at its edge: as many boards as its bound allows meet it, one more misses it."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from scipy import stats
-from validation.trial.bars import PLANNED, bars
 from validation.trial.cells import CELLS, NOISES, Cell
+from validation.trial.limits import PLANNED, limits
 from validation.trial.made_records import GROUP, found_right, made
 
 N = 400
@@ -26,7 +26,7 @@ LOUD = Cell("one", SIX, N, 17.0)
 
 
 def right(cell, i, **kept):
-    """A record that meets every bar of its cell; intervals of 90 % hold in nine of ten."""
+    """A record that meets every limit of its cell; intervals of 90 % hold in nine of ten."""
     planted = {"null": (), "one": (A,), "two": (A, B), "outside": ("rib",)}[cell.kind]
     return found_right(cell, i, planted, **kept)
 
@@ -67,11 +67,11 @@ AT_LEAST = [
 
 
 def by_name(cells, records):
-    """Bars by what they ask."""
+    """Limits by what they ask."""
     by_cell = {cell.name: [] for cell in cells}
     for record in records:
         by_cell[record["cell"]].append(record)
-    return {bar["quantity"]: bar for bar in bars(cells, by_cell)}
+    return {limit["quantity"]: limit for limit in limits(cells, by_cell)}
 
 
 def with_wrong(cell, wrong, n_wrong):
@@ -95,7 +95,7 @@ def fewest_allowed(limit):
 
 
 @pytest.mark.parametrize(("quantity", "cell", "wrong", "limit"), AT_MOST, ids=[case[0] for case in AT_MOST])
-def test_a_bar_from_above_at_its_edge(quantity, cell, wrong, limit):
+def test_a_limit_from_above_at_its_edge(quantity, cell, wrong, limit):
     most = most_allowed(limit)
     assert [by_name((cell,), with_wrong(cell, wrong, n))[quantity]["met"] for n in (most, most + 1)] == [True, False]
 
@@ -138,19 +138,19 @@ def test_sets_hold_two_and_a_half_effects_at_most():
     cell = large(SIX)
     for n_pairs, met in ((220, True), (219, False)):
         records = [called(GROUP, [A], [A, B] if i < n_pairs else [A, B, "grain_angle"])(cell, i) for i in range(N)]
-        bar = by_name((cell,), records)["one effect, cantilever-6: mean size of the set"]
-        assert bar["value"] == pytest.approx(3.0 - n_pairs / N)
-        assert bar["met"] is met
+        limit = by_name((cell,), records)["one effect, cantilever-6: mean size of the set"]
+        assert limit["value"] == pytest.approx(3.0 - n_pairs / N)
+        assert limit["met"] is met
 
 
 def test_a_bar_counts_all_classes_and_those_planned_first_stand_beside_it():
     assert FURTHER not in PLANNED
     cell = large(SIX)
     records = [right(cell, i) if i % 2 else made(cell, i, [FURTHER], "none needed", best=[A]) for i in range(N)]
-    bar = by_name((cell,), records)["top-1, cantilever-6, 5 cents, 2x"]
-    assert (bar["count"], bar["n"], bar["met"]) == (200, 400, False)
-    assert "of the classes planned first 200/200 = 100.0 %" in bar["note"]
-    assert "weakest: clamp_translation 0 %" in bar["note"]
+    limit = by_name((cell,), records)["top-1, cantilever-6, 5 cents, 2x"]
+    assert (limit["count"], limit["n"], limit["met"]) == (200, 400, False)
+    assert "of the classes planned first 200/200 = 100.0 %" in limit["note"]
+    assert "weakest: clamp_translation 0 %" in limit["note"]
 
 
 def test_a_trial_that_finds_everything_meets_every_bar_and_one_without_truth_does_not():
@@ -165,7 +165,7 @@ def test_a_trial_that_finds_everything_meets_every_bar_and_one_without_truth_doe
             record = found_right(cell, i, planted, **kept)
             records.append(quiet_if_loud(cell, record))
     found = by_name(CELLS, records)
-    assert [name for name, bar in found.items() if not bar["met"]] == []
+    assert [name for name, limit in found.items() if not limit["met"]] == []
     assert len(found) == 2 * 4 * 5 + 12 + 2 * 5 + 3 + 1 + 2 * 2 + 1 + 2 + 2 * 5 + 2 + 1
     assert not any("planned" in name or "further" in name for name in found)
 
@@ -175,7 +175,7 @@ def test_a_trial_that_finds_everything_meets_every_bar_and_one_without_truth_doe
         by_cell[record["cell"]].append(record)
     for own in by_cell.values():
         shuffled += [r | {"truth": own[j]["truth"]} for r, j in zip(own, rng.permutation(len(own)), strict=True)]
-    missed = [name for name, bar in by_name(CELLS, shuffled).items() if not bar["met"]]
+    missed = [name for name, limit in by_name(CELLS, shuffled).items() if not limit["met"]]
     for words, n in (("unique and wrong", 11), ("in the set given", 5), ("top-1", 3), ("both in the set", 1)):
         assert sum(words in name for name in missed) == n, words
 

@@ -1,4 +1,4 @@
-"""The page of bars: what tests note, which of several values is shown, and that its rows name tests that there are."""
+"""The page of limits: what tests note, which of several values is shown, and that its rows name existing tests."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from xml.etree import ElementTree
 
 import pytest
 from bars import NOTES, meets
-from validation.calibration.bar_rows import ROWS
-from validation.calibration.run_bars import ROOT, measuring, page, passed
+from validation.calibration.limit_rows import ROWS
+from validation.calibration.run_limits import ROOT, measuring, page, passed
 
 EVERY = [row for rows in ROWS.values() for row in rows]
 
@@ -25,15 +25,15 @@ def read(path):
     return [json.loads(line) for line in path.read_text().splitlines()]
 
 
-@pytest.mark.parametrize(("value", "bar"), [(0.6, {"at_most": 0.5}), (3.6, {"at_least": 3.7, "at_most": 4.3})])
-def test_a_value_outside_its_bar_fails_and_is_noted_as_missed(noted, value, bar):
+@pytest.mark.parametrize(("value", "limit"), [(0.6, {"at_most": 0.5}), (3.6, {"at_least": 3.7, "at_most": 4.3})])
+def test_a_value_outside_its_limit_fails_and_is_noted_as_missed(noted, value, limit):
     with pytest.raises(AssertionError, match=r"V10, twelve modes: wanted at (least|most) .* cents, got "):
-        meets("V10", "twelve modes", value, **bar, unit="cents")
+        meets("V10", "twelve modes", value, **limit, unit="cents")
 
     assert [note["met"] for note in read(noted)] == [False]
 
 
-def test_what_is_no_number_misses_every_bar(noted):
+def test_what_is_no_number_misses_every_limit(noted):
     with pytest.raises(AssertionError):
         meets("V10", "twelve modes", float("nan"), at_most=0.5)
     meets("V10", "twelve modes", 0.4, at_most=0.5)
@@ -41,12 +41,12 @@ def test_what_is_no_number_misses_every_bar(noted):
     assert any("twelve modes: nan (at most 0.5), worst of 2 | **missed** |" in line for line in page(read(noted), {}))
 
 
-def test_a_bar_has_a_bound(noted):
-    with pytest.raises(AssertionError, match="a bar has a bound"):
+def test_a_limit_has_a_bound(noted):
+    with pytest.raises(AssertionError, match="a limit has a bound"):
         meets("V10", "twelve modes", 1.0)
 
 
-def test_the_page_shows_the_value_nearest_to_breaking_its_bar(noted):
+def test_the_page_shows_the_value_nearest_to_breaking_its_limit(noted):
     for value in (3.9, 4.2, 4.0):
         meets("V10", "order", value, at_least=3.7, at_most=4.3)
     meets("V11", "full solves", 0.2, at_most=0.5, unit="cents")
@@ -87,7 +87,7 @@ def test_tests_are_read_by_file_and_name():
 
 def test_every_row_names_tests_that_there_are_or_is_measured_by_one():
     """A test that is renamed would leave its row behind as not measured."""
-    noting = "".join(file.read_text(encoding="utf-8") for file in measuring() if file.name != "test_bars.py")
+    noting = "".join(file.read_text(encoding="utf-8") for file in measuring() if file.name != "test_limits.py")
     for row in EVERY:
         for test in row.tests:
             file, _, name = test.partition("::")

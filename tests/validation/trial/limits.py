@@ -1,8 +1,8 @@
-"""The bars of the trial: each a question, the estimate with its exact bounds, and whether the bounds satisfy it.
+"""The limits of the trial: each a question, the estimate with its exact bounds, and whether the bounds satisfy it.
 
-A bar is met if the bound that could break it does not: the upper one for "at most", the lower one for "at least", both
-for an interval. The bars were set before any board was planted. Every bar counts all classes of effects; what the
-classes that were planned first would give stands in its note. A bar that is missed stays here as missed.
+A limit is met if the bound that could break it does not: the upper one for "at most", the lower one for "at least",
+both for an interval. The limits were set before any board was planted. Every limit counts all classes of effects; what
+the classes that were planned first would give stands in its note. A limit that is missed stays here as missed.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from validation.trial.counts import (
 )
 from validation.trial.sizes import errors
 
-Bar = dict[str, Any]
+Limit = dict[str, Any]
 PLANNED = frozenset(
     (
         "clamp_rotation",
@@ -50,7 +50,7 @@ PLANNED = frozenset(
         "poisson_ratio",
     )
 )
-"""The classes that were planned first; the trial plants further ones, harder to tell apart, and its bars count all."""
+"""The classes that were planned first; the trial plants others too, harder to tell apart, and its limits count all."""
 NOT_NEEDED = (200, 1200)
 """Boards of six modes with one effect of twice the nominal size of which nothing may be said to lack on so many."""
 COVERED = (0.85, 0.95)
@@ -58,8 +58,8 @@ COVERED = (0.85, 0.95)
 Records = Sequence[Record]
 
 
-def bars(cells: Sequence[Cell], by_cell: Mapping[str, Records]) -> list[Bar]:
-    """Every bar for which there are records."""
+def limits(cells: Sequence[Cell], by_cell: Mapping[str, Records]) -> list[Limit]:
+    """Every limit for which there are records."""
 
     def of(kind: str, **wanted: Any) -> list[Record]:
         """Records of the cells of a kind that agree in what is asked for."""
@@ -69,7 +69,7 @@ def bars(cells: Sequence[Cell], by_cell: Mapping[str, Records]) -> list[Bar]:
     designs = list(dict.fromkeys(cell.design for cell in cells))
     six, nine, both = "cantilever-6", "cantilever-9", "cantilever-6-free-6"
     large = {"noise_cents": 5.0, "size": 2.0, "noise": "median"}
-    found: list[Bar | None] = []
+    found: list[Limit | None] = []
     for design in designs:
         for noise, words in NOISES.items():
             nothing = of("null", design=design, noise=noise)
@@ -93,7 +93,7 @@ def bars(cells: Sequence[Cell], by_cell: Mapping[str, Records]) -> list[Bar]:
     unseen = share(of("one", design=six, **large), is_not_needed)
     limit, of_all = NOT_NEEDED
     found.append(
-        _at_most(f"{six}, 5 cents, 2x: none needed", unseen, limit / of_all, beside=f"bar: {limit} of {of_all}")
+        _at_most(f"{six}, 5 cents, 2x: none needed", unseen, limit / of_all, beside=f"limit: {limit} of {of_all}")
     )
     for design in designs:
         records = of("outside", design=design)
@@ -114,7 +114,7 @@ def bars(cells: Sequence[Cell], by_cell: Mapping[str, Records]) -> list[Bar]:
         found += _of_constants(design, of("one", design=design, **large))
     found += _of_sizes([record for record in of("one") if is_right_name(record)])
     found += _of_claims(of("null"), [*of("one"), *of("two"), *of("outside")])
-    return [bar for bar in found if bar is not None]
+    return [limit for limit in found if limit is not None]
 
 
 def join(*notes: str) -> str:
@@ -123,12 +123,12 @@ def join(*notes: str) -> str:
 
 
 def _planned_first(records: Records, question: Callable[[Record], bool]) -> str:
-    """What a bar's share would be among the classes that were planned first."""
+    """What a limit's share would be among the classes that were planned first."""
     planned = share([record for record in records if truth(record) <= PLANNED], question)
     return f"of the classes planned first {_shown(planned)}" if planned.n else ""
 
 
-def _of_claims(nothing: Records, something: Records) -> Iterable[Bar | None]:
+def _of_claims(nothing: Records, something: Records) -> Iterable[Limit | None]:
     """Claims where nothing is planted, and on wrong names; how often a right name is claimed, beside it."""
     yield _at_most("claim made on a null", share(nothing, is_claimed), 0.01, taken_for(nothing, is_claimed))
     wrong, part, right = (
@@ -142,29 +142,29 @@ def _of_claims(nothing: Records, something: Records) -> Iterable[Bar | None]:
     yield _at_most("claim made on a wrong name, outside the library too", wrong, 0.10, cause, beside=beside)
 
 
-def _within(quantity: str, found: Share, note: str = "") -> Bar:
+def _within(quantity: str, found: Share, note: str = "") -> Limit:
     """Both bounds of the coverage of 90 % intervals inside the band."""
     low, high = COVERED
     met = found.low >= low and found.high <= high
-    return _bar(quantity, f"{100 * low:g} to {100 * high:g} %", found, met, note)
+    return _limit(quantity, f"{100 * low:g} to {100 * high:g} %", found, met, note)
 
 
-def _at_most(quantity: str, found: Share, limit: float, cause: str = "", *, beside: str = "") -> Bar | None:
+def _at_most(quantity: str, found: Share, limit: float, cause: str = "", *, beside: str = "") -> Limit | None:
     """Upper bound at most a limit; a cause is told where it is missed, what stands beside it always."""
     met = found.high <= limit
     note = join("" if met else cause, beside)
-    return _bar(quantity, f"<= {100 * limit:.3g} %", found, met, note) if found.n else None
+    return _limit(quantity, f"<= {100 * limit:.3g} %", found, met, note) if found.n else None
 
 
-def _at_least(quantity: str, found: Share, limit: float, cause: str = "", *, beside: str = "") -> Bar | None:
+def _at_least(quantity: str, found: Share, limit: float, cause: str = "", *, beside: str = "") -> Limit | None:
     """Lower bound at least a limit; notes as in `_at_most`."""
     met = found.low >= limit
     note = join("" if met else cause, beside)
-    return _bar(quantity, f">= {100 * limit:.3g} %", found, met, note) if found.n else None
+    return _limit(quantity, f">= {100 * limit:.3g} %", found, met, note) if found.n else None
 
 
-def _bar(quantity: str, wanted: str, found: Share, met: bool, note: str = "") -> Bar:
-    return {"quantity": quantity, "bar": wanted, **found.as_json(), "shown": _shown(found), "met": bool(met),
+def _limit(quantity: str, wanted: str, found: Share, met: bool, note: str = "") -> Limit:
+    return {"quantity": quantity, "limit": wanted, **found.as_json(), "shown": _shown(found), "met": bool(met),
             "note": note}  # fmt: skip
 
 
@@ -173,13 +173,13 @@ def _shown(found: Share) -> str:
     return f"{count}/{found.n} = {100 * found.value:.1f} % ({100 * found.low:.1f} to {100 * found.high:.1f})"
 
 
-def _number(quantity: str, found: Mean, limit: float, percent: bool = False) -> Bar | None:
+def _number(quantity: str, found: Mean, limit: float, percent: bool = False) -> Limit | None:
     if not found.n:
         return None
     factor, unit = (100.0, " %") if percent else (1.0, "")
     value, low, high = (f"{factor * number:.3g}" for number in (found.value, found.low, found.high))
     shown = f"{value}{unit} ({low} to {high}), n = {found.n}"
-    return {"quantity": quantity, "bar": f"<= {factor * limit:g}{unit}", **found.as_json(), "shown": shown,
+    return {"quantity": quantity, "limit": f"<= {factor * limit:g}{unit}", **found.as_json(), "shown": shown,
             "met": bool(found.high <= limit), "note": ""}  # fmt: skip
 
 
@@ -193,7 +193,7 @@ def class_average(records: Records, way: str) -> Share:
     return Share(float(np.mean(each)) * len(records), len(records)) if records else Share(0, 0)
 
 
-def _of_constants(design: str, records: Records) -> Iterable[Bar]:
+def _of_constants(design: str, records: Records) -> Iterable[Limit]:
     """Coverage after tracing within 85 to 95 %, both bounds; and that it is worse without.
 
     After tracing means averaged over all hypotheses, which is what the program shows first. What the hypothesis of the
@@ -209,7 +209,7 @@ def _of_constants(design: str, records: Records) -> Iterable[Bar]:
         + narrowest(records, after, *COVERED),
     )
     gain = mean([holds(r, "averaged") - holds(r, "without") for r in records])
-    yield _bar(
+    yield _limit(
         f"constants without tracing, {design}, 2x: visibly worse",
         "lower than after tracing",
         without,
@@ -218,7 +218,7 @@ def _of_constants(design: str, records: Records) -> Iterable[Bar]:
     )
 
 
-def _of_sizes(named: Records) -> Iterable[Bar]:
+def _of_sizes(named: Records) -> Iterable[Limit]:
     """Sizes of the rightly named, all cells of single effects together."""
     found = [one for record in named for one in record["amplitudes"].values()]
     if not found:
