@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,10 @@ import ritz
 from generator.ringing import Blow, Ringing, recorded, ringing, with_noise
 from numpy.typing import NDArray
 from scipy.io import wavfile
+
+from bayesplate.errors import InputError
+from bayesplate.recordings.picking import Picked
+from bayesplate.recordings.reading import read_recordings
 
 Floats = NDArray[np.float64]
 E_X, E_Y, G_XY = 12.1e9, 0.87e9, 0.72e9
@@ -107,6 +112,40 @@ def write_wav(path: Path, rate: float, *channels: Floats, level: float = 0.5) ->
     columns = np.stack([level * channel / np.abs(channel).max() for channel in channels], axis=1)
     wavfile.write(path, round(rate), np.round(32767.0 * columns).astype(np.int16))
     return path
+
+
+def write_table(path: Path, **columns: Floats) -> Path:
+    """A CSV table with a header."""
+    np.savetxt(path, np.column_stack([*columns.values()]), "%.9g", ",", header=",".join(columns), comments="")
+    return path
+
+
+def only(path: Path, content: bytes | None = None, **options: Any) -> Any:
+    """The one recording, or frequency response, that a file holds."""
+    if content is not None:
+        path.write_bytes(content)
+    ((one,),) = read_recordings([path], **options)
+    return one
+
+
+def refusal(call: Callable[..., Any], *arguments: Any, **options: Any) -> str:
+    """What is said where something is refused; empty where it is not."""
+    try:
+        call(*arguments, **options)
+    except InputError as refused:
+        return str(refused)
+    return ""
+
+
+def likely_below(found: Picked, hertz: float) -> Floats:
+    """Frequencies of the likely modes below a limit, Hz."""
+    return np.array([mode.hz for mode in found.likely if mode.hz < hertz])
+
+
+def truth_below(hertz: float, of: Ringing | None = None) -> Floats:
+    """Frequencies of a board below a limit, Hz."""
+    damped = (of or board()).damped
+    return damped[damped < hertz]
 
 
 def write_taps(folder: Path, rng: np.random.Generator, *, rate: float = 8000.0) -> list[Path]:
