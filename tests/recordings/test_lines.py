@@ -6,16 +6,16 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from made_recordings import board, hits
+from made_recordings import board, hits, likely_below, truth_below
 
 from bayesplate.errors import InputError
-from bayesplate.recordings.contract import PickedRow
-from bayesplate.recordings.hits import find_hits
 from bayesplate.recordings.picking import Picked, pick_modes
 from bayesplate.recordings.signals import Recording
 from bayesplate.recordings.taking import take
 
 RATE, SECONDS, HIGHEST = 8000.0, 7.5, 300.0
+SURE = 0.98 * HIGHEST
+"""Hz below which the planted modes are to be found."""
 TIMES = [0.5, 1.9, 3.3, 4.7, 6.1]
 AT = np.arange(round(SECONDS * RATE)) / RATE
 
@@ -41,50 +41,31 @@ def picked(added: np.ndarray, decibels: float = 45.0) -> Picked:
 
 
 LINES = {
-    "hum with harmonics": (sum(tone(60.01 * k, 0.04 / k) for k in (1, 2, 3, 4)), "hum"),
-    "a tone on a mode": (tone(float(board().damped[2]) + 0.3, 0.03), "a steady line"),
-    "a faint tone": (tone(87.3, 0.003), "a steady line"),
-    "loud tones everywhere": (sum(tone(hertz, 0.5) for hertz in (66.1, 93.7, 111.3, 137.9, 163.2)), "a steady line"),
+    "hum with harmonics": (sum(tone(60.01 * k, 0.04 / k) for k in (1, 2, 3, 4)), 45.0, "hum"),
+    "a tone on a mode": (tone(float(board().damped[2]) + 0.3, 0.03), 45.0, "a steady line"),
+    "a faint tone": (tone(87.3, 0.003), 45.0, "a steady line"),
+    "a faint tone in little noise": (tone(87.3, 0.003), 75.0, "a steady line"),
+    "loud tones everywhere": (
+        sum(tone(hertz, 0.5) for hertz in (66.1, 93.7, 111.3, 137.9, 163.2)),
+        45.0,
+        "a steady line",
+    ),
+    "rumble": (tone(1.0, 2.0) + tone(9.0, 0.3), 45.0, ""),
+    "an offset": (np.ones(AT.size), 45.0, ""),
+    "two whistles": (tone(1000.3, 0.1) + tone(2400.0, 0.1), 45.0, ""),
 }
+"""What is added to the taps, the noise in dB, and what a line of it in the band is named."""
 
 
-def in_band(found: Picked) -> list[PickedRow]:
-    """The likely modes of the band, of which the planted ones are known."""
-    return [mode for mode in found.likely if mode.hz < 0.98 * HIGHEST]
-
-
-TRUTH = board().damped[board().damped < 0.98 * HIGHEST]
-
-
-@pytest.mark.parametrize(("name", "decibels"), [*((name, 45.0) for name in LINES), ("a faint tone", 75.0)])
-def test_a_steady_tone_takes_no_mode_with_it_and_is_named(name, decibels):
-    added, kind = LINES[name]
+@pytest.mark.parametrize("name", LINES)
+def test_a_steady_tone_takes_no_mode_with_it_and_is_named_and_what_lies_beyond_the_band_makes_none(name):
+    added, decibels, kind = LINES[name]
     found = picked(added, decibels)
 
-    likely = in_band(found)
-    np.testing.assert_allclose([mode.hz for mode in likely], TRUTH, rtol=5e-4)
-    assert max(mode.amplitude for mode in likely) == 1.0
-    assert kind in {mode.kind for mode in found.peaks if not mode.is_likely}
-
-
-BEYOND = {
-    "rumble": tone(1.0, 2.0) + tone(9.0, 0.3),
-    "an offset": np.ones(AT.size),
-    "two whistles": tone(1000.3, 0.1) + tone(2400.0, 0.1),
-}
-
-
-@pytest.mark.parametrize("name", BEYOND)
-def test_what_lies_beyond_the_band_refuses_no_tap_and_makes_no_mode(name):
-    found = picked(BEYOND[name])
-
-    np.testing.assert_allclose([mode.hz for mode in in_band(found)], TRUTH, rtol=5e-4)
-
-
-def test_a_tone_alone_is_no_hit():
-    noise = 1e-3 * np.random.default_rng(3).standard_normal(AT.size)
-
-    assert find_hits(Recording("tone.wav", RATE, tone(1000.0, 1.0) + noise)) == []
+    np.testing.assert_allclose(likely_below(found, SURE), truth_below(SURE), rtol=5e-4)
+    if kind:
+        assert max(mode.amplitude for mode in found.likely if mode.hz < SURE) == 1.0
+        assert kind in {mode.kind for mode in found.peaks if not mode.is_likely}
 
 
 def gated(heard: np.ndarray, threshold: float, fade: float) -> np.ndarray:
@@ -99,7 +80,7 @@ def test_what_a_noise_gate_cuts_off_is_not_used_and_it_is_named(threshold, fade)
     taken = take([[Recording("gate.wav", RATE, gated(taps(), threshold, fade))]], HIGHEST)
     found = pick_modes(taken.spectra, 20.0, HIGHEST)
 
-    np.testing.assert_allclose([mode.hz for mode in in_band(found)], TRUTH, rtol=2e-3)
+    np.testing.assert_allclose(likely_below(found, SURE), truth_below(SURE), rtol=2e-3)
     (told,) = taken.remarks
     assert told.startswith("gate.wav: the sound breaks off ")
     assert "a noise gate" in told
