@@ -30,31 +30,22 @@ def answer(strength: float = 1.0) -> Answer:
     return Answer(np.full(1, strength, dtype=complex), np.full(1, 0.01), 1.0)
 
 
-def test_parts_of_a_peak_leave_it_and_a_part_of_a_part_stays():
+def test_parts_of_a_peak_leave_it_and_a_part_of_a_part_and_what_is_rather_a_mode_stay():
     """Two modes with something between them that both are confused with: one of the two was a part of that."""
     assert whole_peaks([MODE, part(0), part(1)]) == {1: 0}
-
-
-def test_what_is_a_mode_rather_than_a_part_does_not_leave():
     assert whole_peaks([MODE, part(0, spurious=0.45), Verdict(0.9, "faint")]) == {}
-
-
-def test_a_part_of_a_faint_line_leaves_it():
     assert whole_peaks([part(1), Verdict(0.9, "faint")]) == {0: 1}
 
 
 def test_what_is_four_times_as_broad_as_all_others_is_rather_no_mode():
+    """Broad things do not tell how the board damps where they are weak."""
     damping = np.array([0.006, 0.008, 0.007, 0.005, 0.009, 0.007, 0.008, 0.006, 0.030])
     odds = broad_odds(damping, np.ones(damping.size))
-
     assert odds[-1] > 1.0
     assert odds[:-1].max() < 0.01
 
-
-def test_broad_things_do_not_tell_how_the_board_damps_where_they_are_weak():
     damping = np.array([0.006, 0.007, 0.008, 0.03, 0.035, 0.04, 0.03])
     weak = np.array([1.0, 1.0, 1.0, 0.05, 0.05, 0.05, 0.05])
-
     assert broad_odds(damping, weak)[3:].min() > 1.0
 
 
@@ -64,28 +55,34 @@ FIRST = np.zeros(1, dtype=np.intp)
 SPECTRA = Spectra(HERTZ, ONES, ONES, ("frf",), FIRST, FIRST, ((None, None),), "acceleration", 2.0)
 
 
-def test_a_verdict_says_that_something_is_broad():
-    modes = [*(mode(100.0 * i) for i in range(1, 9)), mode(950.0, damping=0.035)]
-    found = verdicts(SPECTRA, modes, [answer() for _ in modes])
-
-    assert (found[-1].kind, found[-1].spurious > 0.5) == ("something broad", True)
-    assert max(one.spurious for one in found[:-1]) < 0.1
-
-
 def test_a_weak_mode_is_a_part_of_a_peak_nearby_and_of_nothing_broad():
     modes = [*(mode(100.0 * i) for i in range(1, 9)), mode(950.0, damping=0.035)]
-    answered = [*(answer() for _ in modes), answer(0.05)]
-    beside_a_peak = verdicts(SPECTRA, [*modes, mode(810.0)], answered)
-    beside_the_ground = verdicts(SPECTRA, [*modes, mode(910.0)], answered)
+    answered = [answer()] * len(modes)
+    alone = verdicts(SPECTRA, modes, answered)
+    beside_a_peak = verdicts(SPECTRA, [*modes, mode(810.0)], [*answered, answer(0.05)])
+    beside_the_ground = verdicts(SPECTRA, [*modes, mode(910.0)], [*answered, answer(0.05)])
 
+    assert max(one.spurious for one in alone[:-1]) < 0.1
+    assert (alone[-1].kind, alone[-1].spurious > 0.5) == ("something broad", True)
     assert beside_a_peak[-1].kind == "part of 800.0 Hz"
     assert beside_the_ground[-2].kind == "something broad"
     assert (beside_the_ground[-1].part_of, beside_the_ground[-1].spurious < 0.5) == (-1, True)
 
 
-@pytest.fixture
-def left_out(monkeypatch):
-    """Two modes and a part beside them, others far off; fitted again each has moved, one is gone and one has come."""
+def test_beside_loud_lines_that_do_not_decay_no_mode_is_faint_and_they_are_named():
+    modes = [*(mode(100.0 * i) for i in range(1, 6)), *(mode(hertz, damping=1e-6) for hertz in (83.1, 130.7, 220.3))]
+    found = verdicts(SPECTRA, modes, [*[answer()] * 5, *[answer(300.0)] * 3])
+
+    assert max(one.spurious for one in found[:5]) < 0.1
+    assert {one.kind for one in found[5:]} == {"a steady line"}
+
+
+def test_modes_beside_a_part_are_those_of_a_fit_without_it_and_others_stay(monkeypatch):
+    """Two modes and a part beside them, others far off; fitted again each has moved, one is gone and one has come.
+
+    A mode is averaged with what was nearest to it before: the part may have had its place, and the mode have been what
+    was left.
+    """
     before = [mode(375.0), mode(401.94), mode(402.79), mode(404.65), mode(430.0)]
     again = [mode(401.73), mode(404.22), mode(407.56), mode(431.0)]
     words = {404.65: part(2)}
@@ -95,24 +92,11 @@ def left_out(monkeypatch):
 
     monkeypatch.setattr(picking, "judged", judged)
     monkeypatch.setattr(picking, "fit_modes", lambda *_: again)
-    return picking._without_parts(None, before, [], (20.0, 1000.0))
-
-
-def test_modes_beside_a_part_are_those_of_a_fit_without_it_and_others_stay(left_out):
-    kept, parts = left_out
+    kept, (left_out,) = picking._without_parts(None, before, [], (20.0, 1000.0))
 
     assert [peak.mode.frequency for peak in kept] == [375.0, 401.73, 404.22, 430.0]
-    assert [(peak.mode.frequency, peak.verdict.kind) for peak in parts] == [
-        (404.65, f"part of {kept[2].pole[0]:.1f} Hz")
-    ]
-
-
-def test_a_mode_is_averaged_with_what_was_nearest_to_it_while_the_part_was_there(left_out):
-    """The part may have had its place, and the mode have been what was left."""
-    kept, _ = left_out
-
-    assert kept[2].other.frequency == 404.65
-    assert kept[2].doubt == 0.8
+    assert (left_out.mode.frequency, left_out.verdict.kind) == (404.65, f"part of {kept[2].pole[0]:.1f} Hz")
+    assert (kept[2].other.frequency, kept[2].doubt) == (404.65, 0.8)
 
 
 def test_damping_is_averaged_as_the_frequency_is_and_its_error_holds_both_fits():
@@ -124,11 +108,3 @@ def test_damping_is_averaged_as_the_frequency_is_and_its_error_holds_both_fits()
     assert one.hz == pytest.approx(400.2)
     assert one.damping_percent == pytest.approx(100.0 * (0.8 * decay + 0.2 * other) / 400.2)
     assert one.damping_sd_percent == pytest.approx(100.0 * np.hypot(0.01, 0.4 * (other - decay)) / 400.2)
-
-
-def test_beside_loud_lines_that_do_not_decay_no_mode_is_faint_and_they_are_named():
-    modes = [*(mode(100.0 * i) for i in range(1, 6)), *(mode(hertz, damping=1e-6) for hertz in (83.1, 130.7, 220.3))]
-    found = verdicts(SPECTRA, modes, [*(answer() for _ in range(5)), *(answer(300.0) for _ in range(3))])
-
-    assert max(one.spurious for one in found[:5]) < 0.1
-    assert {one.kind for one in found[5:]} == {"a steady line"}
