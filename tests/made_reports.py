@@ -1,11 +1,14 @@
-"""Quick fits whose reports tests look at, and their pages with any texts in place of the card's."""
+"""Quick fits whose reports tests look at, their pages with any texts in place of the card's, and words in figures."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 from runs import sample_loosely
 
 from bayesplate.board.board import Board
@@ -16,6 +19,11 @@ from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.report.page import fit_page, write_report
 from bayesplate.results.summary import Summary
+
+FIGURES = (
+    "board", "constants", "corner", "modes", "percentiles", "predictive", "priors", "residuals", "sampler", "shares",
+)  # fmt: skip
+"""Of the report of a fit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,3 +54,15 @@ def fitted(card: str) -> Fit:
         sample_loosely(patched)
         result = fit(card)
     return Fit(prepare(card).card, result.inference, result.draws, result.summary)
+
+
+def cut_off(figure: Figure, texts: Iterable[Text], margin: float = 0.0) -> list[str]:
+    """Texts of a figure that reach beyond it by more than a margin, pixels."""
+    figure.draw_without_rendering()
+    width, height = figure.bbox.size
+    found = []
+    for text in texts:
+        box = text.get_window_extent()
+        least, most = min(box.x0, box.y0), max(box.x1 - width, box.y1 - height)
+        found += [text.get_text()] if least < -margin or most > margin else []
+    return found

@@ -55,19 +55,22 @@ def test_a_panel_a_mode_and_its_words():
     assert any("Mixtures of the lowest named modes" in text for text in texts)  # which mix (1,0), not measured
 
 
-def test_mixtures_of_measured_modes_are_said_to_be_that():
-    sheet = made()
+def test_mixtures_of_measured_modes_are_said_to_be_that_and_dollar_signs_of_a_title_stay():
+    """They would be mathematics to matplotlib, and an unclosed brace an error."""
+    sheet = made(title=r"Half $\frac{1$ top")
     combined = tuple(replace(one, weights={"(0,0)": 1.0}) for one in sheet.combined)
+    figure = chladni_sheet(replace(sheet, combined=combined))
+    figure.draw_without_rendering()
 
-    _, texts = words(chladni_sheet(replace(sheet, combined=combined)))
-
+    _, texts = words(figure)
+    assert texts[0].endswith(r"Half $\frac{1$ top")
     assert any("Mixtures of the measured modes" in text for text in texts)
 
 
-def test_nodal_lines_lie_where_the_shape_is_zero():
+def test_nodal_lines_lie_where_the_shape_is_zero_and_edges_are_drawn_as_they_are_held():
     """(1,2): one line half way along, two at a quarter and three quarters across."""
-    figure = chladni_sheet(made())
-    panel = figure.axes[7]  # labels count 0 to 4 across first: (1,2)
+    panels = chladni_sheet(made()).axes
+    panel = panels[7]  # labels count 0 to 4 across first: (1,2)
     (nodal,) = (c for c in panel.collections if np.allclose(c.get_linewidth(), 1.8))
     x, y = np.concatenate([path.vertices for path in nodal.get_paths()]).T
 
@@ -75,14 +78,11 @@ def test_nodal_lines_lie_where_the_shape_is_zero():
     assert on_a_line.all()
     assert {0.25, 0.5, 0.75} <= set(np.round(np.concatenate([x, y]), 2))
 
-
-def test_edges_are_drawn_as_they_are_held():
-    panel = chladni_sheet(made()).axes[0]
-    styles = {line.get_label(): line.get_linestyle() for line in panel.lines}
-
+    styles = {line.get_label(): line.get_linestyle() for line in panels[0].lines}
     assert styles == {"edge x0 clamped": "-", "edge x1 free": "-", "edge y0 supported": "--", "edge y1 free": "-"}
-    assert [patch.get_hatch() for patch in panel.patches] == ["//////"]
-    assert panel.patches[0].get_x() < 0
+    (held,) = panels[0].patches
+    assert held.get_hatch() == "//////"
+    assert held.get_x() < 0
 
 
 @pytest.mark.parametrize("aspect_ratio", [0.2, 6.0])
@@ -104,24 +104,13 @@ def test_nothing_overlaps_or_leaves_the_page(aspect_ratio):
             assert overlap_x < 0.5 or overlap_y < 0.5
 
 
-def test_few_figures_fill_the_sheet():
+def test_few_figures_fill_the_sheet_and_panels_keep_the_boards_proportions():
     """Two columns where no mixtures, three in a row, set the width: a sheet for the bench is read from afar."""
     few = layout(6, 2.2, has_combined=False)
     assert (few.n_columns, few.n_rows) == (2, 3)
     assert few.panel[0] == pytest.approx((8.27 - 2 * 0.55) / 2 - 0.30)  # half of A4 between its margins, less a gap
     assert layout(6, 2.2, has_combined=True).n_columns == 3
-
-
-def test_panels_keep_the_boards_proportions():
     for aspect_ratio in (0.4, 1.0, 2.2):
         plan = layout(12, aspect_ratio, has_combined=True)
         assert plan.panel[0] / plan.panel[1] == pytest.approx(aspect_ratio)
         assert plan.n_columns * plan.n_rows >= 12
-
-
-def test_a_users_dollar_signs_stay_as_they_are():
-    """They would be mathematics to matplotlib, and an unclosed brace an error."""
-    figure = chladni_sheet(made(title=r"Half $\frac{1$ top"))
-    figure.draw_without_rendering()
-
-    assert figure.texts[0].get_text().endswith(r"Half $\frac{1$ top")

@@ -20,18 +20,8 @@ def columns():
     return {name: rng.normal(mean, 0.1, (4, N_DRAWS // 4)) for name, mean in zip(WORDS, (11.0, 0.9, 0.7), strict=True)}
 
 
-@pytest.fixture
-def drawn(monkeypatch):
-    """The figures that are written, kept to be looked at."""
-    kept = []
-    monkeypatch.setattr("bayesplate.report.corner_plot.save_figure", lambda figure, path: kept.append(figure))
-    return kept
-
-
-def test_every_pair_has_a_panel_with_its_draws(columns, drawn, tmp_path):
-    write_corner_plot(tmp_path / "corner.png", columns)
-    (figure,) = drawn
-    panels = np.array(figure.axes).reshape(3, 3)
+def test_every_pair_has_a_panel_with_its_draws_and_what_is_marked_its_line(columns):
+    panels = np.array(corner_figure(columns, {WORDS[0]: 11.05}).axes).reshape(3, 3)
 
     assert tuple(panel.get_xlabel() for panel in panels[-1]) == WORDS
     assert tuple(panel.get_ylabel() for panel in panels[1:, 0]) == WORDS[1:]
@@ -41,6 +31,8 @@ def test_every_pair_has_a_panel_with_its_draws(columns, drawn, tmp_path):
             assert low < columns[other].mean() < high
             low, high = panels[i, j].get_ylim()
             assert low < columns[name].mean() < high
+    assert [line.get_xdata()[0] for line in panels[0, 0].lines] == [11.05]
+    assert not panels[1, 1].lines
 
 
 @pytest.mark.parametrize("n", [6, 9])
@@ -61,21 +53,12 @@ def test_a_panel_has_two_ticks_and_none_where_it_would_run_into_the_next_panel(n
         assert ((at > 0.07) & (at < 0.93)).all()
 
 
-def test_what_is_marked_gets_its_line_and_the_rest_none(columns, drawn, tmp_path):
-    write_corner_plot(tmp_path / "corner.png", columns, {WORDS[0]: 11.05})
-    panels = np.array(drawn[0].axes).reshape(3, 3)
+def test_one_column_is_drawn_alone(columns):
+    for value, lines in ((11.05, [11.05]), (None, [])):
+        (panel,) = corner_figure({WORDS[0]: columns[WORDS[0]]}, {WORDS[0]: value}).axes
 
-    assert [line.get_xdata()[0] for line in panels[0, 0].lines] == [11.05]
-    assert not panels[1, 1].lines
-
-
-@pytest.mark.parametrize(("value", "lines"), [(11.05, [11.05]), (None, [])])
-def test_one_column_is_drawn_alone(columns, drawn, tmp_path, value, lines):
-    write_corner_plot(tmp_path / "corner.png", {WORDS[0]: columns[WORDS[0]]}, {WORDS[0]: value})
-    (panel,) = drawn[0].axes
-
-    assert panel.get_xlabel() == WORDS[0]
-    assert [line.get_xdata()[0] for line in panel.lines] == lines
+        assert panel.get_xlabel() == WORDS[0]
+        assert [line.get_xdata()[0] for line in panel.lines] == lines, value
 
 
 def test_the_same_draws_give_the_same_file_and_no_state_of_pyplot(columns, tmp_path):

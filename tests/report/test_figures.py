@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from diagnoses import DIAGNOSES
 from made_isotropic import steel
+from made_reports import FIGURES, cut_off
 from made_summaries import spread
 
 from bayesplate.board.quantity import Quantity
@@ -27,7 +28,7 @@ from bayesplate.report.diagnosis import null_picture
 from bayesplate.report.modes import modes_pictures, predictive_picture
 from bayesplate.report.page import pictures
 from bayesplate.report.posterior import Compared, compared, health_picture
-from bayesplate.report.style import NO_GLYPH, drawable
+from bayesplate.report.style import NO_GLYPH, drawable, in_figure
 from bayesplate.results.words import MISSING
 
 
@@ -170,7 +171,11 @@ def test_a_plate_without_grain_is_drawn_and_told_so():
 
 
 def test_figures_of_a_board_that_narrows_end_at_its_outline(tapered):
-    """Twist of a free board, symmetric across: its line along stays in the middle, and nothing is drawn beyond."""
+    """Twist of a free board, symmetric across: its line along stays in the middle, and nothing is drawn beyond.
+
+    Places are stated from its own corner, by hand: half the width in from y0 at x1 is 20 + 90 mm on the rectangle, and
+    110 of the mean 200 as stated.
+    """
     system = system_of(tapered, tapered.setups[1])
     values = {**tapered.nominal(), "D_x": 21.0, "D_y": 1.4, "D_s": 5.0}
     twist = sheet(tapered, system, values, "as given")
@@ -185,12 +190,7 @@ def test_figures_of_a_board_that_narrows_end_at_its_outline(tapered):
     low, high = np.array([first.drawn_at(x, y)[1] for y in (0.0, 1.0) for x in drawn[:, 0]]).reshape(2, -1)
     assert (drawn[:, 1] > low - 0.01).all()
     assert (drawn[:, 1] < high + 0.01).all()
-
-
-def test_places_on_a_board_that_narrows_are_stated_from_its_own_corner(tapered):
-    """By hand: half the width in from y0 at x1 is 20 + 90 mm on the rectangle, and 110 of the mean 200 as stated."""
-    shaped = system_of(tapered, tapered.setups[1]).shaped
-
+    shaped = system.shaped
     assert shaped.as_stated(1.0, 0.5) == pytest.approx((1.0, 110 / 200), abs=0.003)
     assert shaped.placed(*shaped.as_stated(0.7, 0.3)) == pytest.approx((0.7, 0.3))
 
@@ -228,35 +228,29 @@ def test_shares_fill_each_mode(drawn):
     assert list(ends.values()) == pytest.approx([100.0] * 6, abs=0.5)
 
 
-def test_before_and_after_are_the_diagnosis_own(drawn):
+def test_the_figures_of_a_diagnosis_show_its_own_numbers(drawn):
+    """What the effect changes, and where the board stands among simulated ones."""
     errors, shifts = drawn["before-after"].figure.axes
-
     assert [bar.get_width() for bar in errors.patches] == [21.25, 46.5, 46.5, 4.25, 9.5, 12.5]
     np.testing.assert_array_equal(shifts.lines[0].get_xdata(), [2.5, -1.25, 0.0])
 
-
-def test_the_board_stands_among_simulated_ones(drawn):
     odds, ratios = drawn["null-control"].figure.axes
-
     assert [line.get_xdata()[0] for line in odds.lines] == [4.5, 3.0]
     assert [line.get_xdata()[0] for line in ratios.lines] == [0.25, 0.75]
     assert [one.get_title("right") for one in (odds, ratios)] == ["dashed: needed beyond", "dashed: claimed below"]
     assert [text.get_text() for text in odds.get_xticklabels()] == ["1 : 100", "1 : 10", "1 : 1", "10 : 1", "100 : 1"]
 
 
-def test_odds_are_told_as_odds_to_who_does_not_see_the_axis():
+@pytest.mark.parametrize(
+    ("log_odds", "words"),
+    [(np.log(90.0), "90 : 1"), (-np.log(4.0), "1 : 4"), (12.0, "10^5 : 1"), (12_000.0, "10^5212 : 1")],
+)
+def test_odds_are_told_and_drawn_as_odds(log_odds, words):
+    """To who does not see the axis too; even where no number holds them no label runs into the next."""
     named = DIAGNOSES["named"]
-    for log_odds, words in ((np.log(90.0), "90 : 1"), (-np.log(4.0), "1 : 4"), (12_000.0, "10^5212 : 1")):
-        null = replace(named.null_control, log_odds=log_odds, log_odds_needed=np.log(2.0))
-        told = null_picture(replace(named, null_control=null)).alt
-        assert told.startswith(f"odds that something is lacking: this board {words}, limit 2 : 1; left-out error")
-
-
-@pytest.mark.parametrize("log_odds", [12.0, 12_000.0])
-def test_odds_beyond_all_doubt_are_read_as_powers_of_ten(log_odds):
-    """No label runs into the next, even odds that no number holds are drawn, and even odds have a mark."""
-    named = DIAGNOSES["named"]
-    picture = null_picture(replace(named, null_control=replace(named.null_control, log_odds=log_odds)))
+    null = replace(named.null_control, log_odds=log_odds, log_odds_needed=np.log(2.0))
+    picture = null_picture(replace(named, null_control=null))
+    assert picture.alt.startswith(f"odds that something is lacking: this board {words}, limit 2 : 1; left-out error")
     picture.figure.canvas.draw()
     labels = picture.figure.axes[0].get_xticklabels()
     boxes = [one.get_window_extent() for one in labels]
@@ -277,41 +271,27 @@ def test_the_expected_readings_have_a_bar_where_all_round_to_one(clamped):
         np.testing.assert_allclose(bars[label], [mode.rounding_cents for mode in modes])
 
 
-def test_no_word_of_the_sampler_is_cut_off_by_large_numbers(clamped):
-    """Rigidities of 20 000 N m, as well known as those of the board: no number stands apart as an offset."""
+def test_no_word_is_cut_off_or_too_small(drawn, clamped):
+    """Nor by rigidities of 20 000 N m, as well known as those of the board: no number stands apart as an offset."""
     chains = clamped.inference.chains
     draws = chains.draws.copy()
     draws[..., :3] = np.log(2e4) + draws[..., :3] - draws[..., :3].mean(axis=(0, 1, 2))
-    picture = health_picture(replace(clamped.inference, chains=replace(chains, draws=draws)))
+    large = health_picture(replace(clamped.inference, chains=replace(chains, draws=draws)))
 
-    require_whole([picture])
-    assert not any(panel.yaxis.get_offset_text().get_text() for panel in picture.figure.axes)
-
-
-def test_no_word_is_cut_off_or_too_small(drawn):
-    require_whole(drawn.values())
-
-
-def require_whole(found):
-    for picture in found:
-        name = picture.name
-        figure = picture.figure
-        figure.draw_without_rendering()
-        width, height = figure.bbox.size
-        assert picture.alt, name
-        assert picture.caption, name
-        for text in words(figure):
-            box = text.get_window_extent()
-            assert text.get_fontsize() >= 6.5, (name, text.get_text())
-            assert box.x0 >= -1, (name, text.get_text())
-            assert box.x1 <= width + 1, (name, text.get_text())
-            assert box.y0 >= -1, (name, text.get_text())
-            assert box.y1 <= height + 1, (name, text.get_text())
+    assert set(drawn) == {*FIGURES, "before-after", "null-control", "signatures"}
+    for picture in (*drawn.values(), large):
+        texts = words(picture.figure)
+        assert cut_off(picture.figure, texts, margin=1.0) == [], picture.name
+        assert min(text.get_fontsize() for text in texts) >= 6.5, picture.name
+        assert picture.alt, picture.name
+        assert picture.caption, picture.name
+    assert not any(panel.yaxis.get_offset_text().get_text() for panel in large.figure.axes)
 
 
-def test_signs_that_the_font_lacks_are_shown_as_such():
+def test_signs_that_the_font_lacks_are_shown_as_such_and_symbols_as_mathematics():
     assert drawable("violin \U0001f3bb") == f"violin {NO_GLYPH}"
     assert drawable("Ø $x$ é") == "Ø $x$ é"
+    assert in_figure("E_x, nu_xy, GPa") == r"$E_{x}$, $\nu_{xy}$, GPa"
 
 
 def test_what_the_readings_made_of_each_prior(clamped):
@@ -345,26 +325,23 @@ def test_the_corner_plot_names_a_quantity_in_two_lines():
 
 
 def test_percentiles_are_of_the_modes_that_the_table_has():
-    """A peak of the paper's board whose mode the printed table lacks takes no part: 42 subsets of six modes."""
+    """A peak of the paper's board whose mode the printed table lacks takes no part: 42 subsets of six modes.
+
+    Three modes have one subset of three, whose spread is none: no picture.
+    """
     board = prepare("finnish-spruce-cantilever").board
-    bare = replace(board, setups=(replace(board.setups[0], peaks=(Peak(Quantity.exact(898.0)),)),))
-    problem = Problem.from_card(bare).posed
     moduli = dict.fromkeys(("E_x", "E_y", "G_xy"), np.geomspace(5e8, 2e10, 8).reshape(2, 4))
 
-    (picture,) = percentiles_pictures(SimpleNamespace(problem=problem), SimpleNamespace(moduli=moduli))
+    def drawn_of(**changed):
+        problem = Problem.from_card(replace(board, setups=(replace(board.setups[0], **changed),))).posed
+        drawn = percentiles_pictures(SimpleNamespace(problem=problem), SimpleNamespace(moduli=moduli))
+        return len(problem.board.setups[0].readings), drawn
 
-    assert len(problem.board.setups[0].readings) == 7
+    n_readings, (picture,) = drawn_of(peaks=(Peak(Quantity.exact(898.0)),))
+    assert n_readings == 7
     assert "42" in picture.caption
     bands = [one for one in picture.figure.axes[0].patches if "percentile method" in str(one.get_label())]
     low, high = bands[0].get_extents().transformed(picture.figure.axes[0].transData.inverted()).intervalx
     assert 10.0 < low < high < 16.0  # E_x of the board in GPa, within a few sd
-
-
-def test_one_estimate_is_no_picture_of_the_percentile_method():
-    """Three modes have one subset of three, and its spread is none."""
-    board = prepare("finnish-spruce-cantilever").board
     kept = [one for one in board.setups[0].readings if str(one.label) in {"(1,0)", "(1,1)", "(1,2)"}]
-    problem = Problem.from_card(replace(board, setups=(replace(board.setups[0], readings=tuple(kept)),))).posed
-
-    assert len(problem.board.setups[0].readings) == 3
-    assert percentiles_pictures(SimpleNamespace(problem=problem), SimpleNamespace(moduli={})) == []
+    assert drawn_of(readings=tuple(kept)) == (3, [])

@@ -11,16 +11,14 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from diagnoses import DIAGNOSES, NEXT, candidate, spread
+from made_reports import FIGURES
 from payloads import DIRECTION_MARKS, EVERY, PAYLOADS, shown
 from read_pages import Read, faults
 
 from bayesplate.report.page import _of_diagnosis
-from bayesplate.report.style import in_figure
 
-FIGURES = (
-    "board", "constants", "corner", "modes", "percentiles", "predictive", "priors", "residuals", "sampler", "shares",
-)  # fmt: skip
 LARGEST = 3_000_000
+"""Bytes."""
 
 
 @pytest.fixture(scope="module")
@@ -42,9 +40,7 @@ def test_it_holds_every_figure_with_words_for_who_cannot_see_it(page, clamped_fo
         assert float(image["width"]) == pytest.approx(4.5 * 96)
     for name, image in zip(names, images, strict=True):
         assert b64decode(image["src"].partition(",")[2]) == (clamped_folder / "figures" / f"{name}.svg").read_bytes()
-
-
-def test_every_figure_is_a_picture_that_says_what_it_shows(clamped_folder):
+    assert (clamped_folder / "report.html").stat().st_size < LARGEST
     for path in sorted((clamped_folder / "figures").glob("*.svg")):
         tree = ElementTree.parse(path)
         titles = [one.text for one in tree.iter("{http://www.w3.org/2000/svg}title")]
@@ -105,12 +101,11 @@ def test_derived_quantities_by_hand(page, clamped):
         assert clamped.summary.derived[name].mean == pytest.approx(value, rel=5e-4), name
 
 
-def test_it_is_small(clamped_folder):
-    assert (clamped_folder / "report.html").stat().st_size < LARGEST
-
-
 def test_a_text_stays_a_text(clamped):
-    """In the title, the source, and what a diagnosis says: literally, without marks that turn the writing around."""
+    """In the title, the source, and what a diagnosis says: literally, without marks that turn the writing around.
+
+    The negative control: the same page with its escapes undone would be noticed.
+    """
     payload = EVERY
     told = candidate(payload, payload, look_alikes=(payload,), rejected_because=payload)
     found = replace(DIAGNOSES["named"], recommendation=payload, candidates=(told,), notes=(payload,))
@@ -121,16 +116,10 @@ def test_a_text_stays_a_text(clamped):
     assert faults(page) == []
     assert text.count(expected) >= 6
     assert not set(DIRECTION_MARKS) & set(page.source)
-
-
-def test_an_unescaped_text_would_be_noticed(clamped):
-    """The negative control of the test above: the same page with its escapes undone."""
-    page = clamped.page(PAYLOADS[4])
-
-    assert faults(Read(page)) == []
-    assert "element img" not in faults(Read(page))
-    broken = faults(Read(page.replace("&lt;", "<").replace("&gt;", ">").replace("&#34;", '"').replace("&#39;", "'")))
-    assert "img onerror" in broken
+    undone = clamped.page(PAYLOADS[4])
+    for escape, sign in (("&lt;", "<"), ("&gt;", ">"), ("&#34;", '"'), ("&#39;", "'")):
+        undone = undone.replace(escape, sign)
+    assert "img onerror" in faults(Read(undone))
 
 
 TOLD = {
@@ -184,13 +173,8 @@ def test_a_page_recommends_nothing_where_nothing_is_recommended(clamped):
     assert "What to measure next" not in Read(clamped.page("A board", diagnosis=silent)).text
 
 
-def test_symbols_are_set_as_mathematics_in_figures():
-    assert in_figure("E_x, nu_xy, GPa") == r"$E_{x}$, $\nu_{xy}$, GPa"
-
-
-@pytest.fixture
-def without_own_figures(monkeypatch):
-    """Reports whose only figures are those of their diagnosis: drawing the fit's takes most of the time."""
+def test_a_diagnosis_brings_its_figures_tables_and_constants(clamped, tmp_path, monkeypatch):
+    """Without the fit's own figures, whose drawing takes most of the time."""
     places = dict.fromkeys(("constants", "board", "modes", "errors", "folded"), ())
     monkeypatch.setattr(
         "bayesplate.report.page.pictures",
@@ -199,27 +183,19 @@ def without_own_figures(monkeypatch):
             **dict(zip(("diagnosis_first", "diagnosis_more"), _of_diagnosis(diagnosis), strict=True)),
         },
     )
-
-
-@pytest.mark.usefixtures("without_own_figures")
-def test_the_exported_constants_are_those_to_quote(clamped, tmp_path):
-    clamped.write(tmp_path / "group", DIAGNOSES["indistinguishable group"])
-    rows = (tmp_path / "group" / "constants.csv").read_text(encoding="utf-8").splitlines()
-    assert [float(row.split(",")[2]) for row in rows[1:]] == pytest.approx([10.25, 1.0, 0.5, 30.0, 2.5, 5.0])
-
-
-def test_a_diagnosis_brings_its_figures_and_tables(clamped, tmp_path, request):
-    """The fit's own figures are drawn once, for the first of them."""
-    named = Read(clamped.write(tmp_path / "named", DIAGNOSES["named"]).read_text(encoding="utf-8"))
-    request.getfixturevalue("without_own_figures")
-    clamped.write(tmp_path / "none", DIAGNOSES["none needed"])
-    clamped.write(tmp_path / "hidden", DIAGNOSES["undetectable"])
-    added = {name: {path.stem for path in (tmp_path / name / "figures").iterdir()} - set(FIGURES)
-             for name in ("named", "none", "hidden")}  # fmt: skip
-
     always = {"null-control", "signatures"}
-    assert added == {"named": {"before-after", *always}, "none": always, "hidden": set()}
-    assert len(named.all("img")) == len(FIGURES) + 3
-    assert (tmp_path / "named" / "before-after.csv").exists()
-    assert (tmp_path / "named" / "known-effects.csv").exists()
-    assert not (tmp_path / "none" / "known-effects.csv").exists()
+    added = {
+        "named": {"before-after", *always},
+        "indistinguishable group": {"before-after", *always},
+        "none needed": always,
+        "undetectable": set(),
+    }
+    for verdict, figures in added.items():
+        folder = tmp_path / verdict
+        page = Read(clamped.write(folder, DIAGNOSES[verdict]).read_text(encoding="utf-8"))
+        assert {path.stem for path in (folder / "figures").iterdir()} == figures, verdict
+        assert len(page.all("img")) == len(figures), verdict
+        assert (folder / "before-after.csv").exists(), verdict
+        assert (folder / "known-effects.csv").exists() == (verdict == "named"), verdict
+    rows = (tmp_path / "indistinguishable group" / "constants.csv").read_text(encoding="utf-8").splitlines()
+    assert [float(row.split(",")[2]) for row in rows[1:]] == pytest.approx([10.25, 1.0, 0.5, 30.0, 2.5, 5.0])

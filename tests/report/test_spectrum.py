@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_reports import cut_off
 from made_summaries import SUMMARY
 
 from bayesplate.report.modes import spectrum_pictures
@@ -31,10 +32,15 @@ MODES = (
 )
 
 
+def drawn(modes=MODES, peaks=PEAKS):
+    """The picture of peaks and modes."""
+    (picture,) = spectrum_pictures(replace(SUMMARY, peaks=peaks, spectra=(Spectrum("bench", 0.2, 0.02, modes),)))
+    return picture
+
+
 @pytest.fixture(scope="module")
 def picture():
-    made = replace(SUMMARY, peaks=PEAKS, spectra=(Spectrum("bench", 0.2, 0.02, MODES),))
-    return spectrum_pictures(made)[0]
+    return drawn()
 
 
 def test_lines_join_peaks_to_the_modes_that_they_may_be(picture):
@@ -59,8 +65,7 @@ def test_a_peak_that_is_no_mode_and_a_mode_without_a_peak_look_otherwise(picture
 
 
 def test_a_question_mark_is_explained_where_there_is_one(picture):
-    unnamed = (*MODES, mode("cannot tell", 259.0, 0.2))
-    (other,) = spectrum_pictures(replace(SUMMARY, peaks=PEAKS, spectra=(Spectrum("bench", 0.2, 0.02, unnamed),)))
+    other = drawn((*MODES, mode("cannot tell", 259.0, 0.2)))
 
     assert "?" in [text.get_text() for text in other.figure.axes[0].texts]
     assert other.caption.endswith("A question mark: a mode whose figure fits no label.")
@@ -69,23 +74,19 @@ def test_a_question_mark_is_explained_where_there_is_one(picture):
 
 def test_names_that_crowd_at_the_upper_end_stay_within_the_figure():
     crowd = tuple(mode(f"({k},4)", 258.0 + k, 1.0 / (k + 1)) for k in range(14))
-    made = replace(SUMMARY, peaks=PEAKS, spectra=(Spectrum("bench", 0.2, 0.02, (MODES[0], *crowd)),))
-    figure = spectrum_pictures(made)[0].figure
-    figure.canvas.draw()
-    boxes = [text.get_window_extent() for text in figure.axes[0].texts]
+    figure = drawn((MODES[0], *crowd)).figure
+    texts = figure.axes[0].texts
 
-    assert len(boxes) == 3 + 15
-    for i, box in enumerate(boxes):
-        assert figure.bbox.x0 <= box.x0
-        assert box.x1 <= figure.bbox.x1
-        assert not any(box.overlaps(other) for other in boxes[:i])
+    assert len(texts) == 3 + 15
+    assert cut_off(figure, texts) == []
+    boxes = [text.get_window_extent() for text in texts]
+    assert not any(box.overlaps(other) for i, box in enumerate(boxes) for other in boxes[:i])
 
 
 def test_peaks_below_all_modes_that_they_may_be_are_drawn_alone():
     """As where every mode so low has a label that is sure, and peaks of something else were read."""
     peaks = tuple(replace(one, assignments=(), spurious_probability=1.0) for one in PEAKS)
-    made = replace(SUMMARY, peaks=peaks, spectra=(Spectrum("bench", 0.2, 0.02, MODES[-1:]),))
-    (picture,) = spectrum_pictures(made)
+    picture = drawn(MODES[-1:], peaks)
     (panel,) = picture.figure.axes
 
     assert [text.get_text() for text in panel.texts] == ["100", "180", "260"]
