@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from html.parser import HTMLParser
 
+from payloads import DIRECTION_MARKS, shown
+
 ALLOWED = {
     "html", "head", "meta", "title", "style", "body", "header", "main", "section", "footer", "h1", "h2", "h3", "p",
     "bdi", "strong", "div", "table", "caption", "thead", "tbody", "tr", "th", "td", "figure", "figcaption", "img",
@@ -52,3 +54,10 @@ def faults(page: Read) -> list[str]:
         found += [] if link is None or (tag == "a" and LINK.fullmatch(link)) else [f"{tag} leads to {link[:40]}"]
     found += ["two titles"] if len(page.all("title")) != 1 else []
     return found
+
+
+def takes_it_for_text(source: str, payload: str, least: int) -> bool:
+    """Whether a page shows a payload literally so many times, without marks that turn the direction of writing."""
+    page = Read(source)
+    count = " ".join(page.text.split()).count(" ".join(shown(payload).split()))
+    return faults(page) == [] and count >= least and not set(DIRECTION_MARKS) & set(source)

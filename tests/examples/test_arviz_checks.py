@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import runpy
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "arviz_checks.py"
-
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory):
+def found(load, tmp_path_factory):
     figure = tmp_path_factory.mktemp("arviz") / "pareto.png"
-    numbers = runpy.run_path(str(EXAMPLE))["run"](figure)
+    numbers = load("arviz_checks").run(figure)
     assert figure.read_bytes().startswith(b"\x89PNG")
     return numbers
 

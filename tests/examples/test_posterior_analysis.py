@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import runpy
-from pathlib import Path
-
 import pytest
-
-EXAMPLE = Path(__file__).parents[2] / "examples" / "posterior_analysis.py"
 
 # GPa, from an independent exact fit of the thin plate (README); the percentile band of the paper lies beside it.
 MEANS = {"E_x": 13.3, "E_y": 0.638, "G_xy": 0.603}
 SDS = {"E_x": 0.40, "E_y": 0.045, "G_xy": 0.022}
 
 
-def test_the_numbers_of_the_cantilever_board(tmp_path):
-    numbers = runpy.run_path(str(EXAMPLE))["run"](tmp_path / "figure.png", corner=tmp_path / "corner.png")
+def test_the_numbers_of_the_cantilever_board(load, tmp_path):
+    numbers = load("posterior_analysis").run(tmp_path / "figure.png", corner=tmp_path / "corner.png")
 
     for name, row in numbers.items():
         assert row["mean"] == pytest.approx(MEANS[name], abs=0.15 * SDS[name])

@@ -65,10 +65,10 @@ def test_the_same_draws_give_the_same_file_and_no_state_of_pyplot(columns, tmp_p
     from matplotlib import pyplot
 
     before = pyplot.get_fignums()
-    for name in ("one.svg", "other.svg"):
-        write_corner_plot(tmp_path / name, columns)
+    for name, marked in (("one.svg", None), ("other.svg", None), ("marked.svg", {WORDS[0]: 11.05})):
+        write_corner_plot(tmp_path / name, columns, marked)
 
-    one, other = ((tmp_path / name).read_bytes() for name in ("one.svg", "other.svg"))
-    assert one == other
+    one, other, marked = ((tmp_path / name).read_bytes() for name in ("one.svg", "other.svg", "marked.svg"))
+    assert one == other != marked
     assert re.match(rb"<\?xml", one)
     assert pyplot.get_fignums() == before
