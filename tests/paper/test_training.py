@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
-from paper_rows import paper_coefficients
+from paper_rows import COEFFICIENTS, SETUPS, beams_of, paper_coefficients
 
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.plate import training
@@ -12,38 +14,28 @@ from bayesplate.plate.naming import find
 from bayesplate.plate.thin import thin_plate
 from bayesplate.plate.training import REFERENCE, TrainingConstants, train, training_weights
 
-CANTILEVER = (("clamped", "free"), ("free", "free"), 223 / 114, 3 / 223)
-CLAMPED = (("clamped", "clamped"), ("clamped", "clamped"), 150 / 103, 3 / 600)
+CANTILEVER = (SETUPS["cantilever"].ends_x, SETUPS["cantilever"].ends_y, 223 / 114, 3 / 223)
+CLAMPED = (SETUPS["clamped"].ends_x, SETUPS["clamped"].ends_y, 150 / 103, 3 / 600)
 CONSTANTS = TrainingConstants(E_x=10.7e9, E_y=0.716e9, G_xy=0.50e9, nu_xy=0.51, G_xz=0.62e9, G_yz=0.023e9)
 MIDDLE = np.array([5.44, 0.364, 1.0])  # p, q, 1 of the plate in the middle of the set
 
-# Tables "Linear fit results" of the paper: a, b, c by label. The cantilever's first label is (1,0).
-CANTILEVER_TABLE = {
-    (1, 0): (3.21, 0.00, 0.00),
-    (1, 1): (3.99, 0.94, 40.5),
-    (2, 0): (117.0, 41.9, 13.6),
-    (1, 2): (14.4, 1720, 155),
-    (2, 1): (124, 15.6, 328),
-    (2, 2): (134, 1910, 1260),
-}
-CLAMPED_TABLE = {
-    (0, 0): (236, 1214, 146.9),
-    (0, 1): (237.5, 8589, 552.3),
-    (1, 0): (1790, 1652, 534.9),
-    (0, 2): (242, 31910, 1196),
-    (1, 1): (1792, 10180, 2051),
-    (1, 2): (1799, 35250, 4469),
-}
+CANTILEVER_TABLE, CLAMPED_TABLE = COEFFICIENTS["cantilever"], COEFFICIENTS["clamped"]
 VEERING = {(2, 0), (1, 2)}
 
 
-def beams(label):
-    """Orders of the beam functions behind a label of the cantilever."""
-    return label[0] - 1, label[1]
+beams = partial(beams_of, "cantilever")
 
 
 def plane(mode):
     return np.array([mode.a, mode.b, mode.c])
+
+
+def found_in_the_middle(board, products):
+    """a, b, c by the energy shares of one solve of the plate in the middle of the set."""
+    ends_x, ends_y, aspect_ratio, _ = board
+    found = find(thin_plate(ends_x, ends_y, 16, 16), training_weights(*board[2:], CONSTANTS, "thin"), products)
+    stiffness = np.stack([found[product].stiffness for product in products])
+    return paper_coefficients(stiffness, aspect_ratio, CONSTANTS.nu_xy)
 
 
 def plate_of(training, factors):
@@ -78,15 +70,14 @@ def test_cantilever_coefficients_are_the_printed_ones(cantilever):
         assert mode.n_plates == 25
 
 
-@pytest.mark.parametrize("label", VEERING, ids=str)
-def test_veering_modes_lie_on_the_printed_planes(cantilever, label):
+def test_veering_modes_lie_on_the_printed_planes(cantilever):
     """Their coefficients depend on which plates are discarded; their planes agree to 0.6 % wherever recognised."""
-    printed = np.array(CANTILEVER_TABLE[label])
-    mode = cantilever.modes[beams(label)]
-    points = np.array([[p.p, p.q, 1.0] for p in cantilever.plates if beams(label) in p.matches])
+    for label in VEERING:
+        mode = cantilever.modes[beams(label)]
+        points = np.array([[p.p, p.q, 1.0] for p in cantilever.plates if beams(label) in p.matches])
 
-    assert 3 <= mode.n_plates == len(points) < 25
-    np.testing.assert_allclose(points @ plane(mode), points @ printed, rtol=0.006)
+        assert 3 <= mode.n_plates == len(points) < 25
+        np.testing.assert_allclose(points @ plane(mode), points @ CANTILEVER_TABLE[label], rtol=0.006)
 
 
 def test_thin_plates_do_not_give_the_cantilever_table(thin_cantilever):
@@ -99,42 +90,28 @@ def test_thin_plates_do_not_give_the_cantilever_table(thin_cantilever):
     assert mode.b / CANTILEVER_TABLE[2, 2][1] == pytest.approx(1.14, abs=0.01)
 
 
-def test_clamped_coefficients_are_the_printed_ones(clamped):
-    for label, (a, b, c) in CLAMPED_TABLE.items():
-        mode = clamped.modes[label]
+def test_clamped_coefficients_are_the_printed_ones_and_the_energy_shares_of_one_solve(clamped):
+    """Clamped modes hardly change their shapes, so that chord and tangent agree to 0.15 %."""
+    found = found_in_the_middle(CLAMPED, CLAMPED_TABLE)
+    for label, share in zip(CLAMPED_TABLE, found, strict=True):
+        mode, (a, b, c) = clamped.modes[label], CLAMPED_TABLE[label]
         assert (mode.a, mode.b) == pytest.approx((a, b), rel=0.01), label
         assert mode.c == pytest.approx(c, rel=0.035), label
-
-
-def test_clamped_training_agrees_with_the_energy_shares_of_one_solve(clamped):
-    """Clamped modes hardly change their shapes, so that chord and tangent agree to 0.15 %."""
-    ends_x, ends_y, aspect_ratio, _ = CLAMPED
-    weights = training_weights(*CLAMPED[2:], CONSTANTS, "thin")
-    found = find(thin_plate(ends_x, ends_y, 16, 16), weights, CLAMPED_TABLE)
-    shares = paper_coefficients(
-        np.stack([found[label].stiffness for label in CLAMPED_TABLE]), aspect_ratio, CONSTANTS.nu_xy
-    )
-
-    np.testing.assert_allclose([plane(clamped.modes[label]) for label in CLAMPED_TABLE], shares, rtol=1.5e-3)
+        np.testing.assert_allclose(plane(mode), share, rtol=1.5e-3)
 
 
 def test_non_negativity_hides_a_negative_share(thin_cantilever):
     """More E_y lowers the lowest mode of a cantilever, by way of nu_yx: b = -0.34. The fit can only answer zero."""
-    ends_x, ends_y, aspect_ratio, _ = CANTILEVER
-    weights = training_weights(*CANTILEVER[2:], CONSTANTS, "thin")
-    found = find(thin_plate(ends_x, ends_y, 16, 16), weights, [(0, 0)])
-    (share,) = paper_coefficients(found[0, 0].stiffness[None], aspect_ratio, CONSTANTS.nu_xy)
+    (share,) = found_in_the_middle(CANTILEVER, [(0, 0)])
 
     assert share[1] == pytest.approx(-0.34, abs=0.05)
     assert thin_cantilever.modes[0, 0].b == 0.0
 
 
-@pytest.mark.parametrize("name", ["cantilever", "clamped"])
-def test_planes_explain_the_frequencies(request, name):
-    modes = request.getfixturevalue(name).modes.values()
-
-    assert all(0.999 <= mode.r_squared <= 1.0 for mode in modes)
-    assert len({mode.r_squared for mode in modes}) == 6
+def test_planes_explain_the_frequencies(cantilever, clamped):
+    for modes in (cantilever.modes.values(), clamped.modes.values()):
+        assert all(0.999 <= mode.r_squared <= 1.0 for mode in modes)
+        assert len({mode.r_squared for mode in modes}) == 6
 
 
 def test_plates_cover_the_printed_ranges(cantilever):
@@ -146,10 +123,7 @@ def test_plates_cover_the_printed_ranges(cantilever):
     assert 0.28 < q.min() < q.max() < 0.45
     reference = plate_of(cantilever, REFERENCE)
     assert (reference.p, reference.q) == pytest.approx((4.36, 0.29), abs=0.005)
-
-
-def test_reference_recognises_itself(cantilever):
-    np.testing.assert_allclose(plate_of(cantilever, REFERENCE).mac[:, :6], np.eye(6), atol=1e-3)
+    np.testing.assert_allclose(reference.mac[:, :6], np.eye(6), atol=1e-3)  # it recognises itself
 
 
 def test_modes_cross_where_the_figure_says(cantilever):

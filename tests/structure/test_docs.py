@@ -49,39 +49,35 @@ def test_pages_say_only_what_is():
     assert {page: faults for page, faults in found.items() if faults} == {}
 
 
-@pytest.mark.parametrize(
-    ("text", "fault"),
-    [
-        ("$ bayesplate fitt my-board.toml", "no command fitt"),
-        ("```{command} chek my-board.toml", "no command chek"),
-        ("try `--resumee`", "no option --resumee"),
-        ("│ E_x │ 13.3 │", "output typed by hand"),
-    ],
-)
-def test_what_is_not_so_is_found(text, fault):
+def test_what_is_not_so_is_found():
     """The negative control."""
-    assert faults_of(text) == [fault]
+    for text, fault in {
+        "$ bayesplate fitt my-board.toml": "no command fitt",
+        "```{command} chek my-board.toml": "no command chek",
+        "try `--resumee`": "no option --resumee",
+        "│ E_x │ 13.3 │": "output typed by hand",
+    }.items():
+        assert faults_of(text) == [fault]
 
 
-@pytest.mark.parametrize("card", CARDS, ids=lambda path: path.stem)
-def test_a_card_of_the_documentation_loads_unless_its_name_says_otherwise(card):
-    if card.stem.endswith("with-faults"):
-        with pytest.raises(InputError, match="did you mean thickness_mm") as refused:
-            prepare(card)
-        assert len(refused.value.faults) == 5
-    else:
-        board = prepare(card, may_lack_frequencies=True).board
-        assert board.name == card.stem
+def test_a_card_of_the_documentation_loads_unless_its_name_says_otherwise():
+    for card in CARDS:
+        if card.stem.endswith("with-faults"):
+            with pytest.raises(InputError, match="did you mean thickness_mm") as refused:
+                prepare(card)
+            assert len(refused.value.faults) == 5
+        else:
+            assert prepare(card, may_lack_frequencies=True).board.name == card.stem
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
-def test_an_example_can_be_shown_in_the_gallery_and_is_tested(example):
+def test_an_example_can_be_shown_in_the_gallery_and_is_tested():
     """A title in one line, how to run it, and a test of its own."""
-    docstring = ast.get_docstring(ast.parse(example.read_text(encoding="utf-8"))) or ""
+    for example in EXAMPLES:
+        docstring = ast.get_docstring(ast.parse(example.read_text(encoding="utf-8"))) or ""
 
-    assert docstring.splitlines()[1] == ""
-    assert f"\n\n    python examples/{example.name}" in docstring
-    assert (ROOT / "tests" / "examples" / f"test_{example.name}").exists()
+        assert docstring.splitlines()[1] == "", example.name
+        assert f"\n\n    python examples/{example.name}" in docstring
+        assert (ROOT / "tests" / "examples" / f"test_{example.name}").exists(), example.name
 
 
 def test_there_is_something_to_read():

@@ -9,7 +9,6 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
 
-import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -57,18 +56,15 @@ def test_every_promise_names_a_test_that_there_is():
         assert f"\n## {heading}\n" in PAGE
 
 
-@pytest.mark.parametrize(
-    ("text", "fault"),
-    [
-        ("`tests/nowhere.py`", "no file tests/nowhere.py"),
-        ("make nothing", "no target nothing"),
-        ("| It is safe. | trust us |", "no test of: It is safe."),
-        ("| It is safe. | `tests/runs.py` |", "no test in tests/runs.py"),
-    ],
-)
-def test_what_is_not_there_is_found(text, fault):
+def test_what_is_not_there_is_found():
     """The negative control."""
-    assert faults_of(text) == [fault]
+    for text, fault in {
+        "`tests/nowhere.py`": "no file tests/nowhere.py",
+        "make nothing": "no target nothing",
+        "| It is safe. | trust us |": "no test of: It is safe.",
+        "| It is safe. | `tests/runs.py` |": "no test in tests/runs.py",
+    }.items():
+        assert faults_of(text) == [fault]
 
 
 def lock_faults(lock: str, asked: list[Requirement]) -> list[str]:
@@ -112,38 +108,30 @@ def test_the_lock_has_what_its_packages_need_in_turn():
     assert n_looked_at > 0 or distribution("numpy").version != versions["numpy"]
 
 
-@pytest.mark.parametrize(
-    ("line", "fault"),
-    [
-        ("numpy @ https://host.example/numpy.whl", "no name==version: numpy @ https://host.example/numpy.whl"),
-        ("--pre", "no name==version: --pre"),
-        ("numpy==2.0 ; python_version < '3.13'", "no name==version: numpy==2.0 ; python_version < '3.13'"),
-        ("../numpy", "no name==version: ../numpy"),
-        ("numpy==1.26.0", "numpy 1.26.0 is not <3,>=2"),
-        ("scipy==1.14", "not locked: numpy"),
-    ],
-)
-def test_a_bad_line_is_found(line, fault):
+def test_a_bad_line_is_found():
     """The negative control."""
-    assert fault in lock_faults(line + "\n", [Requirement("numpy>=2,<3")])
+    for line, fault in {
+        "numpy @ https://host.example/numpy.whl": "no name==version: numpy @ https://host.example/numpy.whl",
+        "--pre": "no name==version: --pre",
+        "numpy==2.0 ; python_version < '3.13'": "no name==version: numpy==2.0 ; python_version < '3.13'",
+        "../numpy": "no name==version: ../numpy",
+        "numpy==1.26.0": "numpy 1.26.0 is not <3,>=2",
+        "scipy==1.14": "not locked: numpy",
+    }.items():
+        assert fault in lock_faults(line + "\n", [Requirement("numpy>=2,<3")])
 
 
-LOOKED_UP = {"name": "a", "version": "1.0", "vulns": []}
-WEAK = {"name": "b", "version": "2.0", "vulns": [{"id": "W-1", "fix_versions": ["2.1"]}]}
-SKIPPED = {"name": "c", "skip_reason": "not found"}
-
-
-@pytest.mark.parametrize(
-    ("found", "said", "code"),
-    [
-        ([LOOKED_UP], "1 of 1 packages were looked up, 0 have known weaknesses", 0),
-        ([LOOKED_UP, WEAK], "b 2.0: W-1, mended in 2.1", 1),
-        ([LOOKED_UP, SKIPPED], "not looked up: c", 0),
-        ([SKIPPED, SKIPPED], "nothing was audited", 0),
-    ],
-)
-def test_an_audit_says_what_it_did_not_look_up(found, said, code):
-    lines, given = tool("audit").told(found)
-
-    assert said in "\n".join(lines)
-    assert given == code
+def test_an_audit_says_what_it_did_not_look_up():
+    looked_up = {"name": "a", "version": "1.0", "vulns": []}
+    weak = {"name": "b", "version": "2.0", "vulns": [{"id": "W-1", "fix_versions": ["2.1"]}]}
+    skipped = {"name": "c", "skip_reason": "not found"}
+    told = tool("audit").told
+    for found, said, code in (
+        ([looked_up], "1 of 1 packages were looked up, 0 have known weaknesses", 0),
+        ([looked_up, weak], "b 2.0: W-1, mended in 2.1", 1),
+        ([looked_up, skipped], "not looked up: c", 0),
+        ([skipped, skipped], "nothing was audited", 0),
+    ):
+        lines, given = told(found)
+        assert said in "\n".join(lines)
+        assert given == code, said
