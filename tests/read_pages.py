@@ -56,8 +56,9 @@ def faults(page: Read) -> list[str]:
     return found
 
 
-def takes_it_for_text(source: str, payload: str, least: int) -> bool:
-    """Whether a page shows a payload literally so many times, without marks that turn the direction of writing."""
+def not_as_text(source: str, payload: str, least: int) -> list[str]:
+    """What is wrong with a page that is to show a payload literally so many times, and no mark that turns writing."""
     page = Read(source)
     count = " ".join(page.text.split()).count(" ".join(shown(payload).split()))
-    return faults(page) == [] and count >= least and not set(DIRECTION_MARKS) & set(source)
+    marks = [ascii(mark) for mark in DIRECTION_MARKS if mark in source]
+    return [*faults(page), *marks, *([] if count >= least else [f"shown {count} times"])]

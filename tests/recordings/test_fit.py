@@ -38,9 +38,7 @@ def window(values: np.ndarray) -> Window:
 def test_without_noise_the_modes_are_exact_however_short_the_record():
     """Two slow decays, cut off when much of them is left: leakage is part of the rational form."""
     slow = PAIR * [1.0, 0.1]
-    values = decays(np.random.default_rng(1), slow, 3, 0.0)
-
-    fit = refined(window(values), slow + np.array([0.3, 0.05]))
+    fit = refined(window(decays(np.random.default_rng(1), slow, 3, 0.0)), slow + np.array([0.3, 0.05]))
 
     np.testing.assert_allclose(fit.poles, slow, rtol=0.0, atol=2e-6)
 

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 from payloads import EVERY
-from read_pages import Read, faults, takes_it_for_text
+from read_pages import Read, faults, not_as_text
 
 from bayesplate.grading.boards import BatchSummary, BoardRow, Failure
 from bayesplate.grading.matching import GradingRequest, grade
@@ -93,7 +93,7 @@ def test_names_and_messages_stay_texts(tmp_path):
     """Of boards that could not be fitted: the only ones whose names may be anything."""
     _, page = page_of(tmp_path, 0, GradingRequest(), said=EVERY)
 
-    assert takes_it_for_text(page, EVERY, 2)
+    assert not_as_text(page, EVERY, 2) == []
 
 
 def test_many_boards_are_drawn_without_names_and_none_at_all_is_a_page_too(tmp_path):

@@ -13,7 +13,7 @@ import pytest
 from diagnoses import DIAGNOSES, NEXT, candidate, spread
 from made_reports import FIGURES
 from payloads import EVERY, PAYLOADS
-from read_pages import Read, faults, takes_it_for_text
+from read_pages import Read, faults, not_as_text
 
 from bayesplate.report.page import _of_diagnosis
 
@@ -110,7 +110,7 @@ def test_a_text_stays_a_text(clamped):
     told = candidate(payload, payload, look_alikes=(payload,), rejected_because=payload)
     found = replace(DIAGNOSES["named"], recommendation=payload, candidates=(told,), notes=(payload,))
 
-    assert takes_it_for_text(clamped.page(payload, payload, found), payload, 6)
+    assert not_as_text(clamped.page(payload, payload, found), payload, 6) == []
     undone = clamped.page(PAYLOADS[4])
     for escape, sign in (("&lt;", "<"), ("&gt;", ">"), ("&#34;", '"'), ("&#39;", "'")):
         undone = undone.replace(escape, sign)

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from made_batches import HERTZ, TEMPLATE
 from made_recordings import hits, write_wav
 from payloads import DIRECTION_MARKS, EVERY, PAYLOADS
-from read_pages import Read, faults, takes_it_for_text
+from read_pages import Read, faults, not_as_text
 
 from bayesplate.cli import main
 from bayesplate.recordings.contract import LabelChance, PickedRow, PickReport
@@ -43,33 +43,27 @@ def figure_faults(folder: Path) -> list[str]:
     return found
 
 
-@pytest.fixture(scope="module")
-def picked(tmp_path_factory):
-    """Recordings between as many places as names, picked by the command line; the names, and what it left and said."""
-    folder = tmp_path_factory.mktemp("bench")
+def test_names_of_recordings_stay_texts(tmp_path):
+    """On the page, in its figures and on the terminal; of the fragment they are a comment in one line.
+
+    Recordings between as many places as names, picked by the command line.
+    """
     names = [*STEERS, *(f"{one}.wav" for one in PAYLOADS if "$" in one and "/" not in one)]
     arguments = []
     for i, name in enumerate(names):
         force, heard = hits(np.random.default_rng(2 + i), [0.05], (0.02, 0.02))
-        arguments.append(str(write_wav(folder / name, 4000.0, force, heard)))
+        arguments.append(str(write_wav(tmp_path / name, 4000.0, force, heard)))
     for i in range(len(names)):
         arguments += ["--hammer", f"{20 + 10 * i},20"]
-    out = folder / "o\x1b[2J\x07\u202eut"
+    out = tmp_path / "o\x1b[2J\x07\u202eut"
     result = CliRunner().invoke(main, ["pick", *arguments, "--highest", "200", "--out", str(out)])
     assert result.exit_code == 0, result.output
-    return names, out, result.stdout + result.stderr
-
-
-def test_names_of_recordings_stay_texts(picked):
-    """On the page, in its figures and on the terminal; of the fragment they are a comment in one line."""
-    _, out, printed = picked
-    page = Read((out / "recordings.html").read_text(encoding="utf-8"))
     fragment = (out / "setup.toml").read_text(encoding="utf-8")
 
-    assert faults(page) == []
+    assert faults(Read((out / "recordings.html").read_text(encoding="utf-8"))) == []
     assert figure_faults(out) == []
     assert len(list((out / "figures").glob("*.svg"))) == 3
-    assert steering(printed) == steering(fragment) == ""
+    assert steering(result.stdout + result.stderr) == steering(fragment) == ""
     assert "owned" in fragment.splitlines()[0]
     assert set(tomllib.loads(fragment)) == {"setup"}
     assert set(tomllib.loads(fragment)["setup"]) <= SETUP_KEYS
@@ -112,7 +106,7 @@ def test_a_text_stays_a_text_on_the_page_of_recordings(tmp_path, monkeypatch):
     (tmp_path / "figures").mkdir()
     home.write_recordings_page(tmp_path, report, SimpleNamespace(paths=(), spectra=None))
 
-    assert takes_it_for_text((tmp_path / "recordings.html").read_text(encoding="utf-8"), payload, 9)
+    assert not_as_text((tmp_path / "recordings.html").read_text(encoding="utf-8"), payload, 9) == []
     assert figure_faults(tmp_path) == []
 
 
