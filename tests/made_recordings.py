@@ -68,11 +68,22 @@ def hits(
     return with_noise(rng, force, 40.0, rate), with_noise(rng, heard, decibels, rate, hum)
 
 
-def accelerance(hertz: Floats, hammer: tuple[float, float]) -> NDArray[np.complex128]:
-    """Of the board between a hammer and the sensor."""
-    omega, own = 2.0 * np.pi * hertz[:, None], 2.0 * np.pi * board().hertz
-    terms = -(omega**2) * board().residues(hammer, SENSOR)
-    return np.sum(terms / (own**2 - omega**2 + 2j * board().damping * own * omega), axis=1)
+def accelerance(
+    hertz: Floats, hammer: tuple[float, float], of: Ringing | None = None, sensor: tuple[float, float] = SENSOR
+) -> NDArray[np.complex128]:
+    """Of a board between a hammer and a sensor."""
+    plate = of or board()
+    omega, own = 2.0 * np.pi * hertz[:, None], 2.0 * np.pi * plate.hertz
+    terms = -(omega**2) * plate.residues(hammer, sensor)
+    return np.sum(terms / (own**2 - omega**2 + 2j * plate.damping * own * omega), axis=1)
+
+
+def with_complex_noise(
+    rng: np.random.Generator, values: NDArray[np.complex128], share: float
+) -> NDArray[np.complex128]:
+    """A response with noise of a share of its greatest value in either part."""
+    noise = share * np.abs(values).max() * rng.standard_normal((2, values.size))
+    return values + noise[0] + 1j * noise[1]
 
 
 def wav_bytes(format_tag: int, channels: int, rate: int, align: int, bits: int, data: bytes, claimed: int) -> bytes:

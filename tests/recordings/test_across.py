@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import ritz
 from generator.ringing import Blow, Ringing, recorded, ringing, with_noise
-from made_recordings import likely_below, truth_below
+from made_recordings import accelerance, likely_below, truth_below, with_complex_noise
 
 from bayesplate.errors import InputError
 from bayesplate.recordings.agreement import agreeing
@@ -126,26 +126,17 @@ def test_a_recording_of_another_board_is_named_and_left_out_where_most_agree():
         picked(files[0], other)
 
 
-def responses(rng, boards, places) -> list[FrequencyResponse]:
-    """Accelerances of boards, each at its place, with noise."""
-    hertz = np.arange(0.0, 500.0, 0.4)
-    omega = 2.0 * np.pi * hertz[:, None]
-    found = []
-    for number, (board, place) in enumerate(zip(boards, places, strict=True)):
-        own = 2.0 * np.pi * board.hertz
-        terms = -(omega**2) * board.residues(place, SENSOR) / (own**2 - omega**2 + 2j * board.damping * own * omega)
-        values = terms.sum(axis=1)
-        noise = rng.standard_normal((2, hertz.size)) * 2e-4 * np.abs(values).max()
-        found.append(FrequencyResponse(f"{number}.csv", hertz, values + noise[0] + 1j * noise[1]))
-    return found
-
-
 def test_responses_of_a_roving_sensor_give_each_mode_once():
     """A sensor of a gram, of 119, lowers each mode otherwise at each place."""
     rng = np.random.default_rng(17)
     places = ((0.02, 0.012), (0.43, 0.18), (0.23, 0.02))
     boards = [made(mass=1e-3, at=place) for place in places]
-    found = pick_modes(take([responses(rng, boards, places)], HIGHEST).spectra, 20.0, HIGHEST)
+    hertz = np.arange(0.0, 500.0, 0.4)
+    responses = []
+    for board, place in zip(boards, places, strict=True):
+        values = with_complex_noise(rng, accelerance(hertz, place, board, SENSOR), 2e-4)
+        responses.append(FrequencyResponse(f"{place}.csv", hertz, values))
+    found = pick_modes(take([responses], HIGHEST).spectra, 20.0, HIGHEST)
 
     each = np.array([board.damped for board in boards])[:, : TRUTH.size]
     likely = likely_below(found, SURE)

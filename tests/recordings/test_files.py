@@ -4,7 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made_recordings import SENSOR, accelerance, board, hits, only, refusal, uff, wav_bytes, write_table, write_wav
+from made_recordings import (
+    SENSOR,
+    accelerance,
+    board,
+    hits,
+    only,
+    refusal,
+    uff,
+    wav_bytes,
+    with_complex_noise,
+    write_table,
+    write_wav,
+)
 from scipy.io import wavfile
 
 from bayesplate.recordings.reading import read_recordings
@@ -94,9 +106,8 @@ def test_a_response_follows_its_force_whatever_its_motion_and_polarity_or_is_ref
         path = write_table(tmp_path / f"{name}.csv", f_hz=HERTZ, re=values.real, im=values.imag)
         said = f"{name}.csv: wanted a response with its phase, got one that answers before"
         assert said in refusal(take, [[only(path)]], 400.0)
-    noise = 3e-3 * np.random.default_rng(1).standard_normal((2, HERTZ.size)) * np.abs(ACCELERANCE).max()
     for motion in (-1.0, 1j):
-        values = (motion * ACCELERANCE + noise[0] + 1j * noise[1])[40:]
+        values = with_complex_noise(np.random.default_rng(1), motion * ACCELERANCE, 3e-3)[40:]
         path = write_table(tmp_path / "a.csv", f_hz=HERTZ[40:], re=values.real, im=values.imag)
         assert take([[only(path)]], 400.0).remarks == (), motion
 

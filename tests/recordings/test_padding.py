@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
-from made_recordings import accelerance, hits
+from made_recordings import accelerance, hits, with_complex_noise
 
 from bayesplate.recordings.padding import common_padding, padding_of
 from bayesplate.recordings.picking import pick_modes
@@ -37,8 +39,7 @@ def test_a_padded_record_is_told_from_a_long_one():
 def test_what_one_response_of_several_knows_is_not_left_out():
     padded, long = response(2), response(1)
     long = FrequencyResponse("long", padded.frequency, np.interp(padded.frequency, long.frequency, long.values))
-    noise = np.random.default_rng(1).standard_normal((2, long.values.size)) * np.abs(long.values).max() * 1e-3
-    long = FrequencyResponse("long", padded.frequency, long.values + noise[0] + 1j * noise[1])
+    long = replace(long, values=with_complex_noise(np.random.default_rng(1), long.values, 1e-3))
 
     assert common_padding([padded]) == 2
     assert common_padding([padded, long]) == 1

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_recordings import SENSOR, accelerance, board, hits, likely_below, truth_below
+from made_recordings import SENSOR, accelerance, board, hits, likely_below, truth_below, with_complex_noise
 from scipy.signal import fftconvolve
 
 from bayesplate.recordings.picking import Picked, pick_modes
@@ -99,9 +99,7 @@ def test_a_frequency_response_is_picked_as_it_is():
     """A modal sum with noise: no time signal was ever there."""
     rng = np.random.default_rng(4)
     hertz = np.arange(0.0, 520.0, 0.5)
-    values = accelerance(hertz, HAMMERS[0])
-    noise = 1e-3 * np.abs(values).max() * rng.standard_normal((2, hertz.size))
-    response = FrequencyResponse("frf", hertz, values + noise[0] + 1j * noise[1])
+    response = FrequencyResponse("frf", hertz, with_complex_noise(rng, accelerance(hertz, HAMMERS[0]), 1e-3))
     found = pick_modes(response_spectra([response], HIGHEST), LOWEST, HIGHEST).likely
 
     assert len(found) >= 5
