@@ -74,8 +74,8 @@ def test_the_row_is_the_one_that_is_shown(example, computed):
         assert list(map(float, one[1::2])) == pytest.approx(list(map(float, other[1::2])), abs=0.101)
 
 
-def test_the_readme_begins_with_measured_boards(example):
-    """One row a board, those of the page; steel in water and the half-tops that were set aside in a sentence each."""
+def test_the_readme_says_what_the_page_of_measured_boards_shows(example):
+    """One row a board; steel in water, the half-tops that were set aside, and where the search claims in a sentence."""
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     inside = readme.partition("<!-- measured -->")[2].partition("<!-- /measured -->")[0]
     assert inside.strip() == example.markdown(example.SHORT_COLUMNS, example.shortest(tables_of(SHOWN)[0])).strip()
@@ -85,16 +85,11 @@ def test_the_readme_begins_with_measured_boards(example):
     before, after = re.search(r"fluid_loading in water: (\S+) → (\S+)", steel[11]).groups()
     assert f"its frequencies in water are missed by {before} cents without the water and by {after} with it" in words
     page = (SHOWN.parent / "spruce-half-tops-set-aside.md").read_text(encoding="utf-8")
-    found = re.search(
-        r"in sum by (\S+) ± (\S+) in log score; error of the left-out boards (\S+) cents before, (\S+)", page
-    )
-    gain, error, first, last = found.groups()
+    told = r"in sum by (\S+) ± (\S+) in log score; error of the left-out boards (\S+) cents before, (\S+)"
+    gain, error, first, last = re.search(told, page).groups()
     assert page.count("The boards share transverse shear: 4 of 4 boards") == 1
     assert f"by {gain} ± {error} in log score, {first} to {last.rstrip('.')} cents" in words
 
-
-def test_the_readme_says_where_the_search_claims():
-    words = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
     (claimed,) = [row for row in shown_rows() if row[3] == "error reduced" and not row[0].startswith("paper-")]
     assert claimed[:3] == ("spruce-free-1R", "indistinguishable group", "transverse_shear, grain_angle")
     before, after = claimed[6].split(" → ")

@@ -43,19 +43,14 @@ def picture():
     return drawn()
 
 
-def test_lines_join_peaks_to_the_modes_that_they_may_be(picture):
+def test_lines_join_peaks_to_the_modes_that_they_may_be_and_what_is_none_looks_otherwise(picture):
     (panel,) = picture.figure.axes
     joined = {(line.get_xdata()[0], line.get_xdata()[1]): line for line in panel.lines if len(line.get_xdata()) == 2}
     ends = [pair for pair, line in joined.items() if list(line.get_ydata()) == [1.0, 0.0]]
-
     assert ends == [(100.0, 101.0), (100.0, 102.0), (260.0, 258.0)]
     assert joined[100.0, 101.0].get_linewidth() > joined[100.0, 102.0].get_linewidth()
 
-
-def test_a_peak_that_is_no_mode_and_a_mode_without_a_peak_look_otherwise(picture):
-    (panel,) = picture.figure.axes
     dots = {float(line.get_xdata()[0]): line for line in panel.lines if line.get_marker() in ("v", "o")}
-
     assert dots[180.0].get_color() == ORANGE
     assert dots[100.0].get_color() == dots[260.0].get_color() == "black"
     assert dots[101.0].get_markerfacecolor() == dots[258.0].get_markerfacecolor() == BLUE

@@ -45,6 +45,7 @@ def faults_of(text: str) -> list[str]:
 
 
 def test_pages_say_only_what_is():
+    assert len(PAGES) > 10
     found = {page.relative_to(ROOT).as_posix(): faults_of(page.read_text(encoding="utf-8")) for page in PAGES}
     assert {page: faults for page, faults in found.items() if faults} == {}
 
@@ -61,6 +62,7 @@ def test_what_is_not_so_is_found():
 
 
 def test_a_card_of_the_documentation_loads_unless_its_name_says_otherwise():
+    assert len(CARDS) > 3
     for card in CARDS:
         if card.stem.endswith("with-faults"):
             with pytest.raises(InputError, match="did you mean thickness_mm") as refused:
@@ -72,18 +74,13 @@ def test_a_card_of_the_documentation_loads_unless_its_name_says_otherwise():
 
 def test_an_example_can_be_shown_in_the_gallery_and_is_tested():
     """A title in one line, how to run it, and a test of its own."""
+    assert {path.stem for path in EXAMPLES} >= {"posterior_analysis", "percentile_comparison", "uncertainty_report"}
     for example in EXAMPLES:
         docstring = ast.get_docstring(ast.parse(example.read_text(encoding="utf-8"))) or ""
 
         assert docstring.splitlines()[1] == "", example.name
         assert f"\n\n    python examples/{example.name}" in docstring
         assert (ROOT / "tests" / "examples" / f"test_{example.name}").exists(), example.name
-
-
-def test_there_is_something_to_read():
-    assert len(PAGES) > 10
-    assert len(CARDS) > 3
-    assert {path.stem for path in EXAMPLES} >= {"posterior_analysis", "percentile_comparison", "uncertainty_report"}
 
 
 def test_every_page_of_results_has_a_day_and_a_tree():
