@@ -65,12 +65,12 @@ def test_a_response_is_of_the_unit_and_the_kind_that_its_header_states(tmp_path)
     for unit, factor in (("", 1.0), ("rad/s", 2.0 * np.pi)):
         one = only(tmp_path / "a.uff", uff([RESPONSE | {"x": HERTZ * factor, "unit": unit}]))
         np.testing.assert_allclose(one.frequency, HERTZ, rtol=1e-5, err_msg=unit)
-    mass = RESPONSE | {"x": HERTZ[1:], "y": 1.0 / ACCELERANCE[1:], "top": 13, "under": 12}
+    mass = RESPONSE | {"x": HERTZ[1:], "y": 1.0 / ACCELERANCE[1:], "top": 13, "under": 11}
     turned = only(tmp_path / "a.uff", uff([mass]))
 
     np.testing.assert_allclose(turned.values, ACCELERANCE[1:], rtol=1e-6)
-    assert turned.motion == "acceleration"
-    assert turned.remarks == ("a.uff set 1: a force over acceleration, turned over",)
+    assert turned.motion == "velocity"
+    assert turned.remarks == ("a.uff set 1: a force over velocity, turned over",)
 
 
 def test_a_force_is_told_by_its_kind_or_its_unit(tmp_path):
