@@ -1,13 +1,9 @@
-"""One line of Hermite elements: exact for cubics, beam functions of the handbooks, even and odd functions of a half."""
+"""One line of Hermite elements: its Gauss points, beam functions of the handbooks, even and odd functions of a half."""
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 import pytest
-from deflected import unknowns
-from numpy.polynomial import Polynomial
 
 from bayesplate.plate.beams import N_BEAMS, beam_functions
 from bayesplate.plate.line import graded_nodes, line, rigid_degrees
@@ -24,29 +20,6 @@ BEAM_WAVENUMBERS = {
     ("supported", "free"): (3.9266023120, 7.0685827456),
 }
 
-# Integrals over [0, 1] of derivatives of x^2 against those of x^3, by hand.
-SQUARE_AGAINST_CUBE = {(0, 0): 1 / 6, (1, 1): 3 / 2, (2, 2): 6.0, (0, 2): 3 / 2, (2, 0): 1 / 2}
-
-
-def of_cubic(side, cubic):
-    return unknowns(side, cubic, cubic.deriv())
-
-
-def test_integrals_of_cubics_are_exact():
-    free = line(("free", "free"), 3)
-    square, cube = (of_cubic(free, Polynomial.basis(degree)) for degree in (2, 3))
-    for (i, j), expected in SQUARE_AGAINST_CUBE.items():
-        both = (free.derivatives[i] @ square) * (free.derivatives[j] @ cube)
-        assert free.weights @ both == pytest.approx(expected, rel=1e-12)
-
-
-def test_shapes_evaluate_a_cubic_exactly():
-    free = line(("free", "free"), 4, is_split=False)
-    cubic = Polynomial([1.0, -1.0, 0.0, 1.0])
-    points = np.array([0.0, 0.1, 0.33, 0.5, 0.91, 1.0])
-
-    np.testing.assert_allclose(free.shapes(points) @ of_cubic(free, cubic), cubic(points), rtol=1e-12)
-
 
 def test_points_and_weights_are_those_of_gauss_on_each_element():
     """Five points are exact to degree nine and no further; of a half line the integral is that of the whole."""
@@ -62,7 +35,7 @@ def test_points_and_weights_are_those_of_gauss_on_each_element():
 
 
 @pytest.mark.parametrize("ends", ENDS)
-def test_held_ends_take_their_of_cubic(ends):
+def test_held_ends_take_their_functions(ends):
     """A clamp holds value and slope, on a shear-flexible plate the value alone; the slope there is the shear strain."""
     whole = line(ends, 5)
     n_clamped, n_supported = ends.count("clamped"), ends.count("supported")
@@ -86,7 +59,10 @@ def test_what_is_held_may_be_less_than_the_ends_say():
 
 @pytest.mark.parametrize(("ends", "wavenumbers"), BEAM_WAVENUMBERS.items())
 def test_beam_functions_are_orthonormal_and_have_the_wavenumbers_of_the_handbooks(ends, wavenumbers):
-    """Rigid motions first, which do not bend; the relative error is about (k / 40)^4 / 2880, at most 5.2e-7 here."""
+    """Rigid motions first, which do not bend; the relative error is about (k / 40)^4 / 2880, at most 5.2e-7 here.
+
+    Rounding of the highest eigenvalue, 9.2e9, over the gap of the lowest, 500, is 4e-9: as much a shape has of others.
+    """
     beams = beam_functions(ends)
     bending = beams.integrals(2, 2)
     n_rigid = len(rigid_degrees(ends))
@@ -94,7 +70,7 @@ def test_beam_functions_are_orthonormal_and_have_the_wavenumbers_of_the_handbook
 
     assert np.all(np.abs(bending[:n_rigid]) < 1e-6)
     np.testing.assert_allclose(bending[n_rigid : n_rigid + 2] ** 0.25, wavenumbers, rtol=1e-6)
-    np.testing.assert_allclose((at_points.T * beams.side.weights) @ at_points, np.eye(N_BEAMS), atol=1e-9)
+    np.testing.assert_allclose((at_points.T * beams.side.weights) @ at_points, np.eye(N_BEAMS), atol=1e-8)
 
 
 def test_free_line_shifts_before_it_turns():
@@ -104,19 +80,6 @@ def test_free_line_shifts_before_it_turns():
 
     np.testing.assert_allclose(shift, 1.0, rtol=1e-12)
     np.testing.assert_allclose(turn, np.sqrt(12.0) * (points - 0.5), atol=1e-12)
-
-
-@pytest.mark.parametrize(("end", "parity"), [("clamped", 0), ("supported", 1), ("free", 0), ("free", 1)])
-def test_functions_of_a_half_go_on_beyond_the_middle_with_their_sign(end, parity):
-    half = line((end, end), 6)
-    points = np.linspace(0.0, 0.5, 7)
-
-    left, right = (half.shapes(at, parity).toarray() for at in (points, 1.0 - points))
-
-    kept = half.kept(parity, is_sheared=False)
-    np.testing.assert_allclose(right[:, kept], (-1.0) ** parity * left[:, kept], atol=1e-12)
-    # Both halves meet with one value and one slope, that of an even function zero and that of an odd one free.
-    assert list(kept[-2:]) == [parity == 0, parity == 1]
 
 
 @pytest.mark.parametrize(("end", "is_sheared"), [("clamped", True), ("supported", False), ("free", True)])
@@ -135,23 +98,6 @@ def test_even_and_odd_functions_of_a_half_are_all_functions_of_the_whole(end, is
     assert are_the_same(deflection, at[:, whole.kept(0, is_sheared)])
     strain = [half.shapes(points, 1 - p)[:, half.kept_strain(p)] for p in (0, 1)]
     assert are_the_same(strain, at[:, whole.kept_strain(0)])
-
-
-@pytest.mark.parametrize("order", [0, 1])
-def test_ends_have_their_own_values_and_slopes(order):
-    whole, half = (line(("free", "free"), 4, is_split=is_split) for is_split in (False, True))
-    cubic = Polynomial([1.0, 2.0, 3.0, 4.0])
-
-    for at in product((False, True), repeat=2):
-        rows, weights = whole.at_ends(at, order)
-        expected = [
-            cubic.deriv(order)(end) if order else cubic(end) for end, asked in zip((0.0, 1.0), at, strict=True) if asked
-        ]
-        np.testing.assert_allclose(rows @ of_cubic(whole, cubic), expected)
-        np.testing.assert_array_equal(weights, np.ones(sum(at)))
-    rows, weights = half.at_ends((True, True), order)
-    assert rows @ of_cubic(half, cubic) == pytest.approx(2.0 if order else 1.0)
-    np.testing.assert_array_equal(weights, [2.0])
 
 
 def test_unlike_ends_or_an_element_across_the_middle_leave_a_whole_line():
