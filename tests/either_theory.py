@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import ritz
 
 from bayesplate.plate.mesh import ELEMENTS_PER_SIDE, mesh
 from bayesplate.plate.shear import SHEAR_ELEMENTS_PER_SIDE, shear_flexible_plate
@@ -12,6 +13,15 @@ from bayesplate.plate.solve import solve
 from bayesplate.plate.terms import Weights
 from bayesplate.plate.thin import thin_plate
 
+SQUARE = ritz.Plate.isotropic(0.3, ritz.ALL_FREE)
+SUPPORTS = {
+    "clamped": ritz.ALL_CLAMPED,
+    "supported": ritz.ALL_SUPPORTED,
+    "free": ritz.ALL_FREE,
+    "cantilever": ritz.CANTILEVER,
+    "mixed": {"x0": "clamped", "x1": "free", "y0": "supported", "y1": "free"},
+    "hinged at one edge": {"x0": "supported", "x1": "free", "y0": "free", "y1": "free"},
+}
 G_SPRUCE = (0.62e9, 0.023e9)
 """G_xz and G_yz, Pa; a plate without shear moduli is thin."""
 

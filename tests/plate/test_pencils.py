@@ -29,10 +29,7 @@ def exact(stiffness, mass):
 
 
 def a_class(stiffness, mass, n_kept):
-    """A class of which each draw is one term of stiffness and one of mass, and the weights that tell them apart.
-
-    Terms are views, so that a draw may be spoilt.
-    """
+    """A class of which each draw is one term of stiffness and one of mass, and the weights that tell them apart."""
     n, r, _ = stiffness.shape
     nothing = np.zeros((r, 0))
     own = ReducedClass(

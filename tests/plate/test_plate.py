@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 import pytest
 from deflected import power
@@ -89,39 +87,18 @@ def test_classes_together_have_the_spectrum_of_the_two_dimensional_element(two_d
     assert [np.sum(one < 1e-4) for one in found] == [own.n_rigid for own in plate.classes]
 
 
-@pytest.mark.parametrize(
-    ("ends_x", "ends_y", "parities"),
-    [
-        (FREE, ("clamped", "clamped"), [(0, 0), (0, 1), (1, 0), (1, 1)]),
-        (("clamped", "free"), FREE, [(0, 0), (0, 1)]),
-        (("clamped", "free"), ("supported", "free"), [(0, 0)]),
-    ],
-)
-def test_classes_are_those_of_like_opposite_edges(ends_x, ends_y, parities):
-    plate = thin_plate(ends_x, ends_y, 4, 6)
-
-    assert [own.parity for own in plate.classes] == parities
-    for beams in product(range(3), range(3)):
-        assert plate.symmetry_class(plate.parity(beams)).parity in parities
-
-
 @pytest.mark.parametrize("parity", [Parity(0, 1), Parity(1, 0)])
 def test_deflections_have_the_parity_of_their_class(parity):
+    """On a lattice, and at places across that differ along the plate."""
     own = thin_plate(FREE, ("clamped", "clamped"), 4, 6).symmetry_class(parity)
     deflections = own.deflections(np.random.default_rng(3).standard_normal((own.n_dof, 2)))
     x, y = np.array([0.1, 0.4]), np.array([0.2, 0.3, 0.45])
-    here = deflections.on(x, y)
+    here, mirrored = deflections.on(x, y), deflections.on(x, 1 - y)
 
     np.testing.assert_allclose(deflections.on(1 - x, y), (-1.0) ** parity.x * here, atol=1e-12)
-    np.testing.assert_allclose(deflections.on(x, 1 - y), (-1.0) ** parity.y * here, atol=1e-12)
-    np.testing.assert_allclose(
-        deflections.across(x, np.stack([y, 1 - y])), _each_its_own(deflections, x, y), atol=1e-12
-    )
-
-
-def _each_its_own(deflections, x, y):
-    """On y at the first place along x, on the mirrored ones at the second."""
-    return np.stack([deflections.on(x[:1], y)[:, 0], deflections.on(x[1:], 1 - y)[:, 0]], axis=1)
+    np.testing.assert_allclose(mirrored, (-1.0) ** parity.y * here, atol=1e-12)
+    across = deflections.across(x, np.stack([y, 1 - y]))
+    np.testing.assert_allclose(across, np.stack([here[:, 0], mirrored[:, 1]], axis=1), atol=1e-12)
 
 
 @pytest.mark.parametrize("parity", [Parity(0, 0), Parity(1, 0)])
@@ -164,12 +141,12 @@ FURTHER = (
 HEAVY = (AtPlaces(((0.3, PLACE, PLACE), (1.0, Amount(beside=0), Amount(beside=0)), (1.0, BESIDE, BESIDE))),)
 
 
-def varied(kinematics, is_split, ends_x=("clamped", "clamped"), ends_y=FREE, outline=None):
+def varied(kinematics, is_split):
     """A plate with two fields of each group and every kind of further term."""
     is_sheared = kinematics is SHEAR_FLEXIBLE
-    x, y = (line(ends, 4, is_sheared, is_split) for ends in (ends_x, ends_y))
+    x, y = (line(ends, 4, is_sheared, is_split) for ends in (("clamped", "clamped"), FREE))
     fields = {group: [None, bump] for group in ("along", "bending", "shear", "mass", "rotary")}
-    return plate_of(kinematics, x, y, Fabric(fields, outline, is_turned=True)).with_terms(FURTHER, HEAVY)
+    return plate_of(kinematics, x, y, Fabric(fields, is_turned=True)).with_terms(FURTHER, HEAVY)
 
 
 def some_weights(plate, seed=2):
@@ -190,29 +167,22 @@ def test_the_pencil_of_a_class_is_its_terms_on_every_unknown(kinematics, is_spli
             np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
 
 
-def test_energies_are_the_diagonals_of_the_terms():
-    (own,) = varied(SHEAR_FLEXIBLE, is_split=False).classes
-    plate = own.plate.with_terms([OnDeflections(mean_square)], [OnDeflections(mean_square)])
-    (own,) = plate.classes
-    vectors = np.random.default_rng(6).standard_normal((own.n_dof, 3))
-
-    for found, terms in zip(own.energies(vectors), (own.project_stiffness, own.project_masses), strict=True):
-        diagonals = np.diagonal(terms(vectors), axis1=1, axis2=2)
-        np.testing.assert_allclose(found, diagonals.T, rtol=1e-9, atol=1e-12 * np.abs(diagonals).max())
-
-
-def test_pencils_on_a_span_have_the_terms_that_exist_on_deflections_too():
-    plate = varied(SHEAR_FLEXIBLE, is_split=True)
-    plate = plate.with_terms([OnDeflections(mean_square)], [OnDeflections(mean_square)])
+def test_energies_and_pencils_on_given_deflections_are_those_of_the_terms():
+    """Terms that exist on deflections only among them: energies are the diagonals, a pencil the sum for each draw."""
+    mean = [OnDeflections(mean_square)]
+    plate = varied(SHEAR_FLEXIBLE, is_split=True).with_terms(mean, mean)
     own = plate.classes[0]
     draws = [some_weights(plate, seed) for seed in range(3)]
     vectors = np.random.default_rng(7).standard_normal((own.n_dof, 4))
 
-    found = own.on_span([own.pencil(plate.elements(one)) for one in draws], together(draws), vectors)
+    spanned = own.on_span([own.pencil(plate.elements(one)) for one in draws], together(draws), vectors)
+    energies = own.energies(vectors)
 
-    for side in (0, 1):
+    for side, terms in enumerate((own.project_stiffness(vectors), own.project_masses(vectors))):
+        diagonals = np.diagonal(terms, axis1=1, axis2=2)
+        np.testing.assert_allclose(energies[side], diagonals.T, rtol=1e-9, atol=1e-12 * np.abs(diagonals).max())
         expected = np.stack([vectors.T @ whole(own, one)[side] @ vectors for one in draws])
-        np.testing.assert_allclose(found[side], expected, atol=1e-11 * np.abs(expected).max())
+        np.testing.assert_allclose(spanned[side], expected, atol=1e-11 * np.abs(expected).max())
 
 
 def test_what_the_masses_give_to_coordinates_beside_the_plate():

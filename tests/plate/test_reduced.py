@@ -11,8 +11,8 @@ import pytest
 import ritz
 from bars import meets
 from dense_pencils import together
+from either_theory import cents
 
-from bayesplate.frequencies.laws import ExactLaw, LinearLaw
 from bayesplate.plate import reduction
 from bayesplate.plate.mesh import mesh
 from bayesplate.plate.naming import find
@@ -38,21 +38,16 @@ def weights_at(board, point):
     return Weights(moved.unit_weights, np.ones(1))
 
 
-def cents(eigenvalues, expected):
-    """600 log2: eigenvalues are squares of frequencies."""
-    return 600.0 * np.log2(eigenvalues / expected)
-
-
 def somewhere(n, seed):
     return np.random.default_rng(seed).uniform(-1.0, 1.0, (n, 3))
 
 
 @cache
 def named(name):
-    """A plate, and its modes found by name at the centre."""
+    """A plate, and its modes found by name at the centre; laws and full solves are of the same coarse mesh."""
     board, names = WANTED[name]
     centre = weights_at(board, np.zeros(3))
-    plate = thin_plate(*board.ends, *mesh(centre))
+    plate = thin_plate(*board.ends, *mesh(centre, 12))
     return plate, find(plate, centre, names)
 
 
@@ -101,16 +96,14 @@ def test_frequencies_hold_where_nothing_was_trained(name):
 
 def test_a_basis_is_no_larger_than_its_tolerance_asks():
     """Another tolerance is another basis: the widest has fewer vectors than the narrowest, which it misses."""
-    sizes, errors = [], []
-    for tolerance in (1e-4, 0.1, 1.0, 10.0):
-        reduced = prepared("free", tolerance)
-        assert reduced.worst_cents <= tolerance
-        sizes.append(sum(own.stiffness.shape[-1] for own in reduced.classes))
-        errors.append(reduced.worst_cents)
+    tolerances = (1e-4, 0.1, 10.0)
+    made = [prepared("cantilever", tolerance) for tolerance in tolerances]
+    sizes = [sum(own.stiffness.shape[-1] for own in reduced.classes) for reduced in made]
 
+    assert all(reduced.worst_cents <= tolerance for reduced, tolerance in zip(made, tolerances, strict=True))
     assert sizes == sorted(sizes, reverse=True)
     assert sizes[0] > sizes[-1]
-    assert errors[-1] > 1e-4
+    assert made[-1].worst_cents > 1e-4
 
 
 def test_reported_error_is_the_true_one_where_the_basis_is_poor():
@@ -180,24 +173,13 @@ def test_modes_of_draws_are_named_as_those_of_full_solves():
 
 def test_a_heavier_plate_has_the_same_names_as_surely():
     """Water makes a plate ten times as heavy; a shape fits its name whatever the mass it is normalised in."""
-    name = "free"
-    draws, _ = trial(name)
-    reduced = prepared(name)
+    draws, _ = trial("free")
+    reduced = prepared("free")
 
     ranks, heavier = (reduced.ranks(Weights(draws.stiffness, n * draws.mass), 0.75) for n in (1.0, 10.0))
 
     assert all(np.array_equal(heavier[beams], own) for beams, own in ranks.items())
     assert sum(int(np.sum(own < 8)) for own in ranks.values()) > 0
-
-
-def test_eigenvalues_are_homogeneous_of_degree_one_in_the_stiffness():
-    name = "free"
-    draws, _ = trial(name)
-    reduced = prepared(name)
-
-    scaled = reduced.eigenvalues(Weights(2.7 * draws.stiffness, 1.3 * draws.mass))
-
-    np.testing.assert_allclose(scaled, reduced.eigenvalues(draws) * 2.7 / 1.3, rtol=1e-10)
 
 
 @pytest.mark.parametrize("n_draws", [0, 513])
@@ -213,26 +195,10 @@ def test_many_draws_are_the_draws_one_by_one(n_draws):
     np.testing.assert_allclose(found, one_by_one[which], rtol=1e-11)
 
 
-def test_where_there_is_no_plate_there_is_no_number():
-    name = "free"
-    draws, _ = trial(name)
-    reduced = prepared(name)
-    spoilt = Weights(draws.stiffness.copy(), draws.mass.copy())
-    spoilt.stiffness[1] *= -1.0
-    spoilt.mass[2] *= -1.0
-
-    found = reduced.eigenvalues(spoilt)
-
-    assert np.isnan(found[1:3]).all()
-    rest = np.delete(np.arange(16), [1, 2])
-    np.testing.assert_allclose(found[rest], reduced.eigenvalues(draws)[rest], rtol=1e-11)
-
-
 def test_energies_of_a_draw_sum_to_its_eigenvalue():
     """The sum rule on few vectors: of each wanted mode, in the caller's order."""
-    name = "free"
-    draws, _ = trial(name)
-    reduced = prepared(name, 1.0)
+    draws, _ = trial("free")
+    reduced = prepared("free")
 
     for i in range(3):
         one = together([draws.at(i)])
@@ -241,30 +207,11 @@ def test_energies_of_a_draw_sum_to_its_eigenvalue():
         np.testing.assert_allclose(mass @ one.mass[0], 1.0, rtol=1e-8)
 
 
-@pytest.mark.parametrize("term", range(4))
-def test_linear_law_is_the_tangent_of_the_exact_law(term):
-    """By a central difference of the exact law at the centre."""
-    board, names = WANTED["cantilever"]
-    _, found = named("cantilever")
-    reduced = prepared("cantilever")
-    linear = LinearLaw(np.stack([found[n].stiffness for n in names]), np.stack([found[n].mass for n in names]))
-    centre = weights_at(board, np.zeros(3))
-
-    def slope(law, step=1e-3):
-        moved = [centre.stiffness * (1.0 + sign * step * np.eye(4)[term]) for sign in (1.0, -1.0)]
-        above, below = law.squared(Weights(np.stack(moved), np.ones((2, 1))))
-        return (above - below) / (2.0 * step)
-
-    # As shares of the mode's energy; the tolerance is the step's square.
-    eigenvalues = np.array([found[n].eigenvalue for n in names])
-    np.testing.assert_allclose(slope(ExactLaw(reduced)) / eigenvalues, slope(linear) / eigenvalues, atol=2e-5)
-
-
 def test_a_shear_flexible_plate_is_held_within_its_tolerance_too():
     """Over three masses and six stiffnesses, shear moduli over a factor of two; rigid motions of the free one."""
     board = ritz.FREE_SPRUCE
     mass = np.array([1.0, 1e-4, 1e-3])
-    plate = shear_flexible_plate(*board.ends, 10, 10)
+    plate = shear_flexible_plate(*board.ends, 8, 8)
     rng = np.random.default_rng(11)
 
     def at(shares):

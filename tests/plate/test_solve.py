@@ -1,166 +1,25 @@
-"""Eigenvalues and shapes of plates: handbooks, exact formulas, Ritz, convergence, energies and symmetries."""
+"""Modes of a plate by class: all of them, their shapes, energies and symmetries, and what rounding may do to them."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
-from itertools import product
 
 import numpy as np
 import pytest
 import ritz
 from bars import meets
 from dense_pencils import dense, spectrum, whole
-from either_theory import G_SPRUCE, assembled, cents, solved, weights_of, with_thickness
+from either_theory import G_SPRUCE, SQUARE, SUPPORTS, assembled, solved, weights_of
 from scipy.linalg import eig, eigh
 
 from bayesplate.plate.line import line
-from bayesplate.plate.mesh import ELEMENTS_PER_SIDE, mesh
 from bayesplate.plate.plate import plate_of
 from bayesplate.plate.shear import SHEAR_FLEXIBLE, shear_flexible_plate
 from bayesplate.plate.solve import solve, solve_classes, solve_up_to
 from bayesplate.plate.terms import Amount, AtPlaces, OnDeflections, Weights
 from bayesplate.plate.thin import THIN, thin_plate
 
-SQUARE = ritz.Plate.isotropic(0.3, ritz.ALL_FREE)
-THICK = ritz.Plate.from_moduli(10e9, 10e9, 10e9 / 2.6, 0.3, rho=450.0, h=0.1, L_x=1.0, L_y=1.0, edges=ritz.ALL_CLAMPED)
-G_ISOTROPIC = (10e9 / 2.6, 10e9 / 2.6)
-SUPPORTS = {
-    "clamped": ritz.ALL_CLAMPED,
-    "supported": ritz.ALL_SUPPORTED,
-    "free": ritz.ALL_FREE,
-    "cantilever": ritz.CANTILEVER,
-    "mixed": {"x0": "clamped", "x1": "free", "y0": "supported", "y1": "free"},
-}
-BOARDS = {"square": SQUARE, "finnish": ritz.FINNISH, "fiemme": ritz.FIEMME, "guitar": ritz.FREE_SPRUCE}
-
-# omega L^2 sqrt(rho h / D) of the lowest mode of an isotropic square plate, nu = 0.3.
-HANDBOOK = {"clamped": 35.9852, "free": 13.4682, "cantilever": 3.4711}
-
 THEORIES = pytest.mark.parametrize("shear_moduli", [None, G_SPRUCE], ids=["thin", "shear-flexible"])
-
-
-def hertz(board, n_modes, shape=None):
-    return np.sqrt(solved(board, n_modes, shape=shape).eigenvalues) / (2.0 * np.pi)
-
-
-@cache
-def reference(board_name, support, n_modes=12):
-    """Frequencies by Ritz; between 20 and 26 polynomials they move by 0.0016 % at most (square cantilever)."""
-    return ritz.frequencies(replace(BOARDS[board_name], edges=SUPPORTS[support]), n_modes, n=26)
-
-
-@pytest.mark.parametrize(("support", "omega"), HANDBOOK.items())
-def test_lowest_mode_of_a_square_plate_is_that_of_the_handbooks(support, omega):
-    board = replace(SQUARE, edges=SUPPORTS[support])
-
-    assert np.sqrt(solved(board, 1).eigenvalues[0]) == pytest.approx(omega, rel=1e-4)
-
-
-def navier(board, shear_moduli, n_modes):
-    """omega^2 of the supported plate, exact: deflection and the two turnings as sines and cosines."""
-    twist, mixed = board.D_s / 4, board.nu_xy * board.D_y + board.D_s / 4
-    areal = board.rho * board.h
-    lowest = []
-    for m, n in product(range(1, 12), repeat=2):
-        a, b = m * np.pi / board.L_x, n * np.pi / board.L_y
-        if shear_moduli is None:
-            energy = board.D_x * a**4 + board.D_y * b**4 + 2 * (mixed + twist) * a**2 * b**2
-            lowest.append(energy / areal)
-            continue
-        S_x, S_y = (5 / 6 * board.h * G for G in shear_moduli)
-        stiffness = [
-            [S_x * a**2 + S_y * b**2, -S_x * a, -S_y * b],
-            [-S_x * a, board.D_x * a**2 + twist * b**2 + S_x, mixed * a * b],
-            [-S_y * b, mixed * a * b, board.D_y * b**2 + twist * a**2 + S_y],
-        ]
-        mass = areal * np.diag([1.0, board.h**2 / 12, board.h**2 / 12])
-        lowest.append(eigh(stiffness, mass, eigvals_only=True)[0])
-    return np.sort(lowest)[:n_modes]
-
-
-SUPPORTED = {
-    "spruce": (ritz.FINNISH, None, None, "closed form, supported all round, 12 modes", 0.346),
-    "isotropic, sheared, very thin": (
-        with_thickness(THICK, 1 / 2000), G_ISOTROPIC, (20, 18), "closed form with transverse shear, 6 modes", 0.1,
-    ),
-    "spruce, sheared, a tenth thick": (
-        with_thickness(ritz.FREE_SPRUCE, ritz.FREE_SPRUCE.L_y / 10), G_SPRUCE, (20, 18),
-        "closed form with transverse shear, 6 modes", 0.1,
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(("board", "shear_moduli", "shape", "words", "bar"), SUPPORTED.values(), ids=SUPPORTED)
-def test_supported_plate_has_the_exact_spectrum(board, shear_moduli, shape, words, bar):
-    board = replace(board, edges=ritz.ALL_SUPPORTED)
-    n_modes = 12 if shear_moduli is None else 6
-
-    off = np.abs(cents(solved(board, n_modes, shear_moduli, shape).eigenvalues, navier(board, shear_moduli, n_modes)))
-
-    # The first mode of the thin plate within 0.01 %.
-    assert off[0] < 0.173
-    meets("V10", words, off.max(), at_most=bar, unit="cents")
-
-
-def test_the_exact_sheared_plate_is_not_the_thin_one():
-    """The closed form above would not notice a plate without shear if the plate were thin: these are 50 cents apart."""
-    assert cents(*(navier(THICK, shear_moduli, 6) for shear_moduli in (G_ISOTROPIC, None))).max() < -50.0
-
-
-@pytest.mark.parametrize(
-    ("board_name", "support"),
-    [("finnish", "cantilever"), ("fiemme", "clamped"), ("guitar", "free"), ("square", "mixed"), ("finnish", "mixed")],
-)
-def test_twelve_modes_agree_with_ritz_on_the_production_mesh(board_name, support):
-    """First mode within 0.01 %, twelve within 0.02 % (a third of a cent)."""
-    board = replace(BOARDS[board_name], edges=SUPPORTS[support])
-
-    off = 2.0 * np.abs(cents(hertz(board, 12), reference(board_name, support)))
-
-    assert off[0] < 0.173
-    meets("V10", "Ritz in Legendre polynomials, 12 modes", off.max(), at_most=0.346, unit="cents")
-
-
-@pytest.mark.parametrize("ratio", [1e-4, 0.3, 1e5])
-def test_mesh_follows_the_wavelengths_and_keeps_its_size(ratio):
-    n_x, n_y = mesh(Weights(np.array([1.0, ratio, 0.1, 0.5]), np.ones(1)))
-
-    assert n_x % 2 == n_y % 2 == 0
-    # Rounding to even numbers moves each by at most 1 of at least 12.
-    assert n_x * n_y == pytest.approx(ELEMENTS_PER_SIDE**2, rel=0.1)
-    assert n_x / n_y == pytest.approx(np.clip(ratio**0.25, 1 / 3, 3), rel=0.1)
-
-
-@pytest.mark.parametrize(
-    ("board_name", "support", "n_modes", "lowest", "highest"),
-    [
-        ("square", "supported", 6, 3.7, 4.3),
-        ("fiemme", "clamped", 6, 3.7, 4.3),
-        ("finnish", "cantilever", 1, 1.7, 2.5),
-    ],
-)
-def test_observed_order_of_convergence(board_name, support, n_modes, lowest, highest):
-    """Order four for smooth modes; about two where a clamped edge ends at a free one and the corner is singular."""
-    board = replace(BOARDS[board_name], edges=SUPPORTS[support])
-    sizes = np.array([6, 8, 12, 16])
-    errors = np.array([hertz(board, n_modes, (n, n)) / reference(board_name, support)[:n_modes] - 1 for n in sizes])
-
-    orders = -np.polyfit(np.log(sizes), np.log(errors), 1)[0]
-
-    assert np.all(errors > 0), "a Ritz value must lie above"
-    words = "order of convergence, smooth modes" if lowest > 3.0 else "order of convergence, singular corners"
-    meets("V10", words, orders.min(), at_least=lowest, at_most=highest)
-    meets("V10", words, orders.max(), at_least=lowest, at_most=highest)
-
-
-def test_convergence_of_a_shear_flexible_plate_is_of_fourth_order():
-    board = with_thickness(replace(THICK, edges=ritz.ALL_SUPPORTED), 0.02)
-    exact = navier(board, G_ISOTROPIC, 4)
-
-    coarse, fine = (solved(board, 4, G_ISOTROPIC, (n, n)).eigenvalues / exact - 1.0 for n in (6, 12))
-
-    assert np.log2(coarse / fine).min() > 3.7
 
 
 def test_frequency_of_a_clamped_plate_depends_on_poisson_through_the_twist_alone():
