@@ -12,14 +12,19 @@ from generator.effects import TransverseShear as GeneratorShear
 from generator.plate import EDGES, Plate
 from generator.plate import solve as solve_generator
 
-from bayesplate.board.attached import AttachedItem
+from bayesplate.board.attached import AttachedItem, DeclaredFluid
+from bayesplate.board.board import Board
 from bayesplate.board.parameter import Owner, shown_name
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.random_field import Surface
 from bayesplate.board.reading import Reading
 from bayesplate.board.setup import Setup
 from bayesplate.commands.prepare import prepare
 from bayesplate.effects import EFFECTS, Effect, declare
+from bayesplate.effects.field_components import FieldProfile
 from bayesplate.effects.transverse_shear import TransverseShear
 from bayesplate.frequencies.system import System
+from bayesplate.plate.membrane import Curvature
 from bayesplate.plate.naming import find
 from bayesplate.plate.solve import Modes, solve
 from bayesplate.posterior.posing import PosedProblem, pose
@@ -37,6 +42,27 @@ Beams = tuple[int, int]
 def setup_of(plate: Plate) -> Setup:
     """A setup with the edges of a plate."""
     return made_boards.setup_of(plate.edges, {(2, 2): 1.0}, name=SETUP)
+
+
+def board_with(
+    plate: Plate,
+    attached: Sequence[AttachedItem] = (),
+    *,
+    effects: Sequence[str] = (),
+    warp: Mapping[Curvature, Quantity] | None = None,
+    fluid: DeclaredFluid | None = None,
+    bounce: Quantity | None = None,
+    **inputs: Quantity,
+) -> Board:
+    """A board of a plate in one setup, with what a card states of it."""
+    setup = replace(setup_of(plate), attached=tuple(attached), fluid=fluid, bounce=bounce)
+    return replace(made_boards.board_of(plate, [setup], **inputs), effects=tuple(effects), warp=dict(warp or {}))
+
+
+def tapered(taper_x: float, taper_y: float) -> FieldProfile:
+    """A profile that readings leave no doubt of: tapers along x and along y."""
+    surface = Surface(((1, 0), (0, 1)), tuple(taper / np.sqrt(12.0) for taper in (taper_x, taper_y)))
+    return FieldProfile(surface, None, (), 1.0, 0.0)
 
 
 def values_of(plate: Plate, parameters: Parameters) -> dict[str, np.ndarray]:
@@ -71,14 +97,24 @@ def hertz_apart(
     generator: Sequence[NoEffect],
     n_modes: int,
     is_sheared: bool = False,
-    n: tuple[int, int] | None = None,
+    n: Sequence[int] = (),
 ) -> np.ndarray:
-    """The package's frequencies against the generator's, cents; n: polynomials of the generator along x and y."""
+    """The package's frequencies against the generator's, cents.
+
+    n: polynomials of the generator along each side; with two numbers the error of a point mass, which goes with the
+    inverse square of their number, is taken away.
+    """
     if is_sheared:
         effects, parameters = (*effects, TransverseShear()), {**parameters, **SHEAR}
         generator = (*generator, GeneratorShear(G_XZ, G_YZ))
     n_rigid = 3 if set(plate.edges.values()) == {"free"} else 0
-    independent = solve_generator(plate, generator, n_modes + n_rigid, n).frequencies[n_rigid:]
+    solved = [
+        solve_generator(plate, generator, n_modes + n_rigid, one).frequencies[n_rigid:]
+        for one in [(each, each) for each in n] or [None]
+    ]
+    independent = solved[-1]
+    if len(n) == 2:
+        independent = independent + (solved[1] - solved[0]) / ((n[1] / n[0]) ** 2 - 1)
     return 1200.0 * np.log2(hertz(plate, effects, parameters, n_modes) / independent)
 
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 import ritz
 from deflected import power
-from effect_plates import MADE, setup_of
+from effect_plates import MADE
 from generator.designs import ALL_FREE
-from generator.known_boards import FREE
 
 from bayesplate.board.attached import AttachedItem
 from bayesplate.board.quantity import Quantity
@@ -93,14 +92,6 @@ def test_candidates_of_a_search():
     assert len(tried) == 12
     assert min(x for x, _ in tried) == pytest.approx(0.25)
     assert max(y for _, y in tried) == 0.5
-
-
-def test_refusals():
-    assert "no [[setup.attached]]" in AttachedMass.refusal(*board_with())
-    assert AttachedMass.refusal(*board_with(KNOWN)) == ""
-    heavy = replace(UNKNOWN, mass=Quantity.exact(2e-3))
-    assert "above 2% of the board roved" in AttachedMass.refusal(*board_with(heavy))
-    assert setup_of(FREE).attached == ()
 
 
 def test_an_exciter_is_no_point_mass():

@@ -24,18 +24,6 @@ from bayesplate.posterior.laplace import law_tolerance
 from bayesplate.posterior.posing import pose
 
 
-def taper(x, y=0.0):
-    return {"thickness_profile.taper_x": x, "thickness_profile.taper_y": y}
-
-
-def test_a_uniform_profile_is_the_constant_plate():
-    uniform = ThicknessProfile(profile=fixed((0.0, 0.0)))
-    assert hertz(FREE, [uniform], {}, 6) == pytest.approx(hertz(FREE, [], {}, 6), rel=1e-5)
-    assert uniform.profile.is_uniform
-    assert uniform.variations() == {}
-    assert uniform.keeps_symmetry() == (True, True)
-
-
 def read_as_on_the_measured_boards():
     x, y = np.tile(np.linspace(0, 1, 5), 2), np.repeat([0.0, 1.0], 5)
     readings = FREE.h + np.array([4, -2, 3, 1, -5, -3, -4, 6, 5, -2]) * 4e-5
@@ -66,12 +54,6 @@ def test_the_expansion_against_the_field_itself(kind, least, most):
     assert least <= worst < most
 
 
-def fixed(tapers):
-    """A known profile: tapers along x and y, without anything open."""
-    per_degree = 1.0 / (2.0 * np.sqrt(3.0))
-    return FieldProfile(Surface(((1, 0), (0, 1)), tuple(taper * per_degree for taper in tapers)), None, (), FREE.h, 0.0)
-
-
 def times(surface, factor):
     return replace(surface, coefficients=tuple(factor * one for one in surface.coefficients))
 
@@ -97,16 +79,6 @@ def test_a_given_mass_is_kept():
     assert density(adjusted) * h.mean() * 0.223 * 0.114 == pytest.approx(0.036, rel=1e-4)
     assert float(values["thickness"]) < 0.00299
     assert ThicknessProfile.is_implied(board)
-
-
-def test_a_thickness_read_alike_everywhere_is_uniform():
-    places = ([0.0, 0.2, 0.4, 0.58], [0.0, 0.2, 0.0, 0.2])
-    board = board_of(ritz.FREE_SPRUCE, [setup_of(FREE)], thickness=Quantity.from_readings([4.7e-3] * 4, 1e-6, *places))
-    effect = ThicknessProfile.of(board, board.setups[0])
-    assert effect.parameters() == ()
-    assert not ThicknessProfile.is_implied(board)
-    assert ThicknessProfile.candidates(board, board.setups[0]) == ()
-    assert "support no thickness_profile" in ThicknessProfile.notes(replace(board, effects=("thickness_profile",)))[0]
 
 
 def with_its_mean():

@@ -1,14 +1,11 @@
-"""Warp: symmetry, weights, what a card states and a search tries."""
+"""Warp: symmetry, weights, and what a card states."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-import made_boards
 import numpy as np
 import pytest
-from effect_plates import setup_of, values_of
-from generator.known_boards import HALF_TOP, STEEL
+from effect_plates import board_with, setup_of, values_of
+from generator.known_boards import HALF_TOP
 
 from bayesplate.board.parameter import BOARD
 from bayesplate.board.quantity import Quantity
@@ -37,25 +34,9 @@ def test_quadratic_in_the_rises():
     assert weights[1] == pytest.approx(4.0 * weights[0])
 
 
-@pytest.fixture(scope="module")
-def half_top():
-    return made_boards.board_of(HALF_TOP, [setup_of(HALF_TOP)])
-
-
-def test_what_was_read_is_taken_and_declares_the_effect(half_top):
-    read = replace(half_top, warp={"cup": Quantity.exact(0.8e-3), "twist": Quantity.exact(0.0)})
-    assert not Warp.is_implied(half_top)
-    assert Warp.is_implied(read)
+def test_what_was_read_is_taken():
+    """A rise of nothing is no parameter."""
+    read = board_with(HALF_TOP, warp={"cup": Quantity.exact(0.8e-3), "twist": Quantity.exact(0.0)})
     parameters = Warp.of(read, read.setups[0]).parameters()
     assert [(one.key, one.prior.is_exact) for one in parameters] == [("cup", True), ("bow", False)]
     assert parameters[0].prior.mean == 0.8e-3
-
-
-def test_a_search_tries_curvatures_and_a_twist_apart(half_top):
-    assert [form.detail for form in Warp.forms(half_top)] == ["cup and bow", "twist"]
-
-
-def test_refused_where_no_usual_warp_would_show():
-    thick = made_boards.board_of(replace(STEEL, h=0.06), [setup_of(STEEL)])
-    assert "thick" in Warp.refusal(thick, thick.setups[0])
-    assert not Warp.forms(thick)
