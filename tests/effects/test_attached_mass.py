@@ -20,17 +20,12 @@ from bayesplate.plate.line import line
 from bayesplate.plate.plate import plate_of
 from bayesplate.plate.thin import THIN
 
-MASS = "attached_mass.mass"
 AS_FREE = replace(ritz.FINNISH, edges=ALL_FREE)
 
 
 def at(*places, radius=(0.0, 0.0)):
     """A thing at places, fractions of the sides."""
     return AttachedMass(MADE, (Item(Quantity.exact(1e-3), "", places, radius),))
-
-
-def weight(plate):
-    return plate.rho * plate.h * plate.L_x * plate.L_y
 
 
 def test_rotary_inertia_of_a_compact_solid():
@@ -73,13 +68,11 @@ UNKNOWN = AttachedItem("weight", ((0.2, 0.01), (0.1, 0.1)))
 def test_what_a_card_declares():
     """A mass declares its thing; the others join if the card lists the effect; places count from the whole board."""
     board, setup = board_with(KNOWN, UNKNOWN)
-    assert AttachedMass.is_implied(board)
     (item,) = AttachedMass.of(board, setup).items
     assert item.mass is KNOWN.mass
     assert item.places[0] == pytest.approx((0.9, 0.75))
     listed = AttachedMass.of(replace(board, effects=("attached_mass",)), setup)
     assert [p.key for p in listed.parameters()] == ["mass_1", "mass_2"]
-    assert not AttachedMass.is_implied(board_with(UNKNOWN)[0])
 
 
 def test_candidates_of_a_search():
@@ -94,24 +87,15 @@ def test_candidates_of_a_search():
     assert max(y for _, y in tried) == 0.5
 
 
-def test_an_exciter_is_no_point_mass():
-    """Its magnet hangs on a spring: with a mass or without, it neither implies the effect nor forbids a search."""
-    board, setup = board_with(AttachedItem("exciter", ((0.1, 0.1),), 0.05), AttachedItem("exciter"))
-    assert not AttachedMass.is_implied(board)
-    assert "no [[setup.attached]]" in AttachedMass.refusal(board, setup)
-    tried = [form.detail for form in AttachedMass.forms(board)]
-    assert tried == [form.detail for form in AttachedMass.forms(board_with()[0])]
-
-
 def test_a_thing_that_is_somewhere_is_tried_at_the_likely_places():
-    """With the prior of its kind, where a forgotten one would be; declared, it has to be somewhere."""
-    board, setup = board_with(AttachedItem("accelerometer"))
-    forms, forgotten = AttachedMass.forms(board), AttachedMass.forms(board_with()[0])
-    assert [form.detail for form in forms] == [form.detail for form in forgotten]
+    """With the prior of its kind, where a forgotten one would be; an exciter, whose magnet hangs, is no thing."""
+    forgotten = [form.detail for form in AttachedMass.forms(board_with()[0])]
+    drives = AttachedItem("exciter", ((0.1, 0.1),), 0.05), AttachedItem("exciter")
+    assert [form.detail for form in AttachedMass.forms(board_with(*drives)[0])] == forgotten
+    forms = AttachedMass.forms(board_with(AttachedItem("accelerometer"))[0])
+    assert [form.detail for form in forms] == forgotten
     assert [form.effects[0].items[0].mass.median for form in forms] == pytest.approx([1.4e-3] * len(forms))
-    assert "no [[setup.attached]] says what is fixed to the board and where" in AttachedMass.refusal(board, setup)
     beside, setup = board_with(KNOWN, AttachedItem("weight"))
-    assert [item.mass for item in AttachedMass.of(replace(beside, effects=("attached_mass",)), setup).items] == [
-        KNOWN.mass
-    ]
+    declared = AttachedMass.of(replace(beside, effects=("attached_mass",)), setup)
+    assert [item.mass for item in declared.items] == [KNOWN.mass]  # declared, it has to be somewhere
     assert [len(one.items) for one in AttachedMass.candidates(beside, setup)] == [2] * len(forgotten)

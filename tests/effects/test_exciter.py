@@ -21,27 +21,23 @@ COIL, MASS = 1.6e-3, 48e-3
 QUARTER, THIRD = (0.25, 0.25), (1.0 / 3.0, 1.0 / 3.0)
 
 
-def drive(*places, mass=MASS, coil=COIL, resonance=38.6, is_held=False):
-    def stated(value):
-        return Quantity.exact(value), ""
-
-    return Drive(stated(mass), stated(coil), stated(resonance), True, is_held, tuple(places))
+def drive(*places, mass=MASS, coil=COIL, resonance=38.6):
+    return Drive(*((Quantity.exact(value), "") for value in (mass, coil, resonance)), True, False, places)
 
 
-def exciter(plate, one):
-    setup = setup_of(plate)
+def exciter(one):
+    setup = setup_of(DRIVEN)
     return Exciter(MADE, (one,), setup.ends_x, setup.ends_y, (1, 2))
 
 
 def sizes(one, **more):
     """Values of the parameters of a drive."""
-    key = "resonance" if one.is_resonance else "suspension"
-    found = {"coil": one.coil[0].mean, "mass": one.mass[0].mean, key: one.suspension[0].mean} | more
+    found = {"coil": one.coil[0].mean, "mass": one.mass[0].mean, "resonance": one.suspension[0].mean} | more
     return {f"exciter.{name}": value for name, value in found.items()}
 
 
-def cents(plate, one, beams, **more):
-    return shifts(plate, [exciter(plate, one)], sizes(one, **more), beams)
+def cents(one, beams, **more):
+    return shifts(DRIVEN, [exciter(one)], sizes(one, **more), beams)
 
 
 def test_on_a_hard_spring_the_magnet_is_a_mass_of_the_board():
@@ -50,8 +46,8 @@ def test_on_a_hard_spring_the_magnet_is_a_mass_of_the_board():
     whole = drive(QUARTER, mass=MASS, coil=0.999 * MASS, resonance=0.0)
     beams = BEAMS["clamped"][:3]
     # A coil of nearly all the mass on no spring: what is left to the magnet by rule, a twentieth, hangs on nothing.
-    assert cents(DRIVEN, hard, beams) == pytest.approx(cents(DRIVEN, whole, beams), abs=1.0)
-    light = shifts(DRIVEN, [exciter(DRIVEN, none)], sizes(none, coil=0.0), beams)
+    assert cents(hard, beams) == pytest.approx(cents(whole, beams), abs=1.0)
+    light = cents(none, beams, coil=0.0)
     # The mesh of a plate with an exciter is finer than that of the bare one.
     assert light == pytest.approx([0.0] * 3, abs=0.05)
 
@@ -63,7 +59,7 @@ def test_a_drive_that_roved_is_the_mean_of_the_frequencies():
     setup = replace(setup_of(DRIVEN), readings=readings)
 
     def hertz(*at):
-        effect = replace(exciter(DRIVEN, drive(*at)), owner=setup.owner)
+        effect = replace(exciter(drive(*at)), owner=setup.owner)
         model = setup_model(System(setup, (effect,)), values_of(DRIVEN, sizes(one)))
         return np.exp(full_log_frequencies(model, values_of(DRIVEN, sizes(one)))), model
 
@@ -76,12 +72,9 @@ def test_a_drive_that_roved_is_the_mean_of_the_frequencies():
 
 def test_a_place_that_nobody_knows_is_a_weight():
     """Within 0.3 cents or a hundredth: what a polynomial of eight and nine nodes misses of a squared deflection."""
-    place = 0.31, 0.12
-    known, anywhere = drive(place), drive()
-    beams = BEAMS["clamped"]
-    x, y = place
-    found = cents(DRIVEN, anywhere, beams, place_x=x, place_y=y)
-    assert found == pytest.approx(cents(DRIVEN, known, beams), rel=0.01, abs=0.3)
+    beams, (x, y) = BEAMS["clamped"], (0.31, 0.12)
+    found = cents(drive(), beams, place_x=x, place_y=y)
+    assert found == pytest.approx(cents(drive((x, y)), beams), rel=0.01, abs=0.3)
 
 
 def test_shares_are_those_of_lagranges_polynomials():
@@ -98,5 +91,5 @@ def test_shares_are_those_of_lagranges_polynomials():
 
 def test_the_usual_place_is_the_middle_of_where_it_may_be():
     """Not one standard deviation above it, which is the middle of the board, where a drive does most of all."""
-    places = [one for one in exciter(DRIVEN, drive()).parameters() if one.key.startswith("place")]
+    places = [one for one in exciter(drive()).parameters() if one.key.startswith("place")]
     assert [one.nominal for one in places] == [0.25, 0.25]

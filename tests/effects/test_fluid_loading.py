@@ -6,11 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import ritz
 from deflected import deflections, power
-from effect_plates import MADE, modes_of, setup_of
+from effect_plates import MADE, board_with, modes_of
 from generator.known_boards import FIEMME, FINNISH
-from made_boards import board_of
 
 from bayesplate.board.attached import DeclaredFluid
 from bayesplate.board.quantity import Quantity
@@ -49,20 +47,14 @@ def test_a_known_baffle_needs_one_term():
 
 
 def test_takes_what_the_card_declares():
-    setup = setup_of(FINNISH)
-    board = board_of(ritz.FINNISH, [setup])
+    """A setup that states its own fluid keeps it."""
+    board = board_with(FINNISH)
+    (setup,) = board.setups
     declared = replace(setup, fluid=DeclaredFluid(Quantity.exact(1.1), "full"))
 
     assert FluidLoading.of(board, setup) == FluidLoading(MADE, 0.223 / 0.114, DEFAULT_DENSITY, UNKNOWN_BAFFLE)
     effect = FluidLoading.of(board, declared)
     assert (effect.density.mean, effect.baffle) == (1.1, Quantity.exact(1.0))
-    assert not FluidLoading.is_implied(board)
-    assert FluidLoading.is_implied(replace(board, setups=(declared,)))
-
-
-def test_a_setup_that_states_its_own_fluid_keeps_it():
-    setup = setup_of(FINNISH)
-    board = board_of(ritz.FINNISH, [setup])
     wet = replace(setup, name="wet", fluid=DeclaredFluid(997.0))
     assert FluidLoading.of(board, wet).in_setup(board, setup).density.mean == 997.0
     assert FluidLoading.of(board, setup).in_setup(board, wet).density.mean == 997.0

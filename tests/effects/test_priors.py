@@ -12,11 +12,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import inf, log, pi
+from types import SimpleNamespace
 
 import pytest
-from effect_plates import SETUP, setup_of
+from effect_plates import board_with
 from generator.known_boards import FIEMME, FREE
-from made_boards import board_of
 
 from bayesplate.board.attached import AttachedItem
 from bayesplate.board.board import Board
@@ -65,111 +65,97 @@ RISES = {
 }
 """Standard deviation of a rise by the sizes of the board, m."""
 
-MASSES = {
-    "accelerometer": (1.4e-3, 2.7),
-    "shaker": (10e-3, 2.0),
-    "weight": (5e-3, 3.0),
-}
+MASSES = [("accelerometer", 1.4e-3, 2.7), ("shaker", 10e-3, 2.0), ("weight", 5e-3, 3.0)]
 """kg and factor, where the card does not state what a thing weighs."""
 
 FORGOTTEN_SHARE = 0.02
 """Of the board's mass: standard deviation of the half-normal prior of a thing that nobody mentioned."""
 
-BOARDS = [board_of(plate, [setup_of(plate)]) for plate in (FIEMME, FREE)]
-DRIVEN = board_of(FIEMME, [replace(setup_of(FIEMME), attached=(AttachedItem("exciter"),))])
+CLAMPED, FREE_BOARD = board_with(FIEMME), board_with(FREE)
+DRIVEN = board_with(FIEMME, [AttachedItem("exciter")])
 """The clamped board with an exciter of which nothing is known."""
 
 
-def told(quantity: Quantity) -> tuple[str, float, float, tuple[float, float]]:
-    kind = "exact" if quantity.is_exact else quantity.kind
-    sd = quantity.log_sd if kind == "log-normal" else quantity.sd
-    return kind, quantity.median, sd, (quantity.lower, quantity.upper)
+def told(parameter):
+    """Unit and prior of a parameter, as `PRIORS` states them."""
+    prior = parameter.prior
+    kind = "exact" if prior.is_exact else prior.kind
+    sd = prior.log_sd if kind == "log-normal" else prior.sd
+    return parameter.unit, kind, prior.median, sd, (prior.lower, prior.upper)
 
 
-def same(quantity: Quantity, kind: str, median: float, sd: float, bounds: tuple[float, float]) -> bool:
-    found_kind, *numbers, limits = told(quantity)
-    return (found_kind, numbers, list(limits)) == (kind, pytest.approx([median, sd]), pytest.approx(list(bounds)))
+def stated(unit, kind, median, sd, bounds):
+    """The same from a table, to the rounding of its numbers."""
+    return unit, kind, pytest.approx(median), pytest.approx(sd), pytest.approx(bounds)
 
 
-def acting(name: str):
-    """The effect on the first of the boards on which it can act."""
-    cls, boards = EFFECTS[name], (*BOARDS, DRIVEN)
-    return next(cls.of(board, board.setups[0]) for board in boards if not cls.refusal(board, board.setups[0]))
+def parameters_on(name, board, setup=None):
+    effect = EFFECTS[name].of(board, board.setups[0] if setup is None else setup)
+    return {parameter.key: parameter for parameter in effect.parameters()}
 
 
-def test_every_parameter_of_every_effect_stands_in_the_table():
-    named = {
-        (name, parameter.key)
-        for name in EFFECTS
-        if name not in ("attached_mass", "outline_profile")
-        for parameter in acting(name).parameters()
-    }
+def test_unit_and_prior_of_every_parameter_of_every_effect():
+    """On the first of the boards on which it can act; a thing or a course that was read has those of its own."""
+    found = {}
+    for name in set(EFFECTS) - {"attached_mass", "outline_profile"}:
+        board = next(one for one in (CLAMPED, FREE_BOARD, DRIVEN) if not EFFECTS[name].refusal(one, one.setups[0]))
+        found |= {(name, key): told(parameter) for key, parameter in parameters_on(name, board).items()}
 
-    assert named == set(PRIORS)
-
-
-def test_prior_and_unit_of_every_parameter():
-    for (name, key), (unit, *prior) in PRIORS.items():
-        (found,) = (one for one in acting(name).parameters() if one.key == key)
-        assert found.unit == unit, (name, key)
-        assert same(found.prior, *prior), (name, told(found.prior))
+    assert found == {which: stated(*row) for which, row in PRIORS.items()}
 
 
-def test_mass_of_a_thing_that_the_card_does_not_weigh():
-    declared = replace(BOARDS[1], effects=("attached_mass",))
-    for kind, (median, factor) in MASSES.items():
-        setup = replace(declared.setups[0], attached=(AttachedItem(kind, ((0.1, 0.1),)),))
-        (found,) = EFFECTS["attached_mass"].of(declared, setup).parameters()
+@pytest.mark.parametrize(("kind", "median", "factor"), MASSES)
+def test_mass_of_a_thing_that_the_card_does_not_weigh(kind, median, factor):
+    board = board_with(FREE, [AttachedItem(kind, ((0.1, 0.1),))], effects=["attached_mass"])
 
-        assert same(found.prior, "log-normal", median, log(factor), ANY), told(found.prior)
-        assert found.unit == "kg"
+    found = parameters_on("attached_mass", board)
+
+    assert told(found["mass"]) == stated("kg", "log-normal", median, log(factor), ANY)
 
 
 def test_mass_of_a_thing_that_nobody_mentioned():
-    board = BOARDS[1]
     sd = FORGOTTEN_SHARE * FREE.rho * FREE.h * FREE.L_x * FREE.L_y
-    tried = EFFECTS["attached_mass"].forms(board)
+    tried = [one for form in EFFECTS["attached_mass"].forms(FREE_BOARD) for one in form.effects]
+
     assert len(tried) > 1
-    for effect in (one for form in tried for one in form.effects):
+    for effect in tried:
         (found,) = effect.parameters()
-        assert same(found.prior, "normal", 0.0, sd, HALF), told(found.prior)
+        assert told(found) == stated("kg", "normal", 0.0, sd, HALF)
 
 
 def test_where_an_exciter_may_be_on_a_board_whose_ends_differ():
     """On a cantilever no half of the length stands for the other; the widths are alike."""
     (clamped,) = DRIVEN.setups
     cantilever = replace(clamped, ends_x=("clamped", "free"), ends_y=("free", "free"))
-    found = {one.key: one.prior for one in EFFECTS["exciter"].of(DRIVEN, cantilever).parameters()}
 
-    assert same(found["place_x"], "normal", 0.5, 2.0, (0.0, 1.0)), told(found["place_x"])
-    assert same(found["place_y"], "normal", 0.25, 1.0, (0.0, 0.5)), told(found["place_y"])
+    found = parameters_on("exciter", DRIVEN, cantilever)
+
+    assert told(found["place_x"]) == stated("1", "normal", 0.5, 2.0, (0.0, 1.0))
+    assert told(found["place_y"]) == stated("1", "normal", 0.25, 1.0, (0.0, 0.5))
 
 
 def test_resonance_in_place_of_a_suspension():
-    stated = Quantity.from_mean(28.3, 0.5)
-    (clamped,) = DRIVEN.setups
-    setup = replace(clamped, attached=(AttachedItem("exciter", resonance=stated),))
-    found = {one.key: (one.unit, one.prior) for one in EFFECTS["exciter"].of(DRIVEN, setup).parameters()}
+    resonance = Quantity.from_mean(28.3, 0.5)
+
+    found = parameters_on("exciter", board_with(FIEMME, [AttachedItem("exciter", resonance=resonance)]))
 
     assert "suspension" not in found
-    assert found["resonance"] == ("Hz", stated)
+    assert (found["resonance"].unit, found["resonance"].prior) == ("Hz", resonance)
 
 
-@pytest.mark.parametrize("board", [DRIVEN, BOARDS[1]], ids=["driven", "free"])
+@pytest.mark.parametrize("board", [DRIVEN, FREE_BOARD], ids=["driven", "free"])
 def test_a_search_keeps_prior_and_unit(board):
     """What it tries is the effect's own parameter, not one of another width or without a unit."""
     seen = set()
     for name, each in forms(board).items():
         for free in (free for form in each for free in form.free if (name, free.key) in PRIORS):
-            unit, *prior = PRIORS[name, free.key]
-            assert free.unit == unit
+            row = list(PRIORS[name, free.key])
             if name == "warp":
-                prior[2] = RISES[free.key](board.inputs)
-            assert same(free.prior, *prior), (name, told(free.prior))
+                row[3] = RISES[free.key](board.inputs)
+            assert told(free) == stated(*row), (name, free.key)
             seen.add(name)
 
     assert len(seen) >= 7
-    assert SETUP in {setup.name for setup in board.setups}
 
 
 CARD = """\
@@ -191,5 +177,8 @@ edges = {{ x0 = "{}", x1 = "free", y0 = "free", y1 = "free" }}
 def test_noise_and_poisson_ratio_of_a_card_that_states_neither(edge, median):
     board = Board.from_text(CARD.format(edge), "b")
 
-    assert same(board.setups[0].noise, "log-normal", median, 0.5, ANY)
-    assert same(board.inputs["poisson_xy"], "normal", 0.4, 0.08, ANY)
+    for found, row in (
+        (board.setups[0].noise, ("log-normal", median, 0.5, ANY)),
+        (board.inputs["poisson_xy"], ("normal", 0.4, 0.08, ANY)),
+    ):
+        assert told(SimpleNamespace(unit="", prior=found)) == stated("", *row)
