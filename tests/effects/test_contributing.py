@@ -48,9 +48,9 @@ def test_a_light_bar_shifts_each_mode_by_its_energies(bar):
 
 
 def test_one_file_and_one_word_take_it_through_a_fit_and_a_search(bar):
-    board = prepare("spruce-free-2R").board
+    board = prepare("finnish-spruce-cantilever").board
     assert {free.key for free in forms(board)[NAME][0].free} == {"EI", "mass"}
-    problem = pose(declare(replace(board, effects=(NAME,))), prepare("spruce-free-2R").prior)
+    problem = pose(declare(replace(board, effects=(NAME,))), prepare("finnish-spruce-cantilever").prior)
     assert {f"z[{NAME}.EI]", f"z[{NAME}.mass]"} <= set(problem.parameters.names)
     assert "held" in bar.refusal(board, replace(board.setups[0], ends_y=("clamped", "free")))
     assert MADE.name not in problem.parameters.names  # the bar belongs to the board

@@ -42,16 +42,13 @@ def _numbers(*values: float) -> str:
     return "[" + ", ".join(_number(value) for value in values) + "]"
 
 
-def _nothing(parameters: Parameters, board: PlantedBoard) -> dict[str, str]:
+def _nothing(*_: Any) -> dict[str, Any]:
     return {}
 
 
-def _no_values(parameters: Parameters, plate: Plate) -> dict[str, float]:
-    return {}
-
-
-def _nothing_fixed(design: Design, size: float) -> Parameters:
-    return {}
+def _same(*keys: str) -> Callable[[Parameters, Plate], dict[str, float]]:
+    """Parameters that the package has under the same names."""
+    return lambda parameters, plate: {key: parameters[key] for key in keys}
 
 
 @dataclass(frozen=True)
@@ -78,8 +75,8 @@ class Declared:
     effect: str
     designs: tuple[str, ...]
     on_card: Callable[[Parameters, PlantedBoard], dict[str, str]] = _nothing
-    values: Callable[[Parameters, Plate], dict[str, float]] = _no_values
-    fixed: Callable[[Design, float], Parameters] = _nothing_fixed
+    values: Callable[[Parameters, Plate], dict[str, float]] = _nothing
+    fixed: Callable[[Design, float], Parameters] = _nothing
     n_places: int = 1
     n: tuple[tuple[int, int], ...] = ()
 
@@ -146,12 +143,9 @@ CASES: dict[str, Declared] = {
         "membrane_tension", ("clamped-9",), values=lambda p, plate: {"N": p["N_x"]},
         fixed=lambda design, size: dict.fromkeys(("N_x", "N_y"), size * design.nominal["membrane_tension"]),
     ),
-    "support_mass": Declared(
-        "support_mass", ("clamped-9",), values=lambda p, plate: {"mass": p["mass"]}
-    ),
+    "support_mass": Declared("support_mass", ("clamped-9",), values=_same("mass")),
     "support_stiffness": Declared(
-        "support_stiffness", ("free-12", "cantilever-6-free-6"),
-        values=lambda p, plate: {"stiffness": p["stiffness"]},
+        "support_stiffness", ("free-12", "cantilever-6-free-6"), values=_same("stiffness")
     ),
     "air without a baffle": Declared(
         "fluid_loading", ALL, _air("none"), fixed=lambda design, size: {"baffle": 0.0}
@@ -162,30 +156,23 @@ CASES: dict[str, Declared] = {
     "read thickness": Declared(
         "thickness_profile", ALL, _grid, fixed=lambda design, size: {"taper_y": 0.02}
     ),
-    "free taper": Declared(
-        "thickness_profile", ALL,
-        values=lambda p, plate: {"taper_x": p["taper_x"], "taper_y": p["taper_y"]},
-    ),
+    "free taper": Declared("thickness_profile", ALL, values=_same("taper_x", "taper_y")),
     "outline_profile": Declared(
         "outline_profile", FREE_SIDES, _widths,
         fixed=lambda design, size: {
             "stations": (0.0, design.L_x), "widths": (design.L_y, design.L_y * (1.0 - size * design.nominal["outline"]))
         },
     ),
-    "density_gradient": Declared(
-        "density_gradient", ALL, values=lambda p, plate: {"gradient": p["gradient"]}
-    ),
-    "stiffness_gradient": Declared(
-        "stiffness_gradient", ALL, values=lambda p, plate: {"gradient": p["gradient"]}
-    ),
+    "density_gradient": Declared("density_gradient", ALL, values=_same("gradient")),
+    "stiffness_gradient": Declared("stiffness_gradient", ALL, values=_same("gradient")),
     "warp": Declared("warp", ALL, _told("warp")),
     "exciter": Declared("exciter", ALL, _told("exciter"), n=((18, 18), (24, 24))),
     "exciter whose magnet is held": Declared(
         "exciter", ALL, _told("exciter"), n=((18, 18), (24, 24)),
         fixed=lambda design, size: {"magnet": "held"},
     ),
-    "grain_angle": Declared("grain_angle", ALL, values=lambda p, plate: {"angle": p["angle"]}),
-    "poisson_ratio": Declared("poisson_ratio", ALL, values=lambda p, plate: {"nu_xy": p["nu_xy"]}),
+    "grain_angle": Declared("grain_angle", ALL, values=_same("angle")),
+    "poisson_ratio": Declared("poisson_ratio", ALL, values=_same("nu_xy")),
 }  # fmt: skip
 
 
@@ -244,25 +231,20 @@ def cents_apart(
     return np.concatenate(apart)
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_generators_frequencies_within_a_cent(name, tmp_path):
-    """The card without the effect is the control: it misses by more than a cent."""
-    case = CASES[name]
-    board = planted(case, case.designs[0])
-    parameters = board.truth.effects[case.effect]
-    assert cents_apart(case, board, parameters, tmp_path) == pytest.approx(0.0, abs=1.0)
-    none = cents_apart(case, board, parameters, tmp_path, effects=())
-    assert np.abs(none).max() > 1.0
+FIRST = [(name, case.designs[0]) for name, case in CASES.items()]
+OTHERS = [(name, design) for name, case in CASES.items() for design in case.designs[1:]]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "design"), [(name, design) for name, case in CASES.items() for design in case.designs[1:]]
-)
-def test_the_generators_frequencies_within_a_cent_on_other_designs(name, design, tmp_path):
+@pytest.mark.parametrize(("name", "design"), [*FIRST, *(pytest.param(*one, marks=pytest.mark.slow) for one in OTHERS)])
+def test_the_generators_frequencies_within_a_cent(name, design, tmp_path):
+    """The card without the effect is the control, on the first design: it misses by more than a cent."""
     case = CASES[name]
     board = planted(case, design)
-    assert cents_apart(case, board, board.truth.effects[case.effect], tmp_path) == pytest.approx(0.0, abs=1.0)
+    parameters = board.truth.effects[case.effect]
+    assert cents_apart(case, board, parameters, tmp_path) == pytest.approx(0.0, abs=1.0)
+    if (name, design) in FIRST:
+        none = cents_apart(case, board, parameters, tmp_path, effects=())
+        assert np.abs(none).max() > 1.0
 
 
 def test_every_effect_of_the_generator_is_declared():
