@@ -12,7 +12,7 @@ from bayesplate.estimates.refit import sensitivities
 from bayesplate.frequencies.laws import ExactLaw, cents
 from bayesplate.posterior.laplace import every_predictor, law_tolerance, predictor
 
-EFFECTS = {"thin": (), "shear-flexible": ("transverse_shear",), "on a soft clamp": ("clamp_rotation",)}
+EFFECTS = {"shear-flexible": ("transverse_shear",), "on a soft clamp": ("clamp_rotation",)}
 
 
 @pytest.fixture(scope="module", params=EFFECTS)

@@ -75,24 +75,7 @@ def test_an_interval_has_the_integral_of_its_density(low, high, robust):
 
 
 @BOTH
-def test_an_interval_agrees_with_scipy_where_scipy_does_not_underflow(robust):
-    law = LAWS[robust]
-    for low in np.linspace(-6, 6, 25):
-        found, a, b = interval(low, low + 0.5, robust)
-        p = law.cdf(b) - law.cdf(a) if low < 0 else law.sf(a) - law.sf(b)
-        assert np.exp(found) == pytest.approx(p, rel=1e-11)
-
-
-def test_far_in_the_tail_the_interval_is_still_finite_and_falls_with_distance():
-    far = [interval(z, z + 1.0, robust=False)[0] for z in (10.0, 40.0, 1e3, 1e5)]
-    assert np.isfinite(far).all()
-    assert np.all(np.diff(far) < 0)
-    assert stats.norm.sf(40.0) == 0.0  # the plain difference would be -inf: this is the control
-
-
-@BOTH
-@pytest.mark.parametrize("width", [1e-2, 1e-4, 1e-6])
-@pytest.mark.parametrize("z", [0.0, 1.3, -2.7, 12.0])
+@pytest.mark.parametrize(("z", "width"), [(0.0, 1e-6), (1.3, 1e-4), (-2.7, 1e-2), (12.0, 1e-4)])
 def test_a_narrow_interval_is_density_times_width(z, width, robust):
     found, low, high = interval(z - width / 2, z + width / 2, robust)
     expected = LAWS[robust].logpdf(0.5 * (low + high)) + np.log(high - low)
@@ -104,36 +87,14 @@ def test_a_narrow_interval_is_density_times_width(z, width, robust):
 
 
 @BOTH
-def test_the_probabilities_of_all_whole_hertz_sum_to_one(robust):
-    hertz = np.arange(1.0, 400.0)
-    errors = errors_of(*hertz[:1], resolution=1.0, robust=robust)
-    assert errors.log_low[0] == pytest.approx(np.log(0.5))
-    total = 0.0
-    for f in hertz:
-        one = errors_of(f, resolution=1.0, robust=robust)
-        total += float(np.exp(one.log_likelihood(np.log([52.3]), 0.01)[0]))
-    outside = LAWS[robust].sf(np.log(399.5 / 52.3) / 0.01) + LAWS[robust].cdf(np.log(0.5 / 52.3) / 0.01)
-    assert total == pytest.approx(1.0 - outside, abs=1e-10)
-
-
-@BOTH
-def test_the_density_of_an_unrounded_reading_integrates_to_one(robust):
-    noise, own = 0.004, 0.003
-
-    def density(log_f):
-        one = ReadingErrors(np.exp([log_f]), np.array([own]), np.zeros(1), robust)
-        return float(np.exp(one.log_likelihood(np.zeros(1), noise)[0]))
-
-    halves = [integrate.quad(density, *ends, epsabs=1e-10, limit=300)[0] for ends in ((-np.inf, 0.0), (0.0, np.inf))]
-    assert sum(halves) == pytest.approx(1.0, abs=1e-7)
-
-
-def test_the_reading_s_own_uncertainty_is_joined_with_the_noise():
-    noise, own, away = 0.003, 0.004, 0.01
-    errors = errors_of(Quantity.from_mean(100.0, 100.0 * own), 100.0)
-    found = errors.log_likelihood(np.full(2, np.log(100.0) - away), noise)
-    assert found[0] == pytest.approx(stats.norm.logpdf(away, scale=0.005), rel=1e-12)
-    assert found[1] == pytest.approx(stats.norm.logpdf(away, scale=0.003), rel=1e-12)
+def test_the_reading_s_own_uncertainty_is_joined_with_the_noise_of_each_draw(robust):
+    own, away = 0.004, 0.01
+    errors = errors_of(Quantity.from_mean(100.0, 100.0 * own), 100.0, robust=robust)
+    noises = np.array([0.003, 0.02])
+    scales = np.array([[0.005, 0.003], [np.hypot(0.02, own), 0.02]])
+    found = errors.log_likelihood(np.full((2, 2), np.log(100.0) - away), noises)
+    assert found == pytest.approx(LAWS[robust].logpdf(away / scales) - np.log(scales), rel=1e-12)
+    assert np.array_equal(errors.sd(noises), np.stack([errors.sd(one) for one in noises]))
 
 
 def test_a_reading_with_an_uncertainty_of_its_own_is_not_rounded_on_top():
@@ -163,13 +124,6 @@ def test_simulated_readings_follow_the_density(robust):
     assert stats.kstest(standard, LAWS[robust].cdf).pvalue > 1e-3
     assert stats.kstest(standard, LAWS[not robust].cdf).pvalue < 1e-6
     assert stats.kstest(standard * 5 / 3, LAWS[robust].cdf).pvalue < 1e-6
-
-
-def test_each_draw_has_its_own_noise():
-    errors = errors_of(100.0)
-    noises = np.array([0.002, 0.02])
-    found = errors.log_likelihood(np.full((2, 1), np.log(101.0)), noises)[:, 0]
-    assert found == pytest.approx(stats.norm.logpdf(np.log(100.0 / 101.0), scale=noises), rel=1e-12)
 
 
 def test_the_logarithm_of_a_noise_is_refused():
@@ -292,12 +246,6 @@ def test_least_squares_search_and_likelihood_weigh_a_reading_alike():
     assert moments == pytest.approx(scales, rel=5e-5)
     # control: without its rounding the lowest reading would be told from its scale
     assert 0.004 / scales[0] < 0.9
-
-
-def test_one_noise_and_many_give_the_same_scales():
-    errors = errors_of(52.0, Quantity.from_mean(98.0, 0.3), resolution=1.0)
-    noises = np.array([0.002, 0.02])
-    assert np.array_equal(errors.sd(noises), np.stack([errors.sd(one) for one in noises]))
 
 
 CARD = """\
