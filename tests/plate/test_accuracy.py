@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from itertools import product
 
 import numpy as np
 import pytest
 import ritz
 from bars import meets
+from closed_forms import navier
 from either_theory import G_SPRUCE, SQUARE, SUPPORTS, cents, solved, with_thickness
-from scipy.linalg import eigh
 
 from bayesplate.plate.mesh import ELEMENTS_PER_SIDE, mesh
 from bayesplate.plate.terms import Weights
@@ -45,28 +44,6 @@ def test_lowest_mode_of_a_square_plate_is_that_of_the_handbooks(support, omega):
     board = replace(SQUARE, edges=SUPPORTS[support])
 
     assert np.sqrt(solved(board, 1).eigenvalues[0]) == pytest.approx(omega, rel=1e-4)
-
-
-def navier(board, shear_moduli, n_modes):
-    """omega^2 of the supported plate, exact: deflection and the two turnings as sines and cosines."""
-    twist, mixed = board.D_s / 4, board.nu_xy * board.D_y + board.D_s / 4
-    areal = board.rho * board.h
-    lowest = []
-    for m, n in product(range(1, 12), repeat=2):
-        a, b = m * np.pi / board.L_x, n * np.pi / board.L_y
-        if shear_moduli is None:
-            energy = board.D_x * a**4 + board.D_y * b**4 + 2 * (mixed + twist) * a**2 * b**2
-            lowest.append(energy / areal)
-            continue
-        S_x, S_y = (5 / 6 * board.h * G for G in shear_moduli)
-        stiffness = [
-            [S_x * a**2 + S_y * b**2, -S_x * a, -S_y * b],
-            [-S_x * a, board.D_x * a**2 + twist * b**2 + S_x, mixed * a * b],
-            [-S_y * b, mixed * a * b, board.D_y * b**2 + twist * a**2 + S_y],
-        ]
-        mass = areal * np.diag([1.0, board.h**2 / 12, board.h**2 / 12])
-        lowest.append(eigh(stiffness, mass, eigvals_only=True)[0])
-    return np.sort(lowest)[:n_modes]
 
 
 SUPPORTED = {
