@@ -159,6 +159,9 @@ CASES = {
         [turning(FINNISH, 1 / 30), sinking(FINNISH, 1e-4)],
         is_sheared=True,
     ),
+    "a clamp that gives way, shear-flexible": Case(
+        FINNISH, [clamp(ClampTranslation, FINNISH)], {SINK: 1e-3}, [sinking(FINNISH, 1e-3)], is_sheared=True
+    ),
     "density, shear-flexible": Case(FREE, [DensityGradient()], {DENSITY: 0.6}, [planted.DensityGradient(0.6)], True),
     "density of a part": Case(COVERED, [DensityGradient(part=PART)], {DENSITY: 0.3}, [planted.DensityGradient(0.3)]),
     "stiffness": Case(PLAIN, [StiffnessGradient()], {STIFFNESS: 0.6}, [planted.StiffnessGradient(0.6)], cents=0.1),

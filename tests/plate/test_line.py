@@ -1,4 +1,4 @@
-"""One line of Hermite elements: its Gauss points, beam functions of the handbooks, even and odd functions of a half."""
+"""One line of Hermite elements: beam functions of the handbooks, halves, and elements graded towards free ends."""
 
 from __future__ import annotations
 
@@ -19,42 +19,6 @@ BEAM_WAVENUMBERS = {
     ("clamped", "supported"): (3.9266023120, 7.0685827456),
     ("supported", "free"): (3.9266023120, 7.0685827456),
 }
-
-
-def test_points_and_weights_are_those_of_gauss_on_each_element():
-    """Five points are exact to degree nine and no further; of a half line the integral is that of the whole."""
-    whole, half = (line(("free", "free"), 2, is_split=is_split) for is_split in (False, True))
-
-    def error(degree):
-        return abs(whole.weights @ whole.points**degree * (degree + 1) - 1.0)
-
-    assert error(9) < 1e-14
-    assert error(10) > 1e-9
-    assert half.points.max() < 0.5
-    assert half.weights @ (half.points - 0.5) ** 2 == pytest.approx(1 / 12, rel=1e-13)
-
-
-@pytest.mark.parametrize("ends", ENDS)
-def test_held_ends_take_their_functions(ends):
-    """A clamp holds value and slope, on a shear-flexible plate the value alone; the slope there is the shear strain."""
-    whole = line(ends, 5)
-    n_clamped, n_supported = ends.count("clamped"), ends.count("supported")
-
-    assert whole.kept(0, is_sheared=False).sum() == 2 * 6 - 2 * n_clamped - n_supported
-    assert whole.kept(0, is_sheared=True).sum() == 2 * 6 - n_clamped - n_supported
-    assert whole.kept_strain(0).sum() == 2 * 6 - n_clamped
-    assert whole.ties() == [
-        (2 * node, 2 * node + 1) for node, end in zip((0, 5), ends, strict=True) if end == "clamped"
-    ]
-
-
-def test_what_is_held_may_be_less_than_the_ends_say():
-    """A released clamp: its beam functions and rigid motions stay those of a clamped line, its functions do not."""
-    free = line(("clamped", "clamped"), 5, held=("free", "guided"))
-
-    assert free.ends == ("clamped", "clamped")
-    np.testing.assert_array_equal(np.flatnonzero(~free.kept(0, is_sheared=False)), [2 * 5 + 1])
-    assert free.ties() == [(2 * 5, 2 * 5 + 1)]
 
 
 @pytest.mark.parametrize(("ends", "wavenumbers"), BEAM_WAVENUMBERS.items())
@@ -80,24 +44,6 @@ def test_free_line_shifts_before_it_turns():
 
     np.testing.assert_allclose(shift, 1.0, rtol=1e-12)
     np.testing.assert_allclose(turn, np.sqrt(12.0) * (points - 0.5), atol=1e-12)
-
-
-@pytest.mark.parametrize(("end", "is_sheared"), [("clamped", True), ("supported", False), ("free", True)])
-def test_even_and_odd_functions_of_a_half_are_all_functions_of_the_whole(end, is_sheared):
-    """Of the deflection, and of the strain along the side, which is odd where the deflection is even."""
-    half, whole = (line((end, end), 6, is_sheared, is_split=is_split) for is_split in (True, False))
-    points = np.linspace(0.0, 1.0, 201)
-
-    def are_the_same(parts, expected):
-        found = np.hstack([part.toarray() for part in parts])
-        ranks = [np.linalg.matrix_rank(one, tol=1e-9) for one in (found, np.hstack([found, expected.toarray()]))]
-        return found.shape == expected.shape and ranks == 2 * [expected.shape[1]]
-
-    at = whole.shapes(points)
-    deflection = [half.shapes(points, p)[:, half.kept(p, is_sheared)] for p in (0, 1)]
-    assert are_the_same(deflection, at[:, whole.kept(0, is_sheared)])
-    strain = [half.shapes(points, 1 - p)[:, half.kept_strain(p)] for p in (0, 1)]
-    assert are_the_same(strain, at[:, whole.kept_strain(0)])
 
 
 def test_unlike_ends_or_an_element_across_the_middle_leave_a_whole_line():

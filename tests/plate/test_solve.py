@@ -22,22 +22,6 @@ from bayesplate.plate.thin import THIN, thin_plate
 THEORIES = pytest.mark.parametrize("shear_moduli", [None, G_SPRUCE], ids=["thin", "shear-flexible"])
 
 
-def test_frequency_of_a_clamped_plate_depends_on_poisson_through_the_twist_alone():
-    """By parts int w_xx w_yy = int w_xy^2 where all edges are clamped, so that d omega^2 / d nu = 2 D_y int w_xy^2."""
-    board, step = ritz.FIEMME, 1e-3
-    modes = solved(board, 8)
-    per_nu = board.D_y / (board.rho * board.h * board.L_x**2 * board.L_y**2)
-    above, below = (solved(replace(board, nu_xy=board.nu_xy + s), 8).eigenvalues for s in (step, -step))
-
-    twist = modes.coefficients[:, 3]
-
-    np.testing.assert_allclose(modes.coefficients[:, 2], 2.0 * twist, rtol=1e-8)
-    # The central difference leaves a third-order term of 1e-7.
-    np.testing.assert_allclose((above - below) / (2.0 * step), 2.0 * per_nu * twist, rtol=1e-5)
-    free = solved(ritz.FINNISH, 6).coefficients
-    assert np.abs(free[:, 2] / free[:, 3] - 2.0).max() > 0.5, "the control: with a free edge it is another"
-
-
 @THEORIES
 def test_energies_are_the_derivatives_of_the_eigenvalues_and_sum_to_them(shear_moduli):
     """Hellmann-Feynman: a share of energy is what the eigenvalue gains from its term, shear and inertia included.
@@ -124,16 +108,6 @@ def test_shapes_are_those_of_ritz(board):
         assert abs(correlation) > 1 - 1e-8
         # Mass-normalised on the unit square here, on the board there.
         assert np.linalg.norm(shape) == pytest.approx(np.linalg.norm(other) * np.sqrt(board.L_x * board.L_y), rel=2e-4)
-
-
-def test_classes_are_solved_for_as_many_modes_as_they_are_asked():
-    plate = thin_plate(("free", "free"), ("free", "free"), 6, 6)
-    counts = {own.parity: 4 + i for i, own in enumerate(plate.classes)}
-
-    for parity, modes in solve_classes(plate, weights_of(SQUARE), counts).items():
-        assert modes.eigenvalues.shape == (counts[parity],)
-        assert np.all(modes.eigenvalues > 100.0), "13.47^2 is the lowest elastic eigenvalue: no rigid motion is left"
-        assert modes.rigid.shape[1] == modes.own.n_rigid
 
 
 @pytest.mark.parametrize("highest", [1e2, 4e4])
