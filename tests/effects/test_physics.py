@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import generator.effects as planted
 import numpy as np
 import pytest
-from effect_plates import MADE, hertz, hertz_apart, setup_of, tapered
+from effect_plates import ALL_SUPPORTED, MADE, hertz, hertz_apart, setup_of, tapered
 from generator.designs import ALL_FREE, CANTILEVER
 from generator.effects import NoEffect
 from generator.exciter import Exciter as PlantedExciter
@@ -46,6 +46,7 @@ FREE_FINNISH = replace(FINNISH, L_x=0.253, edges=ALL_FREE)
 ALONG_X = replace(FINNISH, edges={"x0": "free", "x1": "free", "y0": "clamped", "y1": "free"})
 LONG_SADDLE = replace(HALF_TOP, edges=CANTILEVER)
 HELD_DOME = replace(HALF_TOP, edges=DRIVEN.edges)
+LYING_DOME = replace(HALF_TOP, edges=ALL_SUPPORTED)
 
 
 @dataclass(frozen=True)
@@ -200,6 +201,7 @@ CASES = {
     "warp, sheared": Case(HALF_TOP, [warped(HALF_TOP, **DOME)], is_sheared=True),
     "warp of a saddle without a twist": Case(LONG_SADDLE, [warped(LONG_SADDLE, cup=1e-3, bow=-3e-3)]),
     "warp between clamps": Case(HELD_DOME, [warped(HELD_DOME, **DOME)]),
+    "warp between supports, on which it slides": Case(LYING_DOME, [warped(LYING_DOME, **DOME)]),
     "warp of a tapered board": Case(HALF_TOP, [thicker(0.15, -0.1), warped(HALF_TOP, cup=1.3e-3, bow=2e-3)]),
     "a tenth of a board": Case(FREE, [loaded(FREE, (0.97, 0.91), 0.1)], n=(18, 24)),
     "a sensor that turns": Case(FREE, [loaded(FREE, (0.966, 0.908), 0.012, is_turning=True)], n=(18, 24)),
