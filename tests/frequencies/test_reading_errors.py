@@ -279,12 +279,10 @@ edges = {{ x0 = "free", x1 = "free", y0 = "free", y1 = "free" }}
     ],
 )
 def test_a_list_of_readings_joins_its_standard_error_with_the_rounding_of_the_setup(
-    tmp_path, frequency, resolution, mean, variance
+    frequency, resolution, mean, variance
 ):
-    path = tmp_path / "lists.toml"
     said = "" if resolution is None else f"resolution_hz = {resolution}"
-    path.write_text(CARD.format(frequency=frequency, resolution=said), encoding="utf-8")
-    (setup,) = Board.from_toml(path).setups
+    (setup,) = Board.from_text(CARD.format(frequency=frequency, resolution=said), "lists.toml").setups
     read, plain = (reading.frequency for reading in setup.readings)
     assert (read.mean, read.sd**2) == pytest.approx((mean, variance), rel=1e-12)
     assert plain.is_exact
