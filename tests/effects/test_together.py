@@ -20,26 +20,15 @@ from bayesplate.effects import EFFECTS, declare, effects_of
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.solve import solve
 
-PLATES = {
-    "CFFF": FINNISH,
-    "CCCC": FIEMME,
-    "FFFF": FREE,
-}
+PLATES = {"CFFF": FINNISH, "CCCC": FIEMME, "FFFF": FREE}
 N_MODES = 6
 COARSE = (4, 4)
 """Elements along x and y: frequencies of one mesh are compared, so a coarse one serves."""
 PLACE, DRIVEN_AT = (0.86, 0.34), (0.31, 0.58)
 
-KINDS = {
-    "stiffness": {"clamp_rotation", "clamp_translation", "membrane_tension", "support_stiffness"},
-    "mass": {"attached_mass"},
-    "projected mass": {"fluid_loading", "support_mass"},
-    "field": {"thickness_profile", "outline_profile", "density_gradient", "stiffness_gradient"},
-    "theory": {"transverse_shear"},
-    "material": {"grain_angle", "poisson_ratio"},
-    "projected stiffness": {"warp"},
-    "coordinate": {"exciter"},
-}
+FIELDS = ("density_gradient", "outline_profile", "stiffness_gradient", "thickness_profile")
+PROJECTED = {"fluid_loading", "support_mass", "warp"}
+"""Effects whose terms exist on given deflections alone."""
 
 
 @pytest.fixture
@@ -99,29 +88,29 @@ PAIRS = {
 """Every pair on the first of the boards that allows it."""
 
 
-def test_every_effect_has_its_kind():
-    assert set().union(*TOGETHER.values()) == set(EFFECTS) == set().union(*KINDS.values())
-
-
 def test_effects_act_in_the_order_of_the_library_whatever_that_of_the_declaration():
+    """Each of them on one of the boards."""
     for edges, board in BOARDS.items():
         for order in (TOGETHER[edges], TOGETHER[edges][::-1]):
             acting = effects_of(replace(board, effects=tuple(order)), board.setups[0])
             assert [one.name for one in acting] == TOGETHER[edges]
+    assert set().union(*TOGETHER.values()) == set(EFFECTS)
 
 
-@pytest.mark.parametrize("edges", [pytest.param("CFFF", marks=pytest.mark.slow), "CCCC", "FFFF"])
+@pytest.mark.parametrize(
+    ("edges", "board", "pairs"),
+    [
+        pytest.param("CFFF", BOARDS["CFFF"], PAIRS["CFFF"], marks=pytest.mark.slow),
+        ("CCCC", BOARDS["CCCC"], PAIRS["CCCC"]),
+        ("FFFF", BOARDS["FFFF"], PAIRS["FFFF"]),
+        # A free taper is a sum of fields, each of which meets those of the other effect.
+        ("CFFF", board_like(FINNISH), list(combinations(FIELDS, 2))),
+    ],
+    ids=["CFFF", "CCCC", "FFFF", "tapers and another field"],
+)
 @pytest.mark.usefixtures("coarse")
-def test_any_two_effects_can_act_together(edges):
-    failed = [pair for pair in PAIRS[edges] if not np.all(hertz(PLATES[edges], BOARDS[edges], pair) > 0.0)]
-    assert failed == []
-
-
-@pytest.mark.usefixtures("coarse")
-def test_tapers_and_another_field_can_act_together():
-    """A free taper is a sum of fields, each of which meets those of the other effect."""
-    pairs = combinations(sorted(KINDS["field"]), 2)
-    failed = [pair for pair in pairs if not np.all(hertz(FINNISH, board_like(FINNISH), pair) > 0.0)]
+def test_any_two_effects_can_act_together(edges, board, pairs):
+    failed = [pair for pair in pairs if not np.all(hertz(PLATES[edges], board, pair) > 0.0)]
     assert failed == []
 
 
@@ -142,11 +131,10 @@ def test_what_adds_terms_alone_leaves_the_plate_itself():
     shared = {
         name for name, plate in plates.items() if (plate.x, plate.y) == (bare.x, bare.y) and has_terms_of(plate, bare)
     }
-    projected = KINDS["projected mass"] | KINDS["projected stiffness"]
-    terms_alone = projected | {"membrane_tension", "support_stiffness", "poisson_ratio"}
+    terms_alone = PROJECTED | {"membrane_tension", "support_stiffness", "poisson_ratio"}
 
     assert shared == terms_alone & set(TOGETHER[edges])
-    assert {name for name, plate in plates.items() if plate.is_projected} == projected & set(TOGETHER[edges])
+    assert {name for name, plate in plates.items() if plate.is_projected} == PROJECTED & set(TOGETHER[edges])
     assert not bare.is_projected
 
 
