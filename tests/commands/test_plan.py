@@ -13,7 +13,7 @@ import bayesplate
 from bayesplate.cli import main
 from bayesplate.commands import plan as home
 from bayesplate.commands.prepare import prepare
-from bayesplate.errors import InputError, NotIdentifiableError
+from bayesplate.errors import NotIdentifiableError
 
 UNMEASURED = Path(__file__).parents[2] / "docs" / "cards" / "half-top-unmeasured.toml"
 BOARD = "fiemme-spruce-clamped"
@@ -25,26 +25,15 @@ GAIN = [
     "E_x", "E_y", "G_xy", "constants", "constants_error", "explanations", "explanations_error", "information", "shared",
     "score", "score_per_minute",
 ]  # fmt: skip
-FILES = {
-    "plan.json",
-    "plan.png",
-    "plan.svg",
-    "plan-bench.png",
-    "plan-bench.svg",
-    "plan-bench-2.png",
-    "plan-bench-2.svg",
-}
-
-
-def run(*arguments):
-    return CliRunner().invoke(main, ["plan", *map(str, arguments)])
+FILES = {"plan.json", *(f"plan{of}.{end}" for of in ("", "-bench", "-bench-2") for end in ("png", "svg"))}
 
 
 @pytest.fixture(scope="module")
 def planned(tmp_path_factory):
     """The plan of a board that was not measured."""
     out = tmp_path_factory.mktemp("plan") / "out"
-    result = run(UNMEASURED, "--out", out, "--cost", "clamping=20", "--for", "E_y")
+    asked = ["plan", str(UNMEASURED), "--out", str(out), "--cost", "clamping=20", "--for", "E_y"]
+    result = CliRunner().invoke(main, asked)
     assert result.exit_code == 0, result.output
     return out, json.loads((out / "plan.json").read_text()), result.stdout
 
@@ -71,13 +60,6 @@ def test_a_board_without_frequencies_is_planned_from_its_prior(planned):
     assert found["sequences"][0]["gain"]["score"] >= scores[0]
 
 
-def test_plates_of_no_material_are_passed_over():
-    """The default prior of the moduli, which are independent there, holds some."""
-    free = bayesplate.Setup.from_frequencies({}, edges="free")
-    board = bayesplate.Board.from_numbers("b", length_x=0.253, length_y=0.114, thickness=3e-3, mass=0.041, setups=free)
-    assert bayesplate.plan(board).summary.proposals
-
-
 def test_the_sheet_says_where_each_mode_will_be_and_is_seen(planned):
     _, found, printed = planned
     (bench,) = [one for one in found["bench"] if one["setup"] == "setup"]
@@ -90,138 +72,94 @@ def test_the_sheet_says_where_each_mode_will_be_and_is_seen(planned):
     assert found["first"].split(":")[0] in " ".join(printed.split())
 
 
-def test_files_that_are_there_are_kept_without_force(planned):
-    out, _, _ = planned
-    before = (out / "plan.json").read_bytes()
-
-    refused = run(UNMEASURED, "--out", out)
-
-    assert refused.exit_code == 3
-    assert "plan.json" in refused.output
-    assert (out / "plan.json").read_bytes() == before
+def free_board(hertz):
+    """A board of some readings, under the default prior, whose moduli are independent: a part is no material's."""
+    setup = bayesplate.Setup.from_frequencies(hertz, edges="free")
+    sizes = {"length_x": 0.253, "length_y": 0.114, "thickness": 3e-3, "mass": 0.041}
+    return bayesplate.Board.from_numbers("one", **sizes, setups=setup)
 
 
-def test_a_plan_is_no_run_and_fit_says_what_it_lacks(planned):
-    out, _, _ = planned
-    lacking = CliRunner().invoke(main, ["fit", str(UNMEASURED), "--out", str(out)])
+def test_a_board_whose_one_mode_does_not_tell_three_constants_is_planned_from_its_prior():
+    board = free_board({"(1,1)": 125.0})
+    found = bayesplate.plan(board).summary
 
-    assert lacking.exit_code == 3
-    assert "wanted measured frequencies" in lacking.output
-
-
-REFUSED = [
-    (["--cost", "reading=0"], 3, "costs reading: wanted a positive number of minutes"),
-    (["--cost", "reading"], 2, "wanted CLASS=MINUTES"),
-    (["--between", "grain_angel"], 3, "did you mean grain_angle?"),
-    (["--between", "clamp_rotation"], 3, "between: wanted a board on which clamp_rotation can act, got no edge is"),
-    (["--between", "none"], 3, "between: wanted one name of an effect or more, or None, got an empty list"),
-    (["--between", "air_loading", "--effects", "fluid_loading"], 3, "between: wanted effects that are not dec"),
-    (["--between", "fluid_loading"], 3, "between: wanted the frequencies of a board, by which effects are told apart"),
-    (["--for", "explanations"], 3, "goal: wanted the frequencies of a board, by which effects are told apart"),
-]
-
-
-def test_what_cannot_be_asked_is_refused_and_leaves_nothing(tmp_path):
-    for arguments, code, said in REFUSED:
-        result = run(UNMEASURED, "--out", tmp_path / "out", *arguments)
-
-        assert result.exit_code == code
-        assert said in " ".join(result.output.split())
-        assert list(tmp_path.iterdir()) == []
-
-
-def test_a_campaign_does_not_tell_explanations_apart():
-    with pytest.raises(InputError, match="plan one of its boards"):
-        bayesplate.plan("spruce-half-tops", goal="explanations")
-    with pytest.raises(InputError, match=r"between: wanted the frequencies of a board.*got a campaign"):
-        bayesplate.plan("spruce-half-tops", between=["fluid_loading"])
-
-
-class TestTooFewReadings:
-    """One mode does not tell three constants."""
-
-    @pytest.fixture
-    def board(self):
-        held = bayesplate.Setup.from_frequencies({"(1,1)": 125.0}, edges="free")
-        sizes = {"length_x": 0.253, "length_y": 0.114, "thickness": 3e-3, "mass": 0.041}
-        return bayesplate.Board.from_numbers("one", **sizes, setups=held)
-
-    def test_the_plan_says_that_it_is_from_the_prior(self, board):
-        found = bayesplate.plan(board).summary
-        assert found.basis == "prior"
-        assert found.notes[0].startswith("planned from the prior alone")
-
-    @pytest.mark.parametrize("asked", [{"between": ["fluid_loading"]}, {"goal": "explanations"}])
-    def test_effects_are_not_told_apart(self, board, asked):
+    assert found.proposals
+    assert found.basis == "prior"
+    assert found.notes[0].startswith("planned from the prior alone")
+    for asked in ({"between": ["fluid_loading"]}, {"goal": "explanations"}):
         with pytest.raises(NotIdentifiableError):
             bayesplate.plan(board, **asked)
 
 
-class TestFinishedDiagnosis:
-    """What a diagnosis of the same card said is not searched for again."""
+@pytest.fixture(scope="module")
+def prepared():
+    return prepare(BOARD)
 
-    @pytest.fixture
-    def told(self):
-        prepared = prepare(BOARD)
-        answers = [
-            {"effects": ["membrane_tension"], "probability": 0.4, "words": ""},
-            {"effects": ["fluid_loading"], "probability": 0.05, "words": ""},
-            {"effects": ["grain_angle"], "probability": 0.03, "words": ""},
-        ]
-        return {
-            "card_sha256": prepared.card.sha256, "declared": [], "verdict": "none needed", "effects": [],
-            "answers": answers, "probability_of_none": 0.5,
-        }  # fmt: skip
 
-    def finished(self, folder, told):
-        (folder / "diagnosis.json").write_text(json.dumps(told))
-        return home._finished(folder, prepare(BOARD))
+@pytest.fixture
+def told(prepared):
+    """A diagnosis that is done: three effects may be what the board lacks, or none."""
+    probabilities = {"membrane_tension": 0.4, "fluid_loading": 0.05, "grain_angle": 0.03}
+    answers = [{"effects": [name], "probability": one, "words": ""} for name, one in probabilities.items()]
+    return {
+        "card_sha256": prepared.card.sha256, "declared": [], "verdict": "none needed", "effects": [],
+        "answers": answers, "probability_of_none": 0.5,
+    }  # fmt: skip
 
-    def test_those_within_a_factor_ten_and_those_that_a_group_lists_survive(self, tmp_path, told):
-        found = self.finished(tmp_path, told)
-        assert set(found.support) == {("membrane_tension",), ("fluid_loading",)}
-        assert found.none == 0.5
-        listed = {"verdict": "indistinguishable group", "effects": ["membrane_tension", "grain_angle"]}
-        found = self.finished(tmp_path, told | listed)
-        assert set(found.support) == {("membrane_tension",), ("fluid_loading",), ("grain_angle",)}
 
-    @pytest.mark.parametrize(
-        "other",
-        [
-            {"card_sha256": "0"},
-            {"declared": ["fluid_loading"]},
-            {"verdict": "unexplained"},
-            {"answers": []},
-            {"probability_of_none": float("nan")},
-            {"answers": [{"effects": ["fluid_loading"], "probability": 1.5}]},
-            {"answers": [{"effects": ["witchcraft"], "probability": 0.5}]},
-            {"verdict": "indistinguishable group", "effects": 7},
-        ],
-        ids=range(8),
-    )
-    def test_another_card_model_or_verdict_and_one_that_was_altered_are_not_taken_up(self, tmp_path, told, other):
-        assert self.finished(tmp_path, told | other) is None
+@pytest.fixture
+def taken_up(tmp_path, prepared):
+    """What a plan takes of a text in the place of a diagnosis."""
 
-    def test_nor_is_what_cannot_be_read(self, tmp_path):
-        for content in ("[]", "[" * 100_000):
-            (tmp_path / "diagnosis.json").write_text(content)
-            assert home._finished(tmp_path, prepare(BOARD)) is None
-        assert home._finished(tmp_path / "nowhere", prepare(BOARD)) is None
+    def take(text):
+        (tmp_path / "diagnosis.json").write_text(text)
+        return home._finished(tmp_path, prepared)
 
-    def test_only_they_are_tabulated(self, tmp_path, told, monkeypatch):
-        (tmp_path / "diagnosis.json").write_text(json.dumps(told))
-        kept = []
+    return take
 
-        class Seen(Exception):
-            """Nothing further is asked."""
 
-        def stop(baseline, tried=None, tell=None):
-            kept.append(tried)
-            raise Seen
+def test_answers_within_a_factor_ten_and_those_that_a_group_lists_survive_a_diagnosis(taken_up, told):
+    found = taken_up(json.dumps(told))
+    assert set(found.support) == {("membrane_tension",), ("fluid_loading",)}
+    assert found.none == 0.5
+    listed = {"verdict": "indistinguishable group", "effects": ["membrane_tension", "grain_angle"]}
+    found = taken_up(json.dumps(told | listed))
+    assert set(found.support) == {("membrane_tension",), ("fluid_loading",), ("grain_angle",)}
 
-        monkeypatch.setattr(home, "full_search", stop)
-        monkeypatch.setattr(home, "baseline_of", lambda _: None)
-        monkeypatch.setattr(home.Problem, "posed", SimpleNamespace())
-        with pytest.raises(Seen):
-            bayesplate.plan(BOARD, out=tmp_path)
-        assert kept == [["fluid_loading", "membrane_tension"]]
+
+def test_a_diagnosis_of_another_card_model_or_verdict_and_one_that_was_altered_is_not_taken_up(
+    taken_up, told, prepared, tmp_path
+):
+    assert home._finished(tmp_path, prepared) is None
+    for other in (
+        {"card_sha256": "0"},
+        {"declared": ["fluid_loading"]},
+        {"verdict": "unexplained"},
+        {"answers": []},
+        {"probability_of_none": float("nan")},
+        {"answers": [{"effects": ["fluid_loading"], "probability": 1.5}]},
+        {"answers": [{"effects": ["witchcraft"], "probability": 0.5}]},
+        {"verdict": "indistinguishable group", "effects": 7},
+    ):
+        assert taken_up(json.dumps(told | other)) is None, other
+    for unreadable in ("[]", "[" * 100_000):
+        assert taken_up(unreadable) is None
+
+
+def test_only_the_answers_that_survive_a_diagnosis_are_tabulated(tmp_path, told, monkeypatch):
+    (tmp_path / "diagnosis.json").write_text(json.dumps(told))
+    kept = []
+
+    class Seen(Exception):
+        """Nothing further is asked."""
+
+    def stop(baseline, tried=None, tell=None):
+        kept.append(tried)
+        raise Seen
+
+    monkeypatch.setattr(home, "full_search", stop)
+    monkeypatch.setattr(home, "baseline_of", lambda _: None)
+    monkeypatch.setattr(home.Problem, "posed", SimpleNamespace())
+    with pytest.raises(Seen):
+        bayesplate.plan(BOARD, out=tmp_path)
+    assert kept == [["fluid_loading", "membrane_tension"]]
