@@ -10,13 +10,12 @@ import pytest
 import runs
 from carried_boards import CARRIES, LABEL, five_modes
 from click.testing import CliRunner
-from runs import files_in, read_json
+from runs import read_json
 
 from bayesplate.cli import main
 from bayesplate.commands.check import check
 from bayesplate.commands.diagnose import diagnose as run_diagnose
 from bayesplate.diagnosis.joint import full_search
-from bayesplate.results.folder import OutputFolder
 
 WITH_SHEAR = "paper-cantilever-fe"
 CALM = "fiemme-spruce-clamped"
@@ -180,35 +179,6 @@ def test_a_folder_with_results_needs_force_and_force_leaves_no_stale_before(tmp_
     assert not (folder / "before").exists()
 
 
-@pytest.mark.parametrize("has_notes", [True, False])
-def test_what_somebody_else_keeps_in_before_stays(tmp_path, has_notes):
-    """The fit of an earlier diagnosis goes when the new one is whole, and comes back where it leaves nothing."""
-    (tmp_path / "before").mkdir()
-    for name in (*FIT, *(["notes.txt"] if has_notes else [])):
-        (tmp_path / "before" / name).write_bytes(b"mine")
-    before = files_in(tmp_path)
-    folder = OutputFolder(tmp_path)
-    folder.open(resume=False)
-    assert not any((tmp_path / "before" / name).exists() for name in FIT)
-    folder.release()
-    assert files_in(tmp_path) == before
-
-    folder.open(resume=False)
-    (tmp_path / "summary.json").write_bytes(b"new")
-    folder.close()
-    folder.release()
-    assert files_in(tmp_path) == {"summary.json": b"new"} | ({"before/notes.txt": b"mine"} if has_notes else {})
-
-
-def test_refused_input_and_too_few_readings_leave_no_folder(tmp_path):
-    few = clamped_card(tmp_path, "(0,0)", "(0,2)")
-    for arguments, code in ((("no-such-board",), 3), ((CALM, "--force", "--resume"), 2), ((few,), 4)):
-        run = diagnose(tmp_path / "out", *arguments)
-        assert run.exit_code == code
-        assert not run.folder.exists()
-        assert "Traceback" not in run.stderr
-
-
 def test_three_modes_are_fitted_and_leave_nothing_to_judge_by(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         quickly(patch, page=True)
@@ -227,15 +197,6 @@ def test_three_modes_are_fitted_and_leave_nothing_to_judge_by(tmp_path, monkeypa
     assert found["p_value"] == {"before": None, "after": None}
     assert [one["below_detection_limit"] for one in found["candidates"][:2]] == [True, True]
     assert found["recommendation"].startswith("Measure ")
-
-
-def test_there_is_nothing_to_resume(tmp_path):
-    folder = tmp_path / "out"
-    assert diagnose(folder, CALM, "--resume").exit_code == 6
-    (folder / "checkpoint" / "linear").mkdir(parents=True)
-    run = diagnose(folder, CALM, "--resume")
-    assert run.exit_code == 6
-    assert "none to resume" in run.stderr
 
 
 @pytest.mark.slow

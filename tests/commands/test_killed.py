@@ -28,7 +28,7 @@ from bayesplate.results.folder import OutputFolder
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs a signal that cannot be caught")
 
-FIT = ("fit", "fiemme-spruce-clamped", "--quiet", "--no-report")
+FIT = ("fit", "fiemme-spruce-clamped", "--quiet")
 DIAGNOSE = ("diagnose", "paper-cantilever-fe", "--quiet", "--no-report")
 
 
@@ -47,7 +47,7 @@ def arguments(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytes
     if request.param == "campaign":
         (tmp_path / "cards").mkdir()
         return ("diagnose", str(write_campaign(tmp_path / "cards", (MASS, MASS))), "--quiet", "--no-report")
-    return {"fit": FIT, "fit and report": FIT[:-1], "diagnose": DIAGNOSE}[request.param]
+    return {"fit and report": FIT, "diagnose": DIAGNOSE}[request.param]
 
 
 def run(folder: Path, *arguments: str):
@@ -134,7 +134,7 @@ def test_a_checkpoint_that_is_removed_goes_part_by_part_and_the_first_last(tmp_p
     assert [list(one) for one in dict.fromkeys(map(tuple, found))] == [["before", "refit"], ["before"], []]
 
 
-@pytest.mark.parametrize("arguments", ["fit", "diagnose", "batch"], indirect=True)
+@pytest.mark.parametrize("arguments", ["diagnose", "batch"], indirect=True)
 def test_a_folder_that_another_run_holds_is_left_as_it_is(tmp_path, arguments):
     """Results of an earlier run and of the one in progress; without the other run the same command goes ahead."""
     folder = tmp_path / "out"
@@ -163,13 +163,10 @@ def test_a_folder_that_another_run_has_used_meanwhile_is_not_new(tmp_path):
     assert files_in(folder.path) == {"summary.json": b"of the other run"}
 
 
-def test_force_lays_aside_what_a_campaign_left_of_each_board_and_nothing_else(tmp_path):
-    names = [
-        "boards/a/summary.json",
-        "boards/a/figures/modes.svg",
-        "boards/b/figures/modes.svg",
-        "before/a/posterior.nc",
-    ]
+def test_force_lays_aside_what_runs_left_and_nothing_else_until_there_is_something_better(tmp_path):
+    """Of a fit, of a diagnosis and of each board of a campaign; it comes back where the new run leaves nothing."""
+    names = ["summary.json", "before/summary.json", "before/a/posterior.nc", "boards/a/summary.json"]
+    names += ["boards/a/figures/modes.svg", "boards/b/figures/modes.svg"]
     folder = OutputFolder(tmp_path / "out")
     for name in (*names, "boards/b/notes.txt"):
         (folder.path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -182,6 +179,22 @@ def test_force_lays_aside_what_a_campaign_left_of_each_board_and_nothing_else(tm
     assert folders_in(folder.path).isdisjoint({Path("boards/a"), Path("boards/b/figures"), Path("before")})
     folder.release()
     assert files_in(folder.path) == before
+
+    folder.open(resume=False)
+    (folder.path / "summary.json").write_text("new")
+    folder.close()
+    folder.release()
+    assert files_in(folder.path) == {"summary.json": b"new", "boards/b/notes.txt": b"boards/b/notes.txt"}
+
+
+def test_files_of_commands_that_share_the_folder_with_a_fit_do_not_make_it_a_used_one(tmp_path):
+    for name in ("compare.json", "modes.png", "modes-water.svg", "plan.json", "plan.svg", "plan-bench-2.png"):
+        (tmp_path / name).touch()
+
+    OutputFolder(tmp_path).require_usable(force=False, resume=False)
+    (tmp_path / "plan.txt").touch()
+    with pytest.raises(InputError, match="wanted a new folder"):
+        OutputFolder(tmp_path).require_usable(force=False, resume=False)
 
 
 def test_a_board_of_a_campaign_may_have_the_name_of_a_file_of_the_checkpoint(monkeypatch):

@@ -127,12 +127,6 @@ def test_the_band_follows_the_prior(unmeasured):
         assert (high - low) / 2 == pytest.approx(half_width, rel=0.1)
 
 
-def test_a_sheet_does_not_keep_a_fit_from_the_folder(finnish_sheet):
-    from bayesplate.results.folder import OutputFolder
-
-    OutputFolder(finnish_sheet.folder).require_usable(force=False, resume=False)
-
-
 def test_modes_not_measured_have_the_range_that_the_others_foretell(finnish_sheet):
     (setup,) = runs.read_json(finnish_sheet.stdout)["setups"]
 

@@ -8,9 +8,10 @@ import pytest
 from generator.sand import photograph
 from made_recordings import CARD, SENSOR, SIDES, board
 
+from bayesplate.board.board import Board
 from bayesplate.commands.pick_labels import Labels, label_peaks, pictures_of
 from bayesplate.commands.pick_words import moved_between_hits
-from bayesplate.commands.prepare import prepare
+from bayesplate.commands.prepare import Prepared, prepare
 from bayesplate.recordings.contract import LabelChance, PickedRow
 from bayesplate.recordings.picking import Picked
 from bayesplate.recordings.sand import straightened
@@ -45,24 +46,28 @@ PEAK = PickedRow(
 )  # fmt: skip
 
 
+def planted(material: str = "poisson_xy = 0.4") -> Prepared:
+    """The board that rings, before anything of it was read."""
+    text = CARD.replace("poisson_xy = 0.4", material)
+    return prepare(Board.from_text(text, "planted", may_lack_frequencies=True), may_lack_frequencies=True)
+
+
 def heard(likely: tuple[PickedRow, ...]) -> SimpleNamespace:
     """What was picked without a force, between places that nobody knows."""
     spectra = SimpleNamespace(force=None, between=((None, None),))
     return SimpleNamespace(likely=likely, likely_answers=(), spectra=spectra)
 
 
-def test_a_picture_of_another_mode_or_crosswise_is_told(tmp_path):
+def test_a_picture_of_another_mode_or_crosswise_is_told():
     """The picture is of one of its two peaks: of the other it is told."""
-    (tmp_path / "planted.toml").write_text(CARD)
-    prepared = prepare(tmp_path / "planted.toml", may_lack_frequencies=True)
-    likely = tuple(replace(PEAK, hz=hz, sd_hz=1e-3 * hz) for hz in board().damped[:8])
-    picked = heard(likely)
+    prepared = planted()
+    likely = tuple(replace(PEAK, hz=hz, sd_hz=1e-3 * hz) for hz in board().damped[:5])
     rng = np.random.default_rng(4)
     sand = [photograph(rng, board().modes.shape(m), SIDES) for m in (2, 3)]
     names = ["({},{})".format(*name) for name, _ in board().modes.names()[:4]]
 
     shown = [straightened(picture) for picture in sand]
-    labels = label_peaks(prepared.card, prepared.prior, picked, None, {2: [shown[1]], 3: [shown[1]]})
+    labels = label_peaks(prepared.card, prepared.prior, heard(likely), None, {2: [shown[1]], 3: [shown[1]]})
     kept, told = pictures_of(prepared.board, likely, {likely[2].hz: sand[0], 150.0: sand[1].T})
 
     (doubt,) = labels.doubts
@@ -73,22 +78,20 @@ def test_a_picture_of_another_mode_or_crosswise_is_told(tmp_path):
     )
 
 
-def test_false_peaks_among_the_lowest_do_not_change_the_labels_of_the_others(tmp_path):
+def test_false_peaks_among_the_lowest_do_not_change_the_labels_of_the_others():
     """Three are no modes. One lies 4 % from a mode, and might be it of a plate that is 1 % unlike the board."""
-    (tmp_path / "planted.toml").write_text(CARD)
-    prepared = prepare(tmp_path / "planted.toml", may_lack_frequencies=True)
-    names = ["({},{})".format(*name) for name, _ in board().modes.names()[:8]]
-    truth = board().damped[:8]
-    planted = [(hz, 0.0, name) for hz, name in zip(truth, names, strict=True)]
+    prepared = planted()
+    names = ["({},{})".format(*name) for name, _ in board().modes.names()[:6]]
+    truth = board().damped[:6]
+    true = [(hz, 0.0, name) for hz, name in zip(truth, names, strict=True)]
     false = [(0.5 * truth[0], 0.1, ""), (1.04 * truth[0], 0.15, ""), (1.05 * truth[2], 0.2, "")]
-    every = sorted(planted + false)
+    every = sorted(true + false)
     likely = tuple(replace(PEAK, hz=hz, sd_hz=1e-3 * hz, spurious_probability=spurious) for hz, spurious, _ in every)
-    picked = heard(likely)
 
-    labels = label_peaks(prepared.card, prepared.prior, picked, None, {})
+    labels = label_peaks(prepared.card, prepared.prior, heard(likely), None, {})
 
-    right = [labels.probabilities[i].get(name, 0.0) > 0.95 for i, (_, _, name) in enumerate(every) if name]
-    assert all(right)
+    for found, (_, _, name) in zip(labels.probabilities, every, strict=True):
+        assert not name or found.get(name, 0.0) > 0.95, name
 
 
 HAMMERS = ((0.03, 0.02), (0.29, 0.02), (0.145, 0.19), (0.43, 0.1))
@@ -108,10 +111,9 @@ def hit_at(given: tuple[tuple[float, float], ...]) -> Picked:
     return Picked(tuple(replace(PEAK, hz=one, sd_hz=1e-3 * one) for one in hz), answers, spectra, (), 20.0, 500.0)
 
 
-def test_places_that_contradict_every_label_say_nothing_and_are_asked_about(tmp_path):
+def test_places_that_contradict_every_label_say_nothing_and_are_asked_about():
     """Grain along either side makes two plates of nearly these peaks, and a wrong order may name the other."""
-    (tmp_path / "planted.toml").write_text(CARD.replace("poisson_xy = 0.4", 'prior = "spruce"'))
-    prepared = prepare(tmp_path / "planted.toml", may_lack_frequencies=True)
+    prepared = planted('prior = "spruce"')
     names = ["({},{})".format(*name) for name, _ in board().modes.names()[:6]]
 
     right, wrong = (
@@ -135,16 +137,13 @@ ROW = PickedRow(
 
 
 def test_a_peak_that_fits_none_of_the_boards_modes_is_rather_no_mode_of_it():
-    """Though it is one by the recordings: a support rings too."""
+    """Though it is one by the recordings, which alone decide without a card: a support rings too."""
+    bare = replace(ROW, labels=(), unlabelled_probability=None)
     assert ROW.is_likely
     assert ROW.mode_probability == pytest.approx(0.9 * 0.4)
+    assert bare.mode_probability == pytest.approx(0.9)
     assert chances(ROW.may_be(2)) == "(1,2) 35 %, (3,0) 4 %, none 60 %"
     assert chances(replace(ROW, unlabelled_probability=0.05).may_be(1)) == "(1,2) 35 %"
-
-
-def test_without_a_card_the_recordings_alone_decide():
-    bare = replace(ROW, labels=(), unlabelled_probability=None)
-    assert bare.mode_probability == pytest.approx(0.9)
     assert chances(bare.may_be(2)) == "–"
 
 

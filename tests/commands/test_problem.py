@@ -249,6 +249,9 @@ def test_a_problem_a_card_and_a_board_give_the_same_draws_and_write_nothing(tmp_
     assert len({result.draws.theta.tobytes() for result in results}) == 1
     assert results[1].summary == results[2].summary
     assert results[1].summary.card_sha256 == Board.from_toml(card).sha256
+    other = bayesplate.fit(clamped, seed=4)
+    assert other.summary.seed == 4
+    assert other.draws.theta.tobytes() != results[0].draws.theta.tobytes()
 
 
 def test_what_a_problem_states_is_not_stated_again_and_a_diagnosis_wants_normal_noise(clamped):
