@@ -160,25 +160,6 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path, qu
     assert other.files["summary.json"] != with_shear.files["summary.json"]
 
 
-def test_a_folder_with_results_needs_force_and_force_leaves_no_stale_before(tmp_path, quick, with_shear, monkeypatch):
-    """What is computed besides is left out: known effects, and advice."""
-    monkeypatch.setattr("bayesplate.commands.diagnose.known_fits", lambda *_: ())
-    monkeypatch.setattr("bayesplate.commands.diagnose.advice", lambda *_: "")
-    folder = tmp_path / "out"
-    for name, content in with_shear.files.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(content)
-    (folder / "notes.txt").write_bytes(b"mine")
-    refused = diagnose(folder, CALM)
-    assert refused.exit_code == 3
-    assert refused.files == {**with_shear.files, "notes.txt": b"mine"}
-
-    forced = diagnose(folder, CALM, "--force", "--quiet")
-    assert forced.exit_code == 0
-    assert set(forced.files) == FIT | {"diagnosis.json", "notes.txt"}
-    assert not (folder / "before").exists()
-
-
 def test_three_modes_are_fitted_and_leave_nothing_to_judge_by(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         quickly(patch, page=True)

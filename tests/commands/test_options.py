@@ -5,13 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
 import bayesplate
 from bayesplate.board.shelf import shelf_folder
-from bayesplate.cli import main
 from bayesplate.commands.prepare import default_folder
-from bayesplate.results.contract import as_json
 
 
 @pytest.mark.parametrize(
@@ -48,24 +45,6 @@ def test_robust_noise_sets_one_wrong_reading_apart(finnish, tmp_path):
         octave = 1200.0 * (row.label == "(2,1)")
         assert abs(row.residual_cents - octave - before["residual_cents"]) < 40.0  # two sd of its own noise, 1.2 %
         assert abs(row.left_out_cents - octave - before["left_out_cents"]) < 80.0  # and a leverage of up to one half
-
-
-def test_nothing_is_written_unless_asked_for(tmp_path, monkeypatch, fiemme):
-    """The same draws as with files: writing and checkpoints change nothing."""
-    monkeypatch.chdir(tmp_path)
-    result = bayesplate.fit("fiemme-spruce-clamped")
-
-    assert result.folder is None
-    assert list(tmp_path.iterdir()) == []
-    assert as_json(result.summary) == as_json(fiemme.summary)
-
-
-def test_the_default_folder_is_results_and_the_name_of_the_board(quick_fit, monkeypatch, tmp_path, own_card):
-    monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(main, ["fit", str(own_card), "--no-report"])
-
-    assert result.exit_code == 0
-    assert (tmp_path / "results" / "fiemme-spruce-clamped" / "summary.json").is_file()
 
 
 def test_a_card_is_fitted_by_path_and_no_place_of_the_machine_is_told(quick_fit, own_card):

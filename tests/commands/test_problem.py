@@ -50,15 +50,14 @@ def near(problem: bayesplate.Problem, n: int) -> np.ndarray:
 
 
 def test_one_point_gives_what_many_give(problem):
-    theta = near(problem, 5)
+    theta = near(problem, 3)
     for name in ("log_prob", "log_prior", "log_likelihood", "predict"):
         method = getattr(problem, name)
         many = method(theta)
-        assert len(many) == 5
+        assert len(many) == 3
         assert np.isfinite(many).all()
         for row, at in zip(many, theta, strict=True):
-            np.testing.assert_allclose(method(at), row, rtol=1e-12)  # sums of one row and of five round differently
-            np.testing.assert_array_equal(method(at.tolist()), method(at))
+            np.testing.assert_allclose(method(at.tolist()), row, rtol=1e-12)  # sums of one row and of three round differently
     assert np.ndim(problem.log_prob(theta[0])) == 0
     assert problem.predict(theta[0]).shape == (len(problem.labels),)
     np.testing.assert_allclose(
@@ -96,6 +95,19 @@ def test_predict_and_the_likelihood_are_those_of_the_fit(clamped, fiemme):
     np.testing.assert_allclose(clamped.log_prob(flat), draws.log_posterior.ravel()[:50], rtol=1e-9)
     own = draws.log_likelihood.reshape(-1, 6)[:50].sum(axis=1)
     np.testing.assert_allclose(clamped.log_likelihood(flat), own, rtol=1e-12)
+
+
+def test_the_factors_of_the_prior_multiply_to_it(problem, fiemme):
+    """A board with exact inputs has two of them, one with uncertain ones three."""
+    group = fiemme.to_arviz().log_prior
+    held = {name: group[name].values.ravel() for name in group.data_vars}
+    at = points(problem, 3)
+    factors = problem.posed.posterior.log_prior_factors(at)
+
+    assert group["constants"].values.shape == fiemme.draws.theta.shape[:2]
+    assert (set(held), set(factors)) == ({"constants", "noise"}, {"constants", "noise", "inputs"})
+    np.testing.assert_allclose(sum(held.values()), fiemme.problem.log_prior(fiemme.draws.flat), rtol=1e-12)
+    np.testing.assert_allclose(sum(factors.values()), problem.log_prior(at), rtol=1e-12)
 
 
 def log_density_of(problem: bayesplate.Problem, u: np.ndarray) -> float:
@@ -153,13 +165,13 @@ def wide() -> bayesplate.Problem:
 
 
 def test_where_no_material_exists_the_likelihood_is_zero_and_nothing_is_not_a_number(wide):
-    theta = points(wide, 2000)
+    theta = points(wide, 500)
     values = wide.posed.parameters.values(theta)
     E_x = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"]).E_x
     none = np.isnan(E_x)
 
     assert np.isfinite(theta).all()
-    assert 20 < none.sum() < 1000
+    assert 5 < none.sum() < 250
     for method in (wide.log_likelihood, wide.log_prior, wide.log_prob):
         density = method(theta)
         assert not np.isnan(density).any()
@@ -205,6 +217,7 @@ def test_the_plates_are_solved_once_and_not_before_they_are_needed(monkeypatch):
     from bayesplate.commands import problem as module
 
     calls, pose = [], module.pose
+    monkeypatch.setattr("bayesplate.commands.check.signatures", lambda _: [])  # which take their time
     monkeypatch.setattr(module, "pose", lambda *given, **options: calls.append(1) or pose(*given, **options))
     one = bayesplate.Problem.from_card(BOARD)
     theta = one.prior_transform(np.full(one.n_dim, 0.5))
@@ -236,22 +249,26 @@ def test_a_setup_that_took_the_place_of_the_card_s_is_in_the_text_and_in_its_dig
 
 
 @pytest.mark.usefixtures("quickly")
-def test_a_problem_a_card_and_a_board_give_the_same_draws_and_write_nothing(tmp_path, monkeypatch, clamped):
+def test_a_problem_a_board_and_a_card_give_the_same_draws_and_write_where_they_are_told_alone(
+    tmp_path, monkeypatch, clamped
+):
+    """Writing and checkpoints change no draw; another seed does."""
     monkeypatch.chdir(tmp_path)
     board = clamped.board
     card = tmp_path / f"{BOARD}.toml"
     board.to_toml(card)
     before = files_in(tmp_path)
-    results = [bayesplate.fit(given, seed=3) for given in (clamped, board, card)]
+    results = [bayesplate.fit(given, seed=3) for given in (clamped, board)]
+    other = bayesplate.fit(clamped, seed=4)
 
     assert files_in(tmp_path) == before
-    assert [result.folder for result in results] == [None] * 3
+    assert [result.folder for result in results] == [None] * 2
+    results.append(bayesplate.fit(card, seed=3, out=tmp_path / "out", report=False))
     assert len({result.draws.theta.tobytes() for result in results}) == 1
+    assert other.draws.theta.tobytes() != results[0].draws.theta.tobytes()
+    assert (other.summary.seed, results[0].summary.seed) == (4, 3)
     assert results[1].summary == results[2].summary
     assert results[1].summary.card_sha256 == Board.from_toml(card).sha256
-    other = bayesplate.fit(clamped, seed=4)
-    assert other.summary.seed == 4
-    assert other.draws.theta.tobytes() != results[0].draws.theta.tobytes()
 
 
 def test_what_a_problem_states_is_not_stated_again_and_a_diagnosis_wants_normal_noise(clamped):

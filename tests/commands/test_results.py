@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 
-import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from read_pages import ALLOWED, Read
@@ -76,19 +75,3 @@ def test_a_figure_of_what_is_not_there_is_refused(results):
         with pytest.raises(bayesplate.InputError, match=r"names: wanted a list of one or more of E_x.* each once, got"):
             results["fit"].plot.corner(names)
     assert len(results["fit"].plot.corner(["E_x"]).axes) == 1
-
-
-def test_the_factors_of_the_prior_multiply_to_it(fiemme):
-    """A board with exact inputs has two of them, one with uncertain ones three."""
-    theta = fiemme.draws.theta
-    group = fiemme.to_arviz().log_prior
-
-    assert set(group.data_vars) == {"constants", "noise"}
-    total = group["constants"].values + group["noise"].values
-    np.testing.assert_allclose(total.ravel(), fiemme.problem.log_prior(fiemme.draws.flat), rtol=1e-12)
-    uncertain = bayesplate.Problem.from_card("spruce-free-2R")
-    at = uncertain.prior_transform(np.full((3, uncertain.n_dim), 0.4))
-    factors = uncertain.posed.posterior.log_prior_factors(at)
-    assert set(factors) == {"constants", "noise", "inputs"}
-    np.testing.assert_allclose(sum(factors.values()), uncertain.log_prior(at), rtol=1e-12)
-    assert group["constants"].values.shape == theta.shape[:2]
