@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,8 +15,10 @@ from runs import read_json
 
 from bayesplate.cli import main
 from bayesplate.commands.check import check
+from bayesplate.commands.diagnose import advice
 from bayesplate.commands.diagnose import diagnose as run_diagnose
 from bayesplate.diagnosis.joint import full_search
+from bayesplate.diagnosis.verdict import Answer, Verdict
 
 WITH_SHEAR = "paper-cantilever-fe"
 CALM = "fiemme-spruce-clamped"
@@ -216,3 +219,29 @@ def test_a_mode_that_alone_carries_a_constant_counts_in_no_error_of_a_diagnosis(
     assert abs(left_out[LABEL]) > 3.0 * rms  # it would show
     for row in told["known"]:
         assert row["leave_one_out_rms_cents"] < 1.5 * rms
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[list[tuple[str, ...]]]:
+    """Which rivals of the verdict the plan was asked to keep."""
+    kept: list[list[tuple[str, ...]]] = []
+    home = "bayesplate.commands.diagnose"
+    monkeypatch.setattr(f"{home}.wrong_reading", lambda _: "Read (1,1) again.")
+    monkeypatch.setattr(f"{home}.survivors", lambda _, rivals: kept.append(rivals) or ())
+    monkeypatch.setattr(f"{home}.believed", lambda *_: None)
+    monkeypatch.setattr(f"{home}.Planner", lambda *_: SimpleNamespace(ranked=tuple))
+    monkeypatch.setattr(f"{home}.first_of", lambda *_: "Measure more.")
+    return kept
+
+
+def test_a_wrong_reading_is_told_where_nothing_explains_the_readings_and_else_the_first_line_of_the_plan(asked):
+    """Alternatives of a verdict survive whatever their probability."""
+    rivals = Answer(("shear",), 1, 0.9), Answer(("mass",), 3, 0.0)
+    for word, stands_for, told in (
+        ("unexplained", (), "Read (1,1) again."),
+        ("none needed", (), "Measure more."),
+        ("undetectable", (), "Measure more."),
+        ("indistinguishable group", rivals, "Measure more."),
+    ):
+        assert advice(None, Verdict(word, (), 0, None, "", stands_for=stands_for), None, 1) == told
+    assert asked == [[], [], [("shear",), ("mass",)]]

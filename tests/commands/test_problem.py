@@ -57,7 +57,8 @@ def test_one_point_gives_what_many_give(problem):
         assert len(many) == 3
         assert np.isfinite(many).all()
         for row, at in zip(many, theta, strict=True):
-            np.testing.assert_allclose(method(at.tolist()), row, rtol=1e-12)  # sums of one row and of three round differently
+            # sums of one row and of three round differently
+            np.testing.assert_allclose(method(at.tolist()), row, rtol=1e-12)
     assert np.ndim(problem.log_prob(theta[0])) == 0
     assert problem.predict(theta[0]).shape == (len(problem.labels),)
     np.testing.assert_allclose(

@@ -46,32 +46,17 @@ def pip(*arguments: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
-def elsewhere(installed: Path, folder: Path, *arguments: str) -> str:
-    """Run Python in another folder, with the installed package before any other."""
-    environment = {**os.environ, "PYTHONPATH": str(installed)}
-    done = subprocess.run(
-        [sys.executable, *arguments], cwd=folder, env=environment, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
-def test_the_wheel_holds_the_package_its_cards_and_its_licence(wheel):
-    names = set(zipfile.ZipFile(wheel).namelist())
+def test_the_wheel_holds_nothing_else_than_the_package_its_cards_and_its_licence(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        content = {name: archive.read(name) for name in archive.namelist()}
+    roots = {name.partition("/")[0] for name in content}
     cards = {path.relative_to(ROOT).as_posix() for path in (ROOT / "models").rglob("*.toml")}
     modules = {path.relative_to(ROOT).as_posix() for path in (ROOT / "bayesplate").rglob("*.py")}
 
     assert len(cards) >= 12
     templates = {f"bayesplate/report/templates/report.{ending}" for ending in ("html", "css")}
-    assert {f"bayesplate/{card}" for card in cards} | modules | templates | {"bayesplate/py.typed"} <= names
-    assert any(name.endswith("dist-info/licenses/LICENSE") for name in names)
-
-
-def test_the_wheel_holds_nothing_else(wheel):
-    with zipfile.ZipFile(wheel) as archive:
-        roots = {name.partition("/")[0] for name in archive.namelist()}
-        content = {name: archive.read(name) for name in archive.namelist()}
-
+    assert {f"bayesplate/{card}" for card in cards} | modules | templates | {"bayesplate/py.typed"} <= set(content)
+    assert any(name.endswith("dist-info/licenses/LICENSE") for name in content)
     assert len(roots) == 2
     assert {root.endswith(".dist-info") or root == "bayesplate" for root in roots} == {True}
     assert [name for name in content if name.endswith(EXECUTES_DATA) or "test" in name] == []
@@ -79,11 +64,21 @@ def test_the_wheel_holds_nothing_else(wheel):
     assert [name for name, data in content.items() if any(trace in data for trace in traces)] == []
 
 
+PROGRAM = """
+from bayesplate.board.shelf import shelf_folder
+from bayesplate.cli import main
+print(shelf_folder("boards"))
+main(["check", "finnish-spruce-cantilever", "--json"])
+"""
+
+
 def test_the_installed_command_checks_a_board_of_its_own_shelf(installed, tmp_path):
     """That of the wheel, not of the checkout that this environment may know too."""
-    program = "from bayesplate.board.shelf import shelf_folder; print(shelf_folder('boards'))"
-    shelf = elsewhere(installed, tmp_path, "-c", program).strip()
-    printed = elsewhere(installed, tmp_path, "-m", "bayesplate", "check", "finnish-spruce-cantilever", "--json")
+    environment = {**os.environ, "PYTHONPATH": str(installed)}
+    program = [sys.executable, "-c", PROGRAM]
+    done = subprocess.run(program, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    shelf, _, printed = done.stdout.partition("\n")
 
     assert Path(shelf) == installed / "bayesplate" / "models" / "boards"
     assert read_json(printed) == as_json(bayesplate.check("finnish-spruce-cantilever"))
