@@ -7,7 +7,6 @@ import errno
 import io
 import os
 import pickle
-import re
 import shutil
 import signal
 import subprocess
@@ -32,8 +31,7 @@ from bayesplate.board.prior import load_prior
 from bayesplate.cli import main
 from bayesplate.commands.batch import default_batch_folder
 from bayesplate.commands.batch_boards import boards_of
-from bayesplate.commands.workers import WorkerDied, computed, processes
-from bayesplate.errors import BatchError, CheckpointError, InputError
+from bayesplate.errors import BatchError, InputError
 from bayesplate.results.contract import json_text
 
 WHY = "correct their cards or rows: --resume then fits these alone"
@@ -67,24 +65,24 @@ def one(cards, tmp_path_factory):
     return CliRunner().invoke(main, ["batch", str(cards), "--out", str(out), *options]), out
 
 
-def test_what_is_no_board_card_is_left_aside(cards, tmp_path):
+def test_what_is_no_board_card_is_left_aside(tmp_path):
     """A prior card, and what `pick` writes; a card that lacks its plate is a bad card, not another kind."""
-    folder = shutil.copytree(cards, tmp_path / "tops")
-    (folder / "setup.toml").write_text('[setup.frequencies_hz]\n"(1,1)" = 50.0\n')
-    (folder / "unfinished.toml").write_text('format = 1\nname = "unfinished"\n[setup]\n')
-    boards, aside = boards_of(folder, None)
+    (tmp_path / "own-prior.toml").write_text(load_prior("spruce").to_toml().replace('"spruce"', '"own-prior"'))
+    (tmp_path / "setup.toml").write_text('[setup.frequencies_hz]\n"(1,1)" = 50.0\n')
+    (tmp_path / "unfinished.toml").write_text('format = 1\nname = "unfinished"\n[setup]\n')
+    boards, aside = boards_of(tmp_path, None)
 
-    assert set(aside) == {"own-prior.toml", "setup.toml"}
-    assert "unfinished" in [board.name for board in boards]
+    assert aside == ("own-prior.toml", "setup.toml")
+    assert [board.name for board in boards] == ["unfinished"]
 
 
-def test_a_folder_that_cannot_be_read_is_refused(cards, monkeypatch):
+def test_a_folder_that_cannot_be_read_is_refused(tmp_path, monkeypatch):
     def denied(path):
         raise PermissionError(errno.EACCES, "Permission denied")
 
     monkeypatch.setattr(os, "listdir", denied)
-    with pytest.raises(InputError, match=f"{cards}: wanted a readable folder, got Permission denied"):
-        boards_of(cards, None)
+    with pytest.raises(InputError, match=f"{tmp_path}: wanted a readable folder, got Permission denied"):
+        boards_of(tmp_path, None)
 
 
 @pytest.mark.skipif(not hasattr(os, "symlink"), reason="needs links")
@@ -148,33 +146,49 @@ def test_the_same_bytes_for_one_worker_and_two_and_a_bad_card_stops_nothing(two,
         two.require_all()
 
 
-def test_a_board_has_its_seed_from_its_card_and_only_changed_cards_are_fitted_again(cards, two, tmp_path, monkeypatch):
+@pytest.fixture
+def answered(monkeypatch):
+    """Boards answered in this process, by a function of a call; returns the names of those that were asked for."""
+
+    def by(answer):
+        names = []
+
+        def computed_here(free, calls):
+            for key, (function, arguments) in calls:
+                future: Future[Any] = Future()
+                names.append(arguments[0].name)
+                try:
+                    future.set_result(answer(function, arguments))
+                except InputError as error:
+                    future.set_exception(error)
+                yield key, future
+
+        monkeypatch.setattr("bayesplate.commands.batch_run.computed", computed_here)
+        return names
+
+    return by
+
+
+def as_fitted(function, arguments):
+    """The answer of a fit that was none."""
+    return replace(SUMMARY, name=(name := arguments[0].name), doubts=("misread?",) * (name == "c"))
+
+
+def test_a_board_has_its_seed_from_its_card_and_only_changed_cards_are_fitted_again(cards, two, tmp_path, answered):
     out, again = shutil.copytree(two.folder, tmp_path / "out"), shutil.copytree(cards, tmp_path / "cards")
     (again / "a.toml").unlink()
     (again / "m.toml").write_text(card_text("m", 1.02), encoding="utf-8")
-    submitted = []
-    monkeypatch.setattr("bayesplate.commands.batch_run.computed", counted(submitted))
+    submitted = answered(as_fitted)
 
     result = bayesplate.batch(again, out, workers=1, resume=True, report=False)
 
     before, after = rows_of(two.table.read_bytes()), rows_of(result.table.read_bytes())
-    assert [call[1][0].name for call in submitted] == ["m"]
+    assert submitted == ["m"]
     assert set(after) == {"b", "m", "n"}
     assert {name: after[name] for name in "bn"} == {name: before[name] for name in "bn"}
     assert after["m"]["outcome"] == "fitted"
     assert len({row["seed"] for row in after.values() if row["seed"]}) == 2
     assert (out / "boards.jsonl").read_bytes().count(b"\n") == 3
-
-
-def counted(submitted: list[Any]):
-    """`computed` that notes what it is given."""
-
-    def compute(free, calls):
-        noted = list(calls)
-        submitted.extend(call for _, call in noted)
-        return computed(free, iter(noted))
-
-    return compute
 
 
 def processes_of(session: int) -> list[int]:
@@ -236,32 +250,27 @@ def test_a_cluster_of_two_processes_gives_the_same_bytes(cards, two, tmp_path):
     assert result.table.read_bytes() == two.table.read_bytes()
 
 
-def test_a_worker_that_dies_takes_no_other_board_with_it():
-    calls = [(0, (abs, (-1,))), (1, (os._exit, (1,))), (2, (abs, (-3,))), (3, (int, ("x",)))]
-    with processes(2) as free:
-        found = dict(computed(free, iter(calls)))
-
-    assert found[0].result() == 1
-    assert isinstance(found[1].exception(), WorkerDied)
-    assert found[2].result() == 3
-    assert isinstance(found[3].exception(), ValueError)
-
-
 SCRIPT = """
+import os
 from bayesplate.commands.workers import computed, processes
+calls = [(0, (abs, (-1,))), (1, (os._exit, (1,))), (2, (abs, (-3,))), (3, (int, ("x",)))]
 with processes(2) as free:
-    print([future.result() for _, future in computed(free, [(0, (abs, (-1,)))])])
+    found = dict(computed(free, iter(calls)))
+print(found[0].result(), repr(found[1].exception()), found[2].result(), repr(found[3].exception()))
 """
 
 
-def test_workers_do_not_run_the_script_that_started_them(tmp_path):
-    """Without a guard it would begin the batch again in each."""
+def test_a_worker_that_dies_takes_no_other_board_with_it_and_none_runs_the_script_that_started_it(tmp_path):
+    """Without a guard the script would begin the batch again in each."""
     (tmp_path / "script.py").write_text(SCRIPT, encoding="utf-8")
     program = [sys.executable, "script.py"]
     source = {"cwd": tmp_path, "env": {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}}
     done = subprocess.run(program, capture_output=True, text=True, check=False, **source)
 
-    assert (done.stdout, done.stderr) == ("[1]\n", "")
+    assert done.stderr == ""
+    (said,) = done.stdout.splitlines()
+    died, failed = "WorkerDied('the worker ended without an answer: killed", "ValueError("
+    assert [said.startswith(f"1 {died}"), f" 3 {failed}" in said] == [True, True]
 
 
 TABLE = """name,thickness_mm,mass_g,mass_g sd,"(0,0)","(0,1)","(1,0)","(1,1)","clamped (0,2)"
@@ -327,33 +336,22 @@ def test_a_table_in_parquet_says_the_same(table, tmp_path):
     assert len(texts[0]) == 2
 
 
-def computed_here(workers, calls):
-    """`computed` without a worker."""
-    for key, call in calls:
-        future: Future[Any] = Future()
-        try:
-            future.set_result(call[0](*call[1]))
-        except InputError as error:
-            future.set_exception(error)
-        yield key, future
-
-
-def test_names_of_boards_leave_no_folder_and_are_cells_that_no_sheet_executes(table, tmp_path, monkeypatch):
-    """Nothing is computed here: what the good rows give is another test's."""
-    monkeypatch.setattr("bayesplate.commands.batch_run.computed", lambda free, calls: (one for one in list(calls)[:0]))
+def test_names_of_boards_leave_no_folder_and_are_cells_that_no_sheet_executes(table, tmp_path, answered):
+    asked = answered(as_fitted)
     (tmp_path / "tops.csv").write_text("\n".join(TABLE.splitlines()[:1] + TABLE.splitlines()[3:]))
     result = bayesplate.batch(table, tmp_path / "deep" / "out", template=tmp_path / "template.toml", folders=True)
 
     rows = rows_of(result.table.read_bytes())
+    assert asked == []
     assert {row["outcome"] for row in rows.values()} == {"refused"}
     assert set(rows) == {"'=cmd()", "../../evil", "twice", "Twice", "top-3"}
     assert {path.name for path in (tmp_path / "deep").iterdir()} == {"out"}
     assert not (result.folder / "boards").exists()
 
 
-def test_faults_of_rows_name_the_table_and_the_row_as_it_is_counted_there(table, tmp_path, monkeypatch):
+def test_faults_of_rows_name_the_table_and_the_row_as_it_is_counted_there(table, tmp_path, answered):
     """Lines without a word count but are no boards; so a fault of sizes, of a card that a row names, and of a name."""
-    monkeypatch.setattr("bayesplate.commands.batch_run.computed", computed_here)
+    answered(lambda function, arguments: function(*arguments))
     header = 'name,thickness_mm,density_kg_m3,prior,"(0,0)","(0,1)","(1,0)",,'
     rows = [",,,,", header, "", "thick,3 mm,400,,57,100,130,,", ",,,,,,,,", "light,3,2,,57,100,130,,"]
     rows += ["prior,3,400,x.toml,57,100,130", "twice,3,400,,57,100,130", "", "Twice,3,400,,58,100,131"]
@@ -369,16 +367,9 @@ def test_faults_of_rows_name_the_table_and_the_row_as_it_is_counted_there(table,
     assert told["Twice"].startswith("tops.csv row 8 -> ")
 
 
-def test_doubts_of_a_fit_and_of_copied_rows_reach_the_table_and_the_summary_and_not_the_journal(table, monkeypatch):
+def test_doubts_of_a_fit_and_of_copied_rows_reach_the_table_and_the_summary_and_not_the_journal(table, answered):
     """A copy that is taken out leaves no doubt behind when the run is continued."""
-
-    def made(workers, calls):
-        for key, call in calls:
-            future: Future[Any] = Future()
-            future.set_result(replace(SUMMARY, name=(name := call[1][0].name), doubts=("misread?",) * (name == "c")))
-            yield key, future
-
-    monkeypatch.setattr("bayesplate.commands.batch_run.computed", made)
+    answered(as_fitted)
     header, *rows = 'name,"(0,0)","(0,1)","(1,0)"', "a,57,100,130", "b,57,100,130", "c,58,100,130"
     found = []
     for some, resume in ((rows, False), (rows[1:], True)):
@@ -386,9 +377,8 @@ def test_doubts_of_a_fit_and_of_copied_rows_reach_the_table_and_the_summary_and_
         template = table.parent / "template.toml"
         result = bayesplate.batch(table, table.parent / "out", template=template, report=False, resume=resume)
         doubts = {one.name: one.doubt for one in result.summary.doubts}
-        assert {
-            name: row["doubt"] for name, row in rows_of(result.table.read_bytes()).items() if row["doubt"]
-        } == doubts
+        in_table = {name: row["doubt"] for name, row in rows_of(result.table.read_bytes()).items()}
+        assert {name: doubt for name, doubt in in_table.items() if doubt} == doubts
         found.append(doubts)
 
     copied = "every reading is that of {} to the last digit: one board twice, or a copy?"
@@ -409,26 +399,3 @@ def test_a_table_whose_columns_are_no_keys_is_refused(table, tmp_path):
     assert "column 1: wanted a key of a board card, or the label of a mode" in str(refused.value)
     assert 'wanted a column with the names of the boards, got none (call it "name")' in str(refused.value)
     assert not (tmp_path / "out").exists()
-
-
-def test_what_cannot_be_a_batch_is_refused_and_nothing_is_written(cards, tmp_path):
-    out, empty = tmp_path / "out", tmp_path / "empty"
-    empty.mkdir()
-    table = tmp_path / "x.csv"
-    table.write_text("name\nx\n")
-    tabs = shutil.copy(table, tmp_path / "x.TSV")
-    for source, options, said in (
-        (empty, {}, r"wanted a folder with board cards \(NAME.toml\), got none in it"),
-        (tmp_path / "nowhere", {}, "wanted a folder of cards, or a table .*, got nothing there"),
-        (tmp_path / "nothere.csv", {"template": "x.toml"}, "wanted a folder of cards.*got nothing there .looked in"),
-        (tabs, {"template": "x.toml"}, "wanted a folder of cards.*got another file .save the table as CSV"),
-        (table, {}, "--template: wanted a card for the table"),
-        (cards, {"template": "x.toml"}, "--template: wanted a table of boards beside it, got a folder"),
-        (cards, {"workers": 0, "table": "xls"}, "(?s)workers: wanted.*table: wanted"),
-        (cards, {"grading": 3}, "a GradingRequest or None"),
-    ):
-        with pytest.raises(InputError, match=said):
-            bayesplate.batch(source, out, **options)
-    with pytest.raises(CheckpointError, match=re.escape("wanted the boards.jsonl of an earlier run, got none")):
-        bayesplate.batch(cards, out, resume=True)
-    assert not out.exists()

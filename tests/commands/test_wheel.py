@@ -68,7 +68,7 @@ PROGRAM = """
 from bayesplate.board.shelf import shelf_folder
 from bayesplate.cli import main
 print(shelf_folder("boards"))
-main(["check", "finnish-spruce-cantilever", "--json"])
+main(["check", "acrylic-panel", "--json"])
 """
 
 
@@ -81,6 +81,6 @@ def test_the_installed_command_checks_a_board_of_its_own_shelf(installed, tmp_pa
     shelf, _, printed = done.stdout.partition("\n")
 
     assert Path(shelf) == installed / "bayesplate" / "models" / "boards"
-    assert read_json(printed) == as_json(bayesplate.check("finnish-spruce-cantilever"))
+    assert read_json(printed) == as_json(bayesplate.check("acrylic-panel"))
     assert list(tmp_path.iterdir()) == []
     assert list((installed / "bin").glob("bayesplate*")) or list((installed / "Scripts").glob("bayesplate*"))
