@@ -126,22 +126,6 @@ def test_provenance_is_printed(cantilever):
     assert f"{before:.1f} -> {after:.1f} cents for modes left out of the fit" in shown.closing
 
 
-def test_input_is_refused_before_anything_is_sampled(tmp_path, monkeypatch):
-    def never(*_, **__):
-        raise AssertionError("sampled")
-
-    monkeypatch.setattr("bayesplate.commands.compare.infer", never)
-    (tmp_path / "compare.json").write_text("mine")
-    taken = CliRunner().invoke(main, ["compare", "fiemme-spruce-clamped", "--out", str(tmp_path)])
-    no_table = CliRunner().invoke(main, ["compare", "spruce-free-2R", "--coefficients", "published"])
-    unknown = CliRunner().invoke(main, ["compare", "spruce-free-2R", "--coefficients", "printed"])
-
-    assert (taken.exit_code, no_table.exit_code, unknown.exit_code) == (3, 3, 2)
-    assert "compare.json already there (--force replaces them" in taken.stderr
-    assert "published_coefficients: wanted the name of a table, got nothing" in no_table.stderr
-    assert runs.files_in(tmp_path) == {"compare.json": b"mine"}
-
-
 def test_all_methods_stand_on_the_labels_that_the_draws_leave(monkeypatch):
     """A label that was proposed for a peak and that the draws take back is in no method and no table."""
     board = prepare("fiemme-spruce-clamped").board

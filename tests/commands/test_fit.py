@@ -29,12 +29,10 @@ UNLABELLED_2R = [404.01, 543.70, 594.09, 671.20, 707.01, 850.00, 995.25]
 
 @pytest.fixture(scope="module")
 def summaries(fiemme: bayesplate.FitResult, finnish: Run, free: Run) -> dict[str, dict[str, Any]]:
-    return {"fiemme": read_json(_text(fiemme)), "finnish": finnish.summary, "free": free.summary}
-
-
-def _text(result: bayesplate.FitResult) -> str:
-    assert result.folder is not None
-    return (result.folder / "summary.json").read_text(encoding="utf-8")
+    assert fiemme.folder is not None
+    text = (fiemme.folder / "summary.json").read_text(encoding="utf-8")
+    assert text.endswith("}\n")
+    return {"fiemme": read_json(text), "finnish": finnish.summary, "free": free.summary}
 
 
 def test_every_quantity_has_its_unit_and_quantiles_in_order(summaries):
@@ -83,7 +81,6 @@ def test_the_summary_is_strict_json_that_names_what_was_run(fiemme, summaries):
     summary = summaries["fiemme"]
     card = Board.from_toml("fiemme-spruce-clamped")
 
-    assert _text(fiemme).endswith("}\n")
     assert summary == as_json(fiemme.summary)
     assert (summary["format"], summary["name"], summary["seed"]) == (1, "fiemme-spruce-clamped", 1)
     assert summary["card_sha256"] == card.sha256
@@ -165,42 +162,32 @@ def test_the_archive_opens_in_arviz_with_its_five_groups(archive, fiemme):
         assert archive[group].sizes["draw"] == posterior.sizes["draw"]
     for group in ("log_likelihood", "posterior_predictive"):
         assert archive[group]["frequency"].dims == ("chain", "draw", "reading")
+    predicted = archive["posterior_predictive"]["frequency"].values
+    np.testing.assert_array_equal(predicted, np.round(predicted))  # as the readings are
     observed = archive["observed_data"]["frequency"]
     assert dict(zip(observed["reading"].values.tolist(), observed.values.tolist(), strict=True)) == {
         f"clamped {label}": hertz for label, hertz in FIEMME_HZ.items()
     }
     assert posterior["noise"]["setup"].values.tolist() == ["clamped"]
-    assert list(archive["sample_stats"]["parameter"].values) == ["log_D_x", "log_D_y", "log_D_s", "log_noise[clamped]"]
-    assert {"lp", "tau", "rhat", "ess"} <= set(archive["sample_stats"].data_vars)
     for name, entry in fiemme.summary.elastic.items():
         assert float(posterior[name].mean()) == pytest.approx(entry.mean, rel=1e-12)
 
 
-def test_sample_stats_are_our_own(archive, summaries):
+def test_the_archive_holds_what_was_judged_and_everything_that_a_run_follows_from(archive, summaries):
     """ArviZ would take walkers of one ensemble for independent draws; what was judged stands beside the draws."""
-    stats, sampler = archive["sample_stats"], summaries["fiemme"]["sampler"]
+    stats, sampler, told = archive["sample_stats"], summaries["fiemme"]["sampler"], archive.attrs
+    file = shelf_folder("boards") / "fiemme-spruce-clamped.toml"
 
+    assert list(stats["parameter"].values) == ["log_D_x", "log_D_y", "log_D_s", "log_noise[clamped]"]
+    assert "lp" in stats.data_vars
     assert float(stats["tau"].max()) == sampler["tau_max"]
     assert float(stats["rhat"].max()) == sampler["rhat_max"]
     assert float(stats["ess"].min()) == sampler["ess_min"]
-
-
-def test_predictions_are_rounded_as_the_readings_are(archive):
-    values = archive["posterior_predictive"]["frequency"].values
-
-    np.testing.assert_array_equal(values, np.round(values))
-
-
-def test_the_attributes_hold_card_priors_versions_and_seed(archive, summaries):
-    card = Board.from_toml("fiemme-spruce-clamped")
-    file = shelf_folder("boards") / "fiemme-spruce-clamped.toml"
-
-    assert archive.attrs["card"] == file.read_text(encoding="utf-8")
-    assert archive.attrs["card_sha256"] == card.sha256
-    assert archive.attrs["seed"] == "1"
-    assert archive.attrs["prior"] == "weakly-informative"
-    assert read_json(archive.attrs["versions"]) == summaries["fiemme"]["versions"]
-    assert set(read_json(archive.attrs["priors"])) == set(load_prior("weakly-informative").constants)
+    assert told["card"] == file.read_text(encoding="utf-8")
+    assert told["card_sha256"] == Board.from_toml("fiemme-spruce-clamped").sha256
+    assert (told["seed"], told["prior"]) == ("1", "weakly-informative")
+    assert read_json(told["versions"]) == summaries["fiemme"]["versions"]
+    assert set(read_json(told["priors"])) == set(load_prior("weakly-informative").constants)
 
 
 def test_the_table_gives_every_mean_with_its_sd(finnish):
@@ -217,13 +204,9 @@ def test_the_table_gives_every_mean_with_its_sd(finnish):
     assert finnish.stdout.endswith(f"written to {finnish.folder}\n")
 
 
-def test_json_prints_the_summary_and_nothing_else(free):
-    assert free.exit_code == 0
+def test_only_the_results_are_left_and_json_is_the_summary(fiemme_files, finnish, free):
+    assert (free.exit_code, free.stderr) == (0, "")
     assert read_json(free.stdout) == free.summary
-    assert free.stderr == ""
-
-
-def test_only_the_results_are_left(fiemme_files, finnish, free):
     numbers = {"summary.json", "posterior.nc"}
     tables = {"constants.csv", "constants.tex"}
     figures = {name for name in fiemme_files if name.startswith("figures/")}

@@ -139,33 +139,27 @@ def test_a_run_that_did_not_converge_is_continued_where_more_steps_are_allowed(s
     assert stopped.files == results_of(fiemme_files)
 
 
-def test_a_damaged_checkpoint_is_refused_and_stays(stopped):
-    chains = stopped.folder / "checkpoint" / "linear" / CHAINS
+def test_neither_another_run_nor_a_damaged_checkpoint_is_continued_and_all_stays_as_it_is(stopped, own_card):
+    def refused(code: int, said: str, *options: str) -> None:
+        before = stopped.files
+        run = runs.fit(stopped.folder, str(own_card), *options)
+        lock = {name: data for name, data in run.files.items() if name == "checkpoint/linear/lock"}
+
+        assert run.exit_code == code, said
+        assert said in run.stderr
+        assert "--force" in run.stderr or code == 3
+        assert run.files == before | lock
+
+    text, chains = own_card.read_text(encoding="utf-8"), stopped.folder / "checkpoint" / "linear" / CHAINS
+    refused(6, "differs in its seed: wanted 2, got 1", "--resume", "--seed", "2")
+    refused(6, "wanted a saved run under the exact law, got none to resume", "--resume", "--exact")
+    own_card.write_text(text.replace('"(0,0)" = 57', '"(0,0)" = 58'), encoding="utf-8")
+    refused(6, "differs in its fingerprint", "--resume")
+    own_card.write_text(text.replace("= 600", "= -600"), encoding="utf-8")
+    refused(3, "length_x_mm: wanted a positive number", "--force")
+    own_card.write_text(text, encoding="utf-8")
     chains.write_bytes(chains.read_bytes()[:1000])
-    before = stopped.files
-    again = runs.fit(stopped.folder, BOARD, "--resume", "--quiet", "--no-report")
-
-    assert again.exit_code == 6
-    assert "got a damaged one; start anew with --force" in again.stderr
-    assert again.files == {**before, "checkpoint/linear/lock": again.files["checkpoint/linear/lock"]}
-
-
-def test_another_run_is_not_continued(stopped, own_card):
-    before, text = stopped.files, own_card.read_text(encoding="utf-8")
-    other = text.replace('"(0,0)" = 57', '"(0,0)" = 58')
-    assert other != text
-    for card, options, what in (
-        (other, (), "differs in its fingerprint"),
-        (text, ("--seed", "2"), "differs in its seed: wanted 2, got 1"),
-        (text, ("--exact",), "wanted a saved run under the exact law, got none to resume"),
-    ):
-        own_card.write_text(card, encoding="utf-8")
-        run = runs.fit(stopped.folder, str(own_card), "--resume", *options)
-
-        assert run.exit_code == 6
-        assert what in run.stderr
-        assert "--force" in run.stderr
-        assert run.files == {**before, "checkpoint/linear/lock": run.files["checkpoint/linear/lock"]}
+    refused(6, "got a damaged one; start anew with --force", "--resume")
 
 
 def test_force_replaces_the_results_the_report_and_the_checkpoint_and_nothing_else(stopped, quick_fit):
@@ -187,15 +181,6 @@ def test_force_replaces_the_results_the_report_and_the_checkpoint_and_nothing_el
     assert {name: run.files[name] for name in mine} == mine
     assert run.summary["converged"] is True
     assert run.files["posterior.nc"] != b"old"
-
-
-def test_force_of_a_refused_card_keeps_the_old_results(stopped, quick_fit, own_card):
-    before = stopped.files
-    own_card.write_text(own_card.read_text(encoding="utf-8").replace("= 600", "= -600"), encoding="utf-8")
-    run = quick_fit(str(own_card), "--force")
-
-    assert run.exit_code == 3
-    assert run.files == before
 
 
 def test_the_same_seed_gives_the_same_bytes_whatever_the_number_of_threads(tmp_path, fiemme_files):
