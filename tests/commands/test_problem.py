@@ -50,20 +50,16 @@ def near(problem: bayesplate.Problem, n: int) -> np.ndarray:
 
 
 def test_one_point_gives_what_many_give(problem):
-    theta = near(problem, 3)
+    theta, given = near(problem, 3), {}
     for name in ("log_prob", "log_prior", "log_likelihood", "predict"):
         method = getattr(problem, name)
-        many = method(theta)
-        assert len(many) == 3
-        assert np.isfinite(many).all()
-        for row, at in zip(many, theta, strict=True):
-            # sums of one row and of three round differently
-            np.testing.assert_allclose(method(at.tolist()), row, rtol=1e-12)
-    assert np.ndim(problem.log_prob(theta[0])) == 0
-    assert problem.predict(theta[0]).shape == (len(problem.labels),)
-    np.testing.assert_allclose(
-        problem.log_prob(theta), problem.log_prior(theta) + problem.log_likelihood(theta), rtol=1e-12
-    )
+        given[name] = method(theta)
+        ones = np.array([method(at.tolist()) for at in theta])
+        assert ones.shape == ((3, len(problem.labels)) if name == "predict" else (3,))
+        assert np.isfinite(ones).all()
+        np.testing.assert_allclose(ones, given[name], rtol=1e-12)  # sums of one row and of three round differently
+    assert np.ndim(problem.log_prior(theta[0])) == 0
+    np.testing.assert_allclose(given["log_prob"], given["log_prior"] + given["log_likelihood"], rtol=1e-12)
     u = np.full((3, problem.n_dim), 0.3)
     np.testing.assert_array_equal(problem.prior_transform(u)[1], problem.prior_transform(u[0]))
 
@@ -74,7 +70,6 @@ def test_the_columns_and_the_readings_are_those_of_the_archive(problem, clamped,
     made = fiemme.to_arviz()
     assert clamped.labels == tuple(made.observed_data["reading"].values)
     assert clamped.names == tuple(made.sample_stats["parameter"].values)
-    assert clamped.board.setups[0].labels == tuple(reading.label for reading in clamped.board.setups[0].readings)
 
 
 def test_what_sessions_share_is_among_the_columns(clamped):
@@ -196,22 +191,30 @@ def test_beyond_a_bound_the_density_is_zero(problem):
     assert np.isfinite(problem.log_prob(theta)).tolist() == [True, False]
 
 
-def test_points_of_another_shape_or_outside_the_cube_are_refused(clamped):
-    for theta, got in ((np.zeros((2, 5)), r"one of shape \(2, 5\)"), ("point", "str"), ([[1.0], [1.0, 2.0]], "list")):
-        said = rf"theta: wanted .* \(4,\) or \(n, 4\), columns log_D_x.* got {got}"
-        with pytest.raises(bayesplate.InputError, match=said):
-            clamped.log_prob(theta)
-    with pytest.raises(bayesplate.InputError, match=r"u: wanted numbers from 0 to 1, got 1\.5"):
-        clamped.prior_transform([0.5, 1.5, 0.5, 0.5])
-
-
-def test_a_campaign_is_no_board_and_a_problem_is_one_already(clamped):
+def test_what_is_no_point_or_no_problem_or_states_it_again_is_refused(clamped):
+    """A diagnosis wants normal noise, which its search assumes."""
     campaign = bayesplate.Campaign.from_card("spruce-half-tops")
-    for use in (bayesplate.Problem.from_card, bayesplate.modes, bayesplate.compare, bayesplate.cite):
-        with pytest.raises(bayesplate.InputError, match=r"card: wanted a board: .* got a Campaign \(its boards are"):
-            use(campaign)
-    with pytest.raises(bayesplate.InputError, match=r"card: wanted a board: .* got a Problem \(it is one: use it"):
-        bayesplate.Problem.from_card(clamped)
+    robust = bayesplate.Problem.from_card(BOARD, robust=True)
+    points = r"theta: wanted .* \(4,\) or \(n, 4\), columns log_D_x.* got "
+    no_board = r"card: wanted a board: .* got a Campaign \(its boards are"
+    for function, given, options, said in (
+        (clamped.log_prob, np.zeros((2, 5)), {}, rf"{points}one of shape \(2, 5\)"),
+        (clamped.log_prob, "point", {}, f"{points}str"),
+        (clamped.log_prob, [[1.0], [1.0, 2.0]], {}, f"{points}list"),
+        (clamped.prior_transform, [0.5, 1.5, 0.5, 0.5], {}, r"u: wanted numbers from 0 to 1, got 1\.5"),
+        (bayesplate.Problem.from_card, campaign, {}, no_board),
+        (bayesplate.modes, campaign, {}, no_board),
+        (bayesplate.compare, campaign, {}, no_board),
+        (bayesplate.cite, campaign, {}, no_board),
+        (bayesplate.Problem.from_card, clamped, {}, r"card: wanted a board: .* got a Problem \(it is one: use it"),
+        (bayesplate.fit, clamped, {"law": "exact"}, "law: wanted nothing beside a Problem"),
+        (bayesplate.fit, clamped, {"robust": True}, "robust: wanted nothing beside a Problem"),
+        (bayesplate.modes, clamped, {"effects": []}, "effects: wanted nothing beside a Problem"),
+        (bayesplate.cite, clamped, {"effects": []}, "effects: wanted nothing beside a Problem"),
+        (bayesplate.diagnose, robust, {}, "robust: wanted a problem with normal noise"),
+    ):
+        with pytest.raises(bayesplate.InputError, match=said):
+            function(given, **options)
 
 
 def test_the_plates_are_solved_once_and_not_before_they_are_needed(monkeypatch):
@@ -270,20 +273,6 @@ def test_a_problem_a_board_and_a_card_give_the_same_draws_and_write_where_they_a
     assert (other.summary.seed, results[0].summary.seed) == (4, 3)
     assert results[1].summary == results[2].summary
     assert results[1].summary.card_sha256 == Board.from_toml(card).sha256
-
-
-def test_what_a_problem_states_is_not_stated_again_and_a_diagnosis_wants_normal_noise(clamped):
-    stated = (
-        ("fit", {"law": "exact"}),
-        ("fit", {"robust": True}),
-        ("modes", {"effects": []}),
-        ("cite", {"effects": []}),
-    )
-    for function, given in stated:
-        with pytest.raises(bayesplate.InputError, match=f"{next(iter(given))}: wanted nothing beside a Problem"):
-            getattr(bayesplate, function)(clamped, **given)
-    with pytest.raises(bayesplate.InputError, match="robust: wanted a problem with normal noise"):
-        bayesplate.diagnose(bayesplate.Problem.from_card(BOARD, robust=True))
 
 
 def test_a_board_whose_effects_a_card_cannot_state_is_refused(problem):
