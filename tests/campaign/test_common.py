@@ -90,17 +90,17 @@ def test_boards_that_refuse_are_to_be_measured_again(refused, told):
 
 
 @pytest.mark.parametrize(
-    ("way", "board", "card"), [("own", "", "the campaign's card"), ("one board", "a", "the card of a")]
+    ("board", "where", "each"),
+    [("", "the campaign's card", ", for each board one of its own,"), ("a", "the card of a", ", and")],
 )
-def test_what_boards_have_of_their_own_is_to_be_declared(way, board, card):
-    best = Explanation(way, ("support_stiffness",), board, 0.0, 0.9)
-    step = next_step({}, None, 6, is_declared=False, verdict="unexplained", explanations=[best])
-
+def test_what_boards_have_of_their_own_is_to_be_declared(board, where, each):
+    best = Explanation("one board" if board else "own", ("support_stiffness",), board, 0.0, 0.9)
     nothing = Explanation("none", (), "", 0.0, 0.04)
-    assert next_step({}, None, 6, is_declared=False, verdict="unexplained", explanations=[nothing, best]) == step
+    step = next_step({}, None, 6, is_declared=False, verdict="unexplained", explanations=[nothing, best])
+
+    start = f"declare support stiffness on {where}, support_stiffness in its effects beside those that it has{each}"
+    assert step.startswith(start)
     assert next_step({}, None, 6, is_declared=False, verdict="none needed", explanations=[best]) == ""
-    assert step.startswith(f"declare support stiffness on {card}, support_stiffness in its effects beside")
-    assert ("for each board one of its own" in step) == (board == "")
 
 
 def test_pooled_errors_count_every_mode_once():
@@ -120,21 +120,11 @@ def pooled_of(**boards):
     return {key: tuple(one.boards) for key, one in common_residuals(summaries, there).items()}
 
 
-def test_a_mode_of_boards_that_are_held_otherwise_is_another_one():
-    """Their setups have the name that a card without one gets: (1,1) of a free plate is no mode of a clamped one."""
-    labels = ("(1,1)", "(2,1)")
-    found = pooled_of(a=read("free", labels), b=read("clamped", labels), c=read("free", labels[:1]))
+def test_a_mode_is_one_where_setups_have_one_name_and_are_held_alike_wherever_labels_begin():
+    """Setups have one name where a card gives none: (1,1) of a free plate is no mode of a clamped one."""
+    one, both, free = ("(1,1)",), ("(1,1)", "(2,1)"), read("free", ("(1,1)",))
+    from_one = read("free", ("(2,2)", "(3,2)"), first=(1, 1))
 
-    assert found == {"FFFF (1,1)": ("a", "c")}
-
-
-def test_a_mode_is_the_same_wherever_labels_begin():
-    found = pooled_of(a=read("free", ("(1,1)", "(2,2)")), b=read("free", ("(2,2)", "(3,3)"), first=(1, 1)))
-
-    assert found == {"(1,1)": ("a", "b"), "(2,2)": ("a", "b")}
-
-
-def test_setups_of_different_names_are_told_apart_by_them():
-    boards = {"a": read("free", ("(1,1)",)), "b": read("free", ("(1,1)",)), "c": read("free", ("(1,1)",), name="hung")}
-
-    assert pooled_of(**boards) == {"setup (1,1)": ("a", "b")}
+    assert pooled_of(a=read("free", both), b=read("clamped", both), c=free) == {"FFFF (1,1)": ("a", "c")}
+    assert pooled_of(a=read("free", both), b=from_one) == {"(1,1)": ("a", "b"), "(2,1)": ("a", "b")}
+    assert pooled_of(a=free, b=free, c=read("free", one, name="hung")) == {"setup (1,1)": ("a", "b")}

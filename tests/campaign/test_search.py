@@ -51,57 +51,42 @@ def board(name, peak, height=8.0, none=0.0):
     return Cells(name, none, mass={z: height - 4.0 * (z - peak) ** 2 for z in SIZES})
 
 
-def test_one_size_for_all_is_the_sum_over_sizes_of_the_product_over_boards():
-    boards = [board("a", 1.0), board("b", 1.0), board("c", 0.0)]
-    by_hand = np.log(np.sum([0.25 * np.exp(sum(one.effects["mass"][z] for one in boards)) for z in SIZES]))
+def test_one_size_for_all_is_summed_over_the_cells_that_all_boards_have():
+    boards = [board("a", 1.0), board("b", 1.0), Cells("c", 0.0, mass=dict.fromkeys(SIZES[1:3], 8.0))]
+    kept = [np.exp(sum(one.effects["mass"][z] for one in boards)) for z in SIZES[1:3]]
 
-    assert log_evidence_shared(boards, ("mass",)) == pytest.approx(by_hand)
-    fewer = [*boards, Cells("d", 0.0, mass=dict.fromkeys(SIZES[1:3], 8.0))]
-    kept = [np.exp(sum(one.effects["mass"][z] for one in fewer)) for z in SIZES[1:3]]
-    assert log_evidence_shared(fewer, ("mass",)) == pytest.approx(np.log(np.mean(kept)))
+    assert log_evidence_shared(boards, ("mass",)) == pytest.approx(np.log(np.mean(kept)))
 
 
-def test_the_evidence_of_one_size_for_all_is_the_sum_over_cells_of_the_product():
+def test_each_way_has_the_probability_of_its_prior_and_its_evidence():
+    """Of two boards and two effects, by hand: one size for all is the sum over cells of the product over boards."""
     one, other = (
         Cells("one", -1.0, a={0.0: 0.0, 1.0: 2.0}, b={0.0: 1.0}),
         Cells("other", -2.0, a={0.0: 0.5, 1.0: 1.0}, b={0.0: 0.0}),
     )
-    found = {
-        (each.way, "".join(each.effects), each.board): each for each in explanations([one, other], [("a",), ("b",)])
+    of_one, of_other = np.log(0.5 + 0.5 * np.exp(2.0)), np.log(0.5 * np.exp(0.5) + 0.5 * np.exp(1.0))
+    half_own = 0.5 * (PRIOR["own"] + PRIOR["shared and own"])  # no two effects are asked for
+    by_hand = {
+        ("none", (), ""): (PRIOR["none"], -3.0),
+        ("shared", ("a",), ""): (0.5 * PRIOR["shared"], np.log(0.5 * np.exp(0.5) + 0.5 * np.exp(3.0))),
+        ("shared", ("b",), ""): (0.5 * PRIOR["shared"], 1.0),
+        ("own", ("a",), ""): (half_own, of_one + of_other),
+        ("own", ("b",), ""): (half_own, 1.0),
+        ("one board", ("a",), "one"): (0.25 * PRIOR["one board"], of_one - 2.0),
+        ("one board", ("a",), "other"): (0.25 * PRIOR["one board"], of_other - 1.0),
+        ("one board", ("b",), "one"): (0.25 * PRIOR["one board"], 1.0 - 2.0),
+        ("one board", ("b",), "other"): (0.25 * PRIOR["one board"], 0.0 - 1.0),
     }
+    total = sum(prior * np.exp(log_evidence) for prior, log_evidence in by_hand.values())
+    found = explanations([one, other], [("a",), ("b",)])
 
-    assert found["shared", "a", ""].log_evidence == pytest.approx(np.log(0.5 * np.exp(0.5) + 0.5 * np.exp(3.0)))
-    assert found["own", "a", ""].log_evidence == pytest.approx(
-        np.log(0.5 + 0.5 * np.exp(2.0)) + np.log(0.5 * np.exp(0.5) + 0.5 * np.exp(1.0))
-    )
-    assert found["one board", "a", "one"].log_evidence == pytest.approx(np.log(0.5 + 0.5 * np.exp(2.0)) - 2.0)
-    assert found["none", "", ""].log_evidence == pytest.approx(-3.0)
-    assert sum(each.probability for each in found.values()) == pytest.approx(1.0)
-    ratio = found["shared", "b", ""].probability / found["none", "", ""].probability
-    assert ratio == pytest.approx(0.5 * PRIOR["shared"] / PRIOR["none"] * np.exp(4.0))
-    own, none = found["own", "b", ""], found["none", "", ""]
-    before = 0.5 * (PRIOR["own"] + PRIOR["shared and own"])  # no two effects are asked for
-    assert own.probability / none.probability == pytest.approx(
-        before / PRIOR["none"] * np.exp(own.log_evidence - none.log_evidence)
-    )
+    assert len(found) == len(by_hand)
+    for each in found:
+        prior, log_evidence = by_hand[each.way, each.effects, each.board]
+        assert each.log_evidence == pytest.approx(log_evidence), each
+        assert each.probability == pytest.approx(prior * np.exp(log_evidence) / total), each
+    assert [each.probability for each in found] == sorted((each.probability for each in found), reverse=True)
     assert sum(PRIOR.values()) == pytest.approx(1.0)
-
-
-def test_boards_that_agree_share_and_boards_that_differ_do_not():
-    agreeing = explanations([board(name, 1.0) for name in "abc"], [("mass",)])
-    differing = explanations(
-        [board(name, peak) for name, peak in zip("abc", (-1.0, 0.0, 2.0), strict=True)], [("mass",)]
-    )
-    one = explanations([board("a", 1.0), *(board(name, 0.0, height=-6.0) for name in "bc")], [("mass",)])
-
-    assert (agreeing[0].way, agreeing[0].effects) == ("shared", ("mass",))
-    assert differing[0].way == "own"
-    assert (one[0].way, one[0].board) == ("one board", "a")
-    for found in (agreeing, differing, one):
-        assert sum(each.probability for each in found) == pytest.approx(1.0)
-        assert len(found) == 6
-    assert named(agreeing)[:2] == ("named", ("mass",))
-    assert named(differing)[0] == named(one)[0] == "unexplained"
 
 
 def test_two_effects_alike_take_their_share_of_what_is_shared():
@@ -166,9 +151,9 @@ def test_what_a_search_allows_to_say(found, verdict, effects):
 
 
 def test_what_may_be_as_probable_as_something_that_is_not_shared_is_told():
-    found = [("own", 0.5, "b"), ("shared and own", 0.4, "a", "b"), ("none", 0.01)]
+    found = [explanation("own", 0.5, "b"), explanation("shared and own", 0.4, "a", "b"), explanation("none", 0.01)]
 
-    assert named([explanation(*one) for one in found])[2] == (
+    assert named(found)[2] == (
         "the most probable is b of another size on each board, which the boards do not share; a alike on all boards "
         "beside b of another size on each may be as probable"
     )
