@@ -7,12 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_campaigns import write_campaign
 
 import bayesplate
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
-from bayesplate.campaign.boards import Member
 from bayesplate.campaign.pulls import Pull
 from bayesplate.campaign.shared import Shared
 from bayesplate.commands.check import expected_sds
@@ -58,73 +56,82 @@ def test_the_prior_card_of_an_earlier_run_goes_with_its_other_results(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {"summary.json", "mine.toml"}
 
 
-def test_what_cannot_be_shared_is_refused_board_by_board(tmp_path):
-    path = write_campaign(tmp_path)
-    text = path.read_text()
-    path.write_text(text.replace('"attached_mass"', '"attached_mass"\nas = "ratio"'))
-    with pytest.raises(InputError, match="only transverse_shear has ratios"):
-        bayesplate.Campaign.from_card(path)
-    path.write_text(text)
-    board = tmp_path / "board-1.toml"
-    board.write_text(board.read_text().replace('kind = "accelerometer"', 'kind = "accelerometer"\nmass_g = 3'))
-    with pytest.raises(InputError, match=r"\[\[shared\]\] 1 \"attached_mass\", board board-1: .*mass known for sure"):
-        bayesplate.Campaign.from_card(path)
-    board.write_text(board.read_text().replace("mass_g = 3", "mass_g = { mean = 3, sd = 1 }"))
-    with pytest.raises(InputError, match="one prior, because it is one number, got 2 different ones of mass"):
-        bayesplate.Campaign.from_card(path)
+SENSOR, SHARED, HEAD = 'kind = "accelerometer"', 'effect = "attached_mass"', "\n[[shared]]"
 
 
-def test_a_board_and_its_copy_do_not_count_as_two(tmp_path):
-    path = write_campaign(tmp_path)
+def changed(card, folder, old, new, *names):
+    """The card of the campaign and its boards, with other words in those of some names."""
+    for path in card.parent.glob("*.toml"):
+        text = path.read_text()
+        (folder / path.name).write_text(text.replace(old, new) if path.stem in names else text)
+    return folder / card.name
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "told"),
+    [
+        ("together", SHARED, f'{SHARED}\nas = "ratio"', "only transverse_shear has ratios"),
+        (
+            "board-1",
+            SENSOR,
+            f"{SENSOR}\nmass_g = 3",
+            r'\[\[shared\]\] 1 "attached_mass", board board-1: .*known for sure',
+        ),
+        ("board-1", SENSOR, f"{SENSOR}\nmass_g = {{ mean = 3, sd = 1 }}", "one number, got 2 different ones of mass"),
+        (
+            "together",
+            SHARED,
+            'effect = "density_gradient"\nscatter_percent = 20',
+            "scatter_percent: wanted a positive number.*got .* whose prior is normal",
+        ),
+        (
+            "together",
+            HEAD,
+            f'\neffects = ["clamp_rotation"]{HEAD}',
+            "together.toml boards 1 -> board-0.toml .*clamp_rot",
+        ),
+    ],
+)
+def test_what_cannot_be_shared_is_refused_with_its_place(card, tmp_path, name, old, new, told):
+    with pytest.raises(InputError, match=told):
+        bayesplate.Campaign.from_card(changed(card, tmp_path, old, new, name))
+
+
+def test_a_board_and_its_copy_do_not_count_as_two(card, tmp_path):
+    path = changed(card, tmp_path, "board-2.toml", "other.toml", "together")
     copy = (tmp_path / "board-0.toml").read_text().replace('"board-0"', '"other"').replace("format = 1", "format = 1\n")
     (tmp_path / "other.toml").write_text(copy)
-    path.write_text(path.read_text().replace('"./board-2.toml"', '"./other.toml"'))
     with pytest.raises(InputError, match="boards: wanted each board once, got other with every reading of board-0"):
         bayesplate.Campaign.from_card(path)
 
 
-def test_effects_of_the_campaign_are_declared_on_every_board_as_its_own(tmp_path):
-    path = write_campaign(tmp_path)
-    text = path.read_text()
-    path.write_text(text.replace("\n[[shared]]", '\neffects = ["support_stiffness"]\n[[shared]]', 1))
-    own = bayesplate.Campaign.from_card(path)
-    assert [one.prepared.board.effects for one in own.problems] == [("support_stiffness", "attached_mass")] * len(
-        own.problems
-    )
-    assert {one.effect for one in own.shared} == {"attached_mass"}
-    replaced = bayesplate.Campaign.from_card(path, effects=("fluid_loading",))
-    assert {one.prepared.board.effects for one in replaced.problems} == {("fluid_loading", "attached_mass")}
-    path.write_text(text.replace("\n[[shared]]", '\neffects = ["clamp_rotation"]\n[[shared]]', 1))
-    with pytest.raises(InputError, match=r"together.toml boards 1 -> board-0.toml .*clamp_rotation"):
-        bayesplate.Campaign.from_card(path)
-
-
-def test_faults_of_several_boards_come_at_once(tmp_path):
-    path = write_campaign(tmp_path)
-    for i in (0, 2):
-        board = tmp_path / f"board-{i}.toml"
-        board.write_text(board.read_text().replace("length_x_mm", "lenght_x_mm"))
+def test_faults_of_several_boards_come_at_once(card, tmp_path):
     with pytest.raises(InputError) as refused:
-        bayesplate.fit(path)
+        bayesplate.fit(changed(card, tmp_path, "length_x_mm", "lenght_x_mm", "board-0", "board-2"))
 
     places = [fault.place for fault in refused.value.faults]
-    assert sum(place.startswith("together.toml boards 1 -> board-0.toml") for place in places) == 2
-    assert sum(place.startswith("together.toml boards 3 -> board-2.toml") for place in places) == 2
+    for start in ("together.toml boards 1 -> board-0.toml", "together.toml boards 3 -> board-2.toml"):
+        assert sum(place.startswith(start) for place in places) == 2
+
+
+def test_effects_of_the_campaign_are_declared_on_every_board_as_its_own(card, tmp_path):
+    path = changed(card, tmp_path, HEAD, f'\neffects = ["support_stiffness"]{HEAD}', "together")
+    own = bayesplate.Campaign.from_card(path)
+    replaced = bayesplate.Campaign.from_card(path, effects=("fluid_loading",))
+
+    for found, effect in ((own, "support_stiffness"), (replaced, "fluid_loading")):
+        assert [one.prepared.board.effects for one in found.problems] == [(effect, "attached_mass")] * 3
+        assert {one.effect for one in found.shared} == {"attached_mass"}
+
+
+def test_numbers_of_boards_may_scatter(card, tmp_path):
+    path = changed(card, tmp_path, SHARED, f"{SHARED}\nscatter_percent = 20", "together")
+    assert [one.scatter for one in bayesplate.Campaign.from_card(path).shared] == [0.2]
 
 
 def test_a_campaign_takes_nothing_beside_it(campaign):
     with pytest.raises(InputError, match="nothing beside a Campaign"):
         bayesplate.fit(campaign, effects=[])
-
-
-def test_a_number_that_could_be_negative_does_not_scatter(tmp_path):
-    path = write_campaign(tmp_path)
-    text = path.read_text().replace('"attached_mass"', '"attached_mass"\nscatter_percent = 20')
-    path.write_text(text)
-    assert [one.scatter for one in bayesplate.Campaign.from_card(path).shared] == [0.2]
-    path.write_text(text.replace("attached_mass", "density_gradient"))
-    with pytest.raises(InputError, match=r"scatter_percent: wanted a positive number.*got .* whose prior is normal"):
-        bayesplate.Campaign.from_card(path)
 
 
 def test_check_says_what_the_boards_would_share(campaign):
@@ -149,10 +156,8 @@ def test_the_sd_to_expect_is_over_that_of_the_prior(lower, sd_before):
     assert expected_sds(shared, [Pull(np.zeros((1, 1)), np.zeros(1))]) == pytest.approx([1.0])
 
 
-def test_members_of_a_ratio_have_the_campaign_s_prior(fitted_campaign):
-    """Where a value is shared nothing is weighted."""
+def test_where_a_value_is_shared_no_draw_is_weighted(fitted_campaign):
     for member in fitted_campaign.learnt.members:
-        assert isinstance(member, Member)
         assert np.array_equal(member.alone.log_weights, np.zeros(len(member.alone.z)))
 
 
