@@ -14,7 +14,7 @@ from bayesplate.board.reading import Peak
 from bayesplate.campaign.scatter import expected_width
 from bayesplate.planning.bench import bands, benches
 from bayesplate.planning.proposals import Costs, Planner
-from bayesplate.planning.together import _linear, beliefs_together
+from bayesplate.planning.together import _judged, _linear, beliefs_together
 
 SHARED = "attached_mass.mass"
 
@@ -69,32 +69,38 @@ def listed(posed, planner):
     return planner.ranked(*posed[1:])
 
 
+def judged(posed, planner, **other):
+    """What the first board says where it has other readings or shares something else, its plate as it was solved."""
+    known, noise = planner.beliefs.boards[0], planner.beliefs.explanations[0].noise[0, :1]
+    given = {"board": known.board, "shared": posed[2], "laws": known.laws[:1]} | other
+    return _judged(given["board"], posed[1][0], given["shared"], known.values, noise, given["laws"])
+
+
 def test_a_board_whose_number_scatters_says_less_of_the_middle(posed, planner):
     """Its precision and the variance of the scatter, joined as of a sum; not where nothing scatters."""
-    (board, *_), (prior, *_), shared = posed
     alone = planner.beliefs.boards[0].pull
-    scattering = tuple(replace(one, scatter=0.5) for one in shared)
-    scattered = _linear(board, prior, scattering).known.pull
+    scattering = tuple(replace(one, scatter=0.5) for one in posed[2])
+    scattered = judged(posed, planner, shared=scattering).known.pull
     width = expected_width(scattering)
 
     assert scattered == pytest.approx(np.linalg.inv(np.linalg.inv(alone) + np.diag(width**2)))
     assert scattered[0, 0] < 0.9 * alone[0, 0]
 
 
-def test_a_reading_counts_with_the_uncertainty_that_it_was_stated_with(posed):
+def test_a_reading_counts_with_the_uncertainty_that_it_was_stated_with(posed, planner):
     """In the precision of the board: by hand, a row with its own variance in place of the noise alone."""
-    (board, *_), (prior, *_), shared = posed
-    (setup,) = board.setups
+    (board, *_), _, shared = posed
+    (setup,), law = board.setups, planner.beliefs.boards[0].laws[0]
     first = setup.readings[0]
     rough = replace(first, frequency=Quantity.from_mean(first.frequency.mean, 0.03 * first.frequency.mean))
-    made = replace(board, setups=(replace(setup, readings=(rough, *setup.readings[1:])),))
-    known, noise, precision = _linear(made, prior, shared)
+    read = replace(setup, readings=(rough, *setup.readings[1:]))
+    laws = (replace(law, station=replace(law.station, base=read)),)
+    known, noise, precision = judged(posed, planner, board=replace(board, setups=(read,)), laws=laws)
 
-    (law,) = known.laws
     rows = law.slopes[0, : law.station.n_old] @ known.columns
     variance = np.full(len(rows), noise[0] ** 2)
     variance[0] += np.log1p(0.03**2)
-    n = made.symmetry.n
+    n = board.symmetry.n
     own = np.diag([*np.zeros(n), *np.ones(len(precision) - n - len(shared)), *np.zeros(len(shared))])
     assert precision == pytest.approx(own + rows.T @ (rows / variance[:, None]), rel=1e-3)
 
