@@ -55,23 +55,15 @@ def test_an_isotropic_board_has_one_constant_to_tell_of():
     assert air_sentence(board, estimate) == ""
 
 
-def test_the_sentence_says_by_how_much_and_what_to_add():
+def test_the_sentence_says_by_how_much_and_what_to_add_but_for_lines_that_the_card_has():
+    """By `effects = []` what a card states is not declared: a fit without it is meant."""
     board, estimate = in_air(HALF_TOP, BEAMS["half-top"])
     E_x, E_y, G_xy = (f"{100.0 * one:+.1f} %" for one in rise_with_air(board, estimate))
     told = air_sentence(board, estimate)
     assert f"E_x {E_x}, E_y {E_y}, G_xy {G_xy}" in told
     assert told.endswith('add to [setup.fluid] the lines density_kg_m3 = 1.2 and baffle = "none"')
-
-
-def test_lines_that_the_card_has_are_not_asked_for_again():
-    """By `effects = []` what a card states is not declared: a fit without it is meant."""
-    board, estimate = in_air(HALF_TOP, BEAMS["half-top"])
-    stated = [replace(setup, fluid=DeclaredFluid(1.2, "none")) for setup in board.setups]
-    told = air_sentence(replace(board, setups=tuple(stated), effects=()), estimate)
+    stated = tuple(replace(setup, fluid=DeclaredFluid(1.2, "none")) for setup in board.setups)
+    told = air_sentence(replace(board, setups=stated, effects=()), estimate)
     assert told.endswith("--effects fluid_loading, or its name among the effects of the card, puts it in")
     assert "add to" not in told
-
-
-def test_nothing_is_said_where_a_fluid_is_declared():
-    board, estimate = in_air(HALF_TOP, BEAMS["half-top"])
     assert air_sentence(declare(replace(board, effects=("fluid_loading",))), estimate) == ""

@@ -1,4 +1,4 @@
-"""The journal of many boards: what a killed run leaves of it is used as far as it is sound."""
+"""Rows of many boards: their copies, and their journal, of which a killed run leaves what is used as far as sound."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from made_summaries import SUMMARY
 
-from bayesplate.grading.boards import NUMBERS, WORDS, BoardRow, row_of
+from bayesplate.grading.boards import NUMBERS, WORDS, BoardRow, row_of, with_copies_in_doubt
 from bayesplate.grading.storage import Journal, write_table
 
 ROW, REFUSED = (
@@ -16,27 +16,32 @@ ROW, REFUSED = (
 )
 
 
-def test_rows_come_back_to_the_last_bit(tmp_path):
-    journal = Journal(tmp_path / "boards.jsonl")
-    journal.append("one", ROW)
-    journal.append("two", REFUSED)
-    again = Journal(tmp_path / "boards.jsonl")
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "boards.jsonl"
 
-    assert again.rows == journal.rows == {"one": ROW, "two": REFUSED}
+
+def written(path, **rows):
+    """The bytes of a journal with some rows, which are there when it is opened again."""
+    journal = Journal(path)
+    for key, row in rows.items():
+        journal.append(key, row)
+    journal.close()
+    again = Journal(path)
+    assert again.rows == journal.rows == rows
+    again.close()
+    return path.read_bytes()
+
+
+def test_rows_come_back_to_the_last_bit(path):
+    written(path, one=ROW, two=REFUSED)
     assert ROW.doubt == "misread?; scatter"
     assert len(ROW.cells()) == len(WORDS) + len(NUMBERS) == len(REFUSED.cells())
-    journal.close()
-    again.close()
 
 
-@pytest.mark.parametrize("cut", [1, 7, 100])
-def test_a_line_that_is_half_written_is_cut_off_and_written_anew(tmp_path, cut):
-    path = tmp_path / "boards.jsonl"
-    journal = Journal(path)
-    journal.append("one", ROW)
-    journal.append("two", REFUSED)
-    journal.close()
-    whole = path.read_bytes()
+@pytest.mark.parametrize("cut", [1, 100])
+def test_a_line_that_is_half_written_is_cut_off_and_written_anew(path, cut):
+    whole = written(path, one=ROW, two=REFUSED)
     path.write_bytes(whole[:-cut])
     journal = Journal(path)
     assert set(journal.rows) <= {"one"}
@@ -47,14 +52,9 @@ def test_a_line_that_is_half_written_is_cut_off_and_written_anew(tmp_path, cut):
     assert path.read_bytes() == whole
 
 
-def test_a_line_that_was_altered_is_no_row_wherever_it_was(tmp_path):
+def test_a_line_that_was_altered_is_no_row_wherever_it_was(path):
     """Every byte in turn, as a disk or a hand may change it: never another row in its place, and the next one stays."""
-    path = tmp_path / "boards.jsonl"
-    journal = Journal(path)
-    journal.append("one", REFUSED)
-    journal.append("two", REFUSED)
-    journal.close()
-    whole = path.read_bytes()
+    whole = written(path, one=REFUSED, two=REFUSED)
     for at in range(whole.index(b"\n")):
         path.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
         journal = Journal(path)
@@ -63,8 +63,7 @@ def test_a_line_that_was_altered_is_no_row_wherever_it_was(tmp_path):
         journal.close()
 
 
-def test_a_damaged_line_is_no_row_and_the_others_are(tmp_path):
-    path = tmp_path / "boards.jsonl"
+def test_a_damaged_line_is_no_row_and_the_others_are(path):
     path.write_bytes(b'{"key": "x"}\nnonsense\n{"key": "y", "row": {"name": 3}}\n' + b"[" * 100_000 + b"\n")
     journal = Journal(path)
     assert journal.rows == {}
@@ -95,3 +94,21 @@ def test_a_table_in_parquet_has_the_same_cells(tmp_path):
     assert found.column_names == [*WORDS, *NUMBERS]
     assert [list(one.values()) for one in found.to_pylist()[:2]] == [ROW.cells(), REFUSED.cells()]
     assert found.num_rows == 1400
+
+
+def test_boards_of_the_same_readings_are_in_doubt():
+    rows = [
+        BoardRow("a", "fitted", doubt="misread?", readings_sha256="1"),
+        BoardRow("b", "refused", "b.toml [plate] mass_g: wanted"),
+        BoardRow("c", "fitted", readings_sha256="2"),
+        BoardRow("d", "fitted", readings_sha256="1"),
+        *(BoardRow(f"e{i}", "fitted", readings_sha256="3") for i in range(6)),
+        BoardRow("f", "fitted"),
+        BoardRow("g", "fitted"),
+    ]
+    doubts = {row.name: row.doubt for row in with_copies_in_doubt(rows) if row.doubt}
+
+    assert doubts["a"] == "every reading is that of d to the last digit: one board twice, or a copy?; misread?"
+    assert doubts["d"].startswith("every reading is that of a to")
+    assert "that of e0, e1, e2 and 2 more to" in doubts["e5"]
+    assert set(doubts) == {"a", "d", *(f"e{i}" for i in range(6))}
