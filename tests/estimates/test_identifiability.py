@@ -100,37 +100,35 @@ def test_of_constants_that_are_open_together_one_at_least_is_named():
     assert (found.errors_beside_known > np.log(2.0) / 1.96).any()
 
 
+def remarks_of(board):
+    """What is said of a board at its estimate, and how well that is known."""
+    estimate = weighted_least_squares(board)
+    found = identifiability(estimate.sensitivities, estimate.scales)
+    return " ".join(remarks(board, found)), found
+
+
 def test_three_modes_that_suffice_leave_nothing_to_check_with(hertz):
-    board = cantilever(hertz, (0, 0), (0, 1), (0, 2))
-    problem = posed(board)
-    sentences = " ".join(remarks(board, problem.identifiability))
-    assert "three modes fix three constants exactly" in sentences
-    assert problem.identifiability.leverages == pytest.approx(np.ones(3), abs=1e-9)
-    four = cantilever(hertz, (0, 0), (0, 1), (0, 2), (1, 1))
-    assert "three modes" not in " ".join(remarks(four, posed(four).identifiability))
+    told, found = remarks_of(cantilever(hertz, (0, 0), (0, 1), (0, 2)))
+    assert "three modes fix three constants exactly" in told
+    assert found.leverages == pytest.approx(np.ones(3), abs=1e-9)
+    assert "three modes" not in remarks_of(cantilever(hertz, (0, 0), (0, 1), (0, 2), (1, 1)))[0]
 
 
 def test_a_mode_that_carries_a_constant_alone_is_named(hertz):
     board = cantilever(hertz, (0, 0), (0, 1), (1, 0), (1, 1), (0, 2))
-    problem = posed(board)
-    leverages = dict(zip(board.setups[0].labels, problem.identifiability.leverages, strict=True))
-    named = [
-        label
-        for label in leverages
-        if f"mode {label} alone carries" in " ".join(remarks(board, problem.identifiability))
-    ]
-    assert named == [label for label, leverage in leverages.items() if leverage > 0.9]
+    told, found = remarks_of(board)
+    labels = board.setups[0].labels
+    named = [label for label in labels if f"mode {label} alone carries" in told]
+    assert named == [one for one, leverage in zip(labels, found.leverages, strict=True) if leverage > 0.9]
     assert (0, 2) in named
     assert (0, 0) not in named
 
 
-def test_a_fully_clamped_board_is_told_what_it_sees():
-    for name, told in (("fiemme-spruce-clamped", True), ("finnish-spruce-cantilever", False)):
-        board = prepare(name).board
-        estimate = weighted_least_squares(board)
-        sentences = " ".join(remarks(board, identifiability(estimate.sensitivities, estimate.scales)))
-        assert ("only D_s + 2 nu_xy D_y is seen" in sentences) == told
-        assert "G_xy" in sentences or not told
+@pytest.mark.parametrize(("name", "told"), [("fiemme-spruce-clamped", True), ("finnish-spruce-cantilever", False)])
+def test_a_fully_clamped_board_is_told_what_it_sees(name, told):
+    sentences, _ = remarks_of(prepare(name).board)
+    assert ("only D_s + 2 nu_xy D_y is seen" in sentences) == told
+    assert "G_xy" in sentences or not told
 
 
 @pytest.mark.parametrize(

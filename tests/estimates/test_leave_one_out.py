@@ -37,45 +37,60 @@ def problem():
     return slopes, rng.uniform(0.002, 0.01, N_MODES), 5.0 + 0.01 * rng.normal(size=N_MODES)
 
 
-def closed_form(slopes, scales, target, constant):
-    """In-sample residuals r, leverages h, and r / (1 - h); the input's prior is one more observation."""
-    weighted = np.concatenate([slopes / scales[:, None], np.eye(4)[3:]])
-    data = np.concatenate([(target - constant) / scales, [0.0]])
-    hat = weighted @ np.linalg.inv(weighted.T @ weighted) @ weighted.T
-    residuals = (data - hat @ data)[: target.size] * scales
-    leverages = np.diagonal(hat)[: target.size]
-    return residuals, leverages, residuals / (1 - leverages)
+def linear(slopes):
+    return lambda x: 5.0 + x @ slopes.T
+
+
+def errors_of(slopes, scales, target, modes=None):
+    """Errors of a linear problem of normal readings."""
+    return prediction_errors(linear(slopes), target, normal_misfit(target, scales), ORIGIN, modes=modes)
+
+
+def hat_matrix(weighted):
+    return weighted @ np.linalg.inv(weighted.T @ weighted) @ weighted.T
+
+
+def closed_form(slopes, scales, target):
+    """In-sample residuals r, and the hat matrix, of whose diagonal h each mode left out is missed by r / (1 - h).
+
+    The input's prior is one more observation.
+    """
+    hat = hat_matrix(np.concatenate([slopes / scales[:, None], np.eye(4)[3:]]))
+    data = np.concatenate([(target - 5.0) / scales, [0.0]])
+    return (data - hat @ data)[: target.size] * scales, hat[: target.size, : target.size]
 
 
 def test_a_linear_problem_has_the_closed_form(problem):
     slopes, scales, target = problem
-    found = prediction_errors(lambda x: 5.0 + x @ slopes.T, target, normal_misfit(target, scales), ORIGIN)
-    in_sample, leverages, left_out = closed_form(slopes, scales, target, 5.0)
+    found = errors_of(*problem)
+    in_sample, hat = closed_form(*problem)
+    leverages = np.diagonal(hat)
     assert found.in_sample == pytest.approx(in_sample, abs=1e-9)
-    meets("V12", "linear problem", np.abs(found.left_out - left_out).max(), at_most=1e-9)
+    meets("V12", "linear problem", np.abs(found.left_out - in_sample / (1 - leverages)).max(), at_most=1e-9)
     # controls: neither the fit that has seen the mode, nor the leverages of other modes, give this
     assert np.abs(found.left_out - in_sample).max() > 1e-4
     assert np.abs(found.left_out - in_sample / (1 - np.roll(leverages, 1))).max() > 1e-4
+    assert found.leverages.values == pytest.approx(leverages, abs=1e-6)
+    assert ((found.leverages.carries >= 0) == (leverages > 0.9)).all()
+    precise = prediction_errors(linear(slopes), target, normal_misfit(target, scales), ORIGIN, scales=1e-3 * scales)
+    _, hat = closed_form(slopes, 1e-3 * scales, target)
+    assert precise.leverages.values == pytest.approx(np.diagonal(hat), abs=1e-6)
 
 
 def test_readings_of_one_mode_are_left_out_together(problem):
     """The closed form with a block of the hat matrix in place of a leverage; with its twin kept, a reading is missed by
     less."""
-    slopes, scales, target = problem
+    _, scales, _ = problem
     modes = [(0, 4), (1,), (2, 6), (3,), (5,)]
-    predict, misfit = lambda x: 5.0 + x @ slopes.T, normal_misfit(target, scales)
-    found = prediction_errors(predict, target, misfit, ORIGIN, modes=modes)
-    weighted = np.concatenate([slopes / scales[:, None], np.eye(4)[3:]])
-    hat = weighted @ np.linalg.inv(weighted.T @ weighted) @ weighted.T
-    in_sample, _, alone = closed_form(slopes, scales, target, 5.0)
+    found = errors_of(*problem, modes=modes)
+    in_sample, hat = closed_form(*problem)
     for mode in map(list, modes):
         block = np.eye(len(mode)) - hat[np.ix_(mode, mode)]
         expected = scales[mode] * np.linalg.solve(block, in_sample[mode] / scales[mode])
         assert found.left_out[mode] == pytest.approx(expected, abs=1e-9)
+    alone = in_sample / (1 - np.diagonal(hat))
     assert np.abs(found.left_out - alone)[[0, 2, 4, 6]].min() > 1e-4  # control
-    assert np.isnan(
-        prediction_errors(predict, target, misfit, ORIGIN, modes=[(0, 4, 1), (2, 6, 3), (5,)]).left_out
-    ).all()
+    assert np.isnan(errors_of(*problem, modes=[(0, 4, 1), (2, 6, 3), (5,)]).left_out).all()
 
 
 def test_a_curved_problem_approaches_the_closed_form_as_the_residuals_shrink(problem):
@@ -90,10 +105,9 @@ def test_a_curved_problem_approaches_the_closed_form_as_the_residuals_shrink(pro
     for size in (1.0, 0.1):
         data = 5.0 + size * (target - 5.0)
         fitted = refit(curved, data, scales, np.zeros(4))
-        weighted = design(curved, scales, fitted)
-        hat = weighted @ np.linalg.inv(weighted.T @ weighted) @ weighted.T
+        leverages = np.diagonal(hat_matrix(design(curved, scales, fitted)))[:N_MODES]
         found = prediction_errors(curved, data, normal_misfit(data, scales), ORIGIN)
-        expected = found.in_sample / (1 - np.diagonal(hat)[:N_MODES])
+        expected = found.in_sample / (1 - leverages)
         apart.append(np.abs(found.left_out - expected).max())
     assert apart[1] == pytest.approx(apart[0] / 100, rel=0.5)
 
@@ -114,9 +128,7 @@ def test_the_paper_s_board_under_the_exact_law():
 
 
 def test_three_modes_leave_nothing_out(problem):
-    slopes, scales, target = problem
-    misfit = normal_misfit(target[:3], scales[:3])
-    found = prediction_errors(lambda x: 5.0 + x @ slopes[:3].T, target[:3], misfit, ORIGIN)
+    found = errors_of(*(one[:3] for one in problem))
     assert np.isnan(found.left_out).all()
     assert np.isfinite(found.in_sample).all()
     assert (found.leverages.carries < 0).all()  # nothing is left out, so that there is nothing to count or not
@@ -125,7 +137,7 @@ def test_three_modes_leave_nothing_out(problem):
 def test_an_input_stays_within_its_prior(problem):
     """Poor data leave it at the prior's middle, precise ones take it where they alone would lead."""
     slopes, scales, target = problem
-    moved = [abs(refit(lambda x: 5.0 + x @ slopes.T, target, scales * s, np.zeros(4))[3]) for s in (1e4, 1e2, 1.0)]
+    moved = [abs(refit(linear(slopes), target, scales * s, np.zeros(4))[3]) for s in (1e4, 1e2, 1.0)]
     free = abs(np.linalg.lstsq(slopes / scales[:, None], (target - 5.0) / scales, rcond=None)[0][3])
     assert moved[0] < moved[1] < moved[2]
     assert moved[0] < 0.1 * free
@@ -159,12 +171,12 @@ def test_the_fit_with_deviances_is_the_most_likely_point(problem, step, robust):
     hertz = np.round(np.exp(target) / step) * step if step else np.exp(target)
     errors = ReadingErrors(hertz, np.zeros(N_MODES), np.full(N_MODES, step), robust)
     misfit = deviance_misfit([errors], [NOISE])
-    found = prediction_errors(lambda x: 5.0 + x @ slopes.T, np.log(hertz), misfit, ORIGIN)
-    whole = most_likely(lambda x: 5.0 + x @ slopes.T, misfit, ORIGIN[0])
+    found = prediction_errors(linear(slopes), np.log(hertz), misfit, ORIGIN)
+    whole = most_likely(linear(slopes), misfit, ORIGIN[0])
     for left_out in ([], [2], [5]):
         starts = [ORIGIN[0], whole] if left_out else [ORIGIN[0]]
         start = min(starts, key=lambda x: np.delete(misfit(5.0 + slopes @ x)[0] ** 2, left_out).sum() + x[3] ** 2)
-        fitted = most_likely(lambda x: 5.0 + x @ slopes.T, misfit, start, None, left_out)
+        fitted = most_likely(linear(slopes), misfit, start, None, left_out)
         arguments = (slopes, hertz, step, robust, left_out)
         best = optimize.minimize(loss, fitted + 0.01, arguments, "Nelder-Mead",
                                  options={"xatol": 1e-10, "fatol": 1e-13, "maxfev": 8000})  # fmt: skip
@@ -186,10 +198,8 @@ def test_without_rounding_normal_deviances_give_the_weighted_least_squares(probl
     slopes, scales, target = problem
     errors = ReadingErrors(np.exp(target), np.sqrt(scales**2 - 0.001**2), np.zeros(N_MODES))
     assert errors.own_sd.min() > 0.001
-    wanted, found = (
-        prediction_errors(lambda x: 5.0 + x @ slopes.T, target, misfit, ORIGIN)
-        for misfit in (normal_misfit(target, scales), deviance_misfit([errors], [0.001]))
-    )
+    wanted = errors_of(slopes, scales, target)
+    found = prediction_errors(linear(slopes), target, deviance_misfit([errors], [0.001]), ORIGIN)
     assert found.left_out == pytest.approx(wanted.left_out, abs=1e-11)
     assert found.in_sample == pytest.approx(wanted.in_sample, abs=1e-11)
 
@@ -200,7 +210,7 @@ def test_readings_far_wider_than_the_noise_leave_a_fit_where_it_starts(problem):
     start = np.array([0.003, -0.002, 0.001, 0.0])
     hertz = np.round(np.exp(5.0 + slopes @ start) / 10.0) * 10.0 + 2.0
     errors = ReadingErrors(hertz, np.zeros(N_MODES), np.full(N_MODES, 30.0))
-    fitted = most_likely(lambda x: 5.0 + x @ slopes.T, deviance_misfit([errors], [1e-5]), start)
+    fitted = most_likely(linear(slopes), deviance_misfit([errors], [1e-5]), start)
     assert fitted == pytest.approx(start, abs=1e-9)
 
 
@@ -212,10 +222,10 @@ def test_a_fit_of_several_peaks_begins_at_the_best_start():
     errors = ReadingErrors(np.exp(log_f), np.zeros(5), np.zeros(5), robust=True)
     misfit = deviance_misfit([errors], [0.002])
     starts = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]])
-    found = prediction_errors(lambda x: 5.0 + x @ slopes.T, log_f, misfit, starts)
+    found = prediction_errors(linear(slopes), log_f, misfit, starts)
     # with one of the upper pair left out the fit is at the lower pair, and the other way round
     assert found.left_out[:4] == pytest.approx([-0.2, -0.2, 0.2, 0.2], abs=0.005)
-    alone = prediction_errors(lambda x: 5.0 + x @ slopes.T, log_f, misfit, starts[:1])
+    alone = prediction_errors(linear(slopes), log_f, misfit, starts[:1])
     assert np.abs(alone.left_out[:2]).max() < 0.01  # control: from the lower start alone it stays there
 
 
@@ -250,18 +260,6 @@ def test_what_a_mode_carries_may_be_a_size_with_a_prior():
     assert found.carries[4] == 3
     weak = leverages_of(np.where(np.arange(4) == 3, 0.5, 1.0) * slopes, scales)  # 25 / 26: the prior counts
     assert weak.values[4] == pytest.approx(25.0 / 26.0)
-
-
-def test_leverages_are_those_of_the_closed_form(problem):
-    slopes, scales, target = problem
-    found = prediction_errors(lambda x: 5.0 + x @ slopes.T, target, normal_misfit(target, scales), ORIGIN)
-    _, leverages, _ = closed_form(slopes, scales, target, 5.0)
-    assert found.leverages.values == pytest.approx(leverages, abs=1e-6)
-    assert ((found.leverages.carries >= 0) == (leverages > 0.9)).all()
-    tight = prediction_errors(
-        lambda x: 5.0 + x @ slopes.T, target, normal_misfit(target, scales), ORIGIN, scales=1e-3 * scales
-    )
-    assert tight.leverages.values.sum() > found.leverages.values.sum()  # the prior of the input weighs less
 
 
 def test_readings_of_one_mode_carry_together_what_neither_carries_alone():

@@ -105,44 +105,44 @@ def read_as(taken):
     return _expected(one, known, law)
 
 
-def test_where_labels_are_exchanged_each_peak_is_found_again_as_the_other_mode():
+@pytest.mark.parametrize(
+    ("found_again", "taken"),
+    [
+        ([2, 5, 4, 3, 6, 7], [0, 3, 2, 1, 4, 5]),  # two labels exchanged
+        ([3, 2, -1, -1, 6, 7], [1, 0, np.nan, np.nan, 4, 5]),  # no mode, or an unread one, says nothing of another day
+    ],
+)
+def test_where_labels_are_exchanged_each_peak_is_found_again_as_the_other_mode(found_again, taken):
     """With and without a known mass; of the further mode nothing changes. Two readings of another setup come first."""
-    shift, slopes = read_as(np.array([2, 5, 4, 3, 6, 7]))
+    shift, slopes = read_as(np.array(found_again))
 
-    taken = np.array([0, 3, 2, 1, 4, 5])
-    assert shift[0] == pytest.approx(np.r_[102.0 + taken, N, taken + N + 1, 2 * N + 1])
-    assert slopes[0, : N + 1, 0] == pytest.approx(np.r_[1.0 + 0.5 * taken, N])
+    taken, is_mode = np.array(taken), np.isfinite(taken)
+    assert shift[0] == pytest.approx(np.r_[102.0 + taken, N, taken + N + 1, 2 * N + 1], nan_ok=True)
+    assert slopes[0, :N, 0][is_mode] == pytest.approx(1.0 + 0.5 * taken[is_mode])
+    assert slopes[0, N, 0] == N
     assert not slopes[0, N + 1 :].any()
 
 
-def test_a_reading_that_is_no_mode_or_an_unread_one_says_nothing_of_another_day():
-    shift, _ = read_as(np.array([3, 2, -1, -1, 6, 7]))
-
-    taken = np.array([1, 0, np.nan, np.nan, 4, 5])
-    assert shift[0] == pytest.approx(np.r_[102.0 + taken, N, taken + N + 1, 2 * N + 1], nan_ok=True)
+def test_without_readings_at_hand_modes_are_expected_where_the_law_has_them():
     assert read_as(None)[0][0] == pytest.approx(np.arange(2.0 * (N + 1)))
 
 
-def at_hand(rows):
-    """Of eight readings, which are the modes 2 to 9 by their labels, what an explanation with other labels expects."""
-    of_label, taken = np.arange(2, 10), np.asarray(rows)
-    base, own = SimpleNamespace(rows=of_label), SimpleNamespace(n_modes=8, rows=taken, is_mode=taken >= 0)
-    shift, slopes = 10.0 + np.arange(8.0)[None], np.arange(8.0)[None, :, None]
-    return _at_hand(own, base, shift, slopes)
+@pytest.mark.parametrize(
+    ("rows", "taken", "none"),
+    [
+        ([2, 3, 4, 7, 6, 5, 8, 9], [0, 1, 2, 5, 4, 3, 6, 7], []),
+        ([2, 3, 5, 4, 30, -1, 8, 9], [0, 1, 3, 2, -1, -1, 6, 7], [5]),
+    ],
+    ids=["two labels exchanged", "one taken for an unread mode and one for none"],
+)
+def test_what_an_explanation_with_other_labels_takes_each_reading_for(rows, taken, none):
+    """Of eight readings, which are the modes 2 to 9 by their labels; its arrays are those of its own labels already."""
+    of_label, own_rows = np.arange(2, 10), np.asarray(rows)
+    base = SimpleNamespace(rows=of_label)
+    own = SimpleNamespace(n_modes=8, rows=own_rows, is_mode=own_rows >= 0)
+    found = _at_hand(own, base, 10.0 + np.arange(8.0)[None], np.arange(8.0)[None, :, None])
 
-
-def test_an_exchange_of_two_labels_takes_each_peak_for_the_other_mode():
-    """The arrays are those of the labels of the explanation already."""
-    found = at_hand([2, 3, 4, 7, 6, 5, 8, 9])
-
-    assert found.taken.tolist() == [0, 1, 2, 5, 4, 3, 6, 7]
-    assert found.shift[0] == pytest.approx(10.0 + np.arange(8.0))
-    assert found.slopes[0, :, 0] == pytest.approx(np.arange(8.0))
-
-
-def test_a_reading_taken_for_an_unread_mode_has_no_label_and_one_taken_for_none_is_not_expected():
-    found = at_hand([2, 3, 5, 4, 30, -1, 8, 9])
-
-    assert found.taken.tolist() == [0, 1, 3, 2, -1, -1, 6, 7]
-    assert np.flatnonzero(np.isnan(found.shift[0])).tolist() == [5]
-    assert found.shift[0, 2] == 12.0  # its own arrays are those of the mode that it is taken for
+    expected = np.where(np.isin(np.arange(8), none), np.nan, 10.0 + np.arange(8.0))
+    assert found.taken.tolist() == taken
+    assert found.shift[0] == pytest.approx(expected, nan_ok=True)
+    assert np.delete(found.slopes[0, :, 0], none) == pytest.approx(np.delete(np.arange(8.0), none))

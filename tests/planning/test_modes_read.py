@@ -21,63 +21,54 @@ def exact(sizes, constants):
     return sizes @ LINEAR + sizes**2 @ SQUARE + OF_CONSTANTS * constants[0] * np.ones(2)
 
 
-@pytest.fixture
-def added(monkeypatch):
-    """Terms of one constant and two sizes, at which the constant stands by the sizes; and what is added to them."""
-    rng = np.random.default_rng(3)
-    sizes = rng.normal(0.3, 0.5, (N_TERMS, 2))
-    mean = np.column_stack([0.1 + sizes @ [0.2, -0.1], sizes])
+def with_effect(monkeypatch, mean, solved):
+    """Terms of one constant and some sizes of an effect, which is solved as given; shift and slopes of two rows."""
+    n_terms, n_u = mean.shape
     prior = Quantity.from_mean(0.0, 1.0, "normal")
-    parameters = tuple(SimpleNamespace(name=name, prior=prior) for name in "ab")
-    form = FormTerms(np.arange(N_TERMS), None, ("made",) * 2, parameters, np.array([1, 2]))
+    parameters = tuple(SimpleNamespace(name=f"size {i}", prior=prior) for i in range(1, n_u))
+    form = FormTerms(np.arange(n_terms), None, ("made",) * (n_u - 1), parameters, np.arange(1, n_u))
     one = Belief(
-        members=("made",), words="", probability=1.0, mean=mean, covariance=np.tile(0.01 * np.eye(3), (N_TERMS, 1, 1)),
-        noise=np.ones((N_TERMS, 1)), middle=np.zeros((N_TERMS, 0)), wanted=np.zeros((N_TERMS, 0, 3)), forms=(form,),
+        members=("made",), words="", probability=1.0, mean=mean, noise=np.ones((n_terms, 1)),
+        covariance=np.tile(0.01 * np.eye(n_u), (n_terms, 1, 1)), middle=np.zeros((n_terms, 0)),
+        wanted=np.zeros((n_terms, 0, n_u)), forms=(form,),
     )  # fmt: skip
-    asked = []
+    monkeypatch.setattr(home, "_beside", solved)
+    known = SimpleNamespace(board=SimpleNamespace(symmetry=SimpleNamespace(n=1)))
+    return one, known, np.zeros((n_terms, 2)), np.zeros((n_terms, 2, n_u))
+
+
+def test_each_term_is_linear_about_its_own_place_on_the_parabola(monkeypatch):
+    """The constant stands by the sizes there; two solutions along each size and one in the middle are all it takes."""
+    sizes, asked = np.random.default_rng(3).normal(0.3, 0.5, (N_TERMS, 2)), []
+    mean = np.column_stack([0.1 + sizes @ [0.2, -0.1], sizes])
 
     def solved(known, law, form, sizes, constants):
         asked.append(sizes)
         return exact(sizes, constants)
 
-    monkeypatch.setattr(home, "_beside", solved)
-    known = SimpleNamespace(board=SimpleNamespace(symmetry=SimpleNamespace(n=1)))
-    shift, slopes = np.zeros((N_TERMS, 2)), np.zeros((N_TERMS, 2, 3))
+    one, known, shift, slopes = with_effect(monkeypatch, mean, solved)
     home.add_effects(one, known, SimpleNamespace(middle=np.zeros(2)), shift, slopes)
-    return mean, shift, slopes, asked
-
-
-def test_each_term_is_linear_about_its_own_place_on_the_parabola(added):
-    mean, shift, slopes, asked = added
-    inside = np.all([(one >= np.min(asked, axis=0)) & (one <= np.max(asked, axis=0)) for one in mean[:, 1:]], axis=1)
+    inside = np.all([(one >= np.min(asked, axis=0)) & (one <= np.max(asked, axis=0)) for one in sizes], axis=1)
     expected = shift + np.einsum("tnu,tu->tn", slopes, mean)
 
     wanted = np.stack([exact(one[1:], one[:1]) for one in mean])
+    assert len(asked) == 5
     assert inside.sum() > N_TERMS // 2
     assert expected[inside] == pytest.approx(wanted[inside], abs=1e-12)
     of_constants = OF_CONSTANTS * np.array([[0.2], [-0.1]])
-    along = LINEAR + 2.0 * mean[:, 1:, None] * SQUARE + of_constants
+    along = LINEAR + 2.0 * sizes[:, :, None] * SQUARE + of_constants
     assert slopes[inside][:, :, 1:] == pytest.approx(np.swapaxes(along, 1, 2)[inside], abs=1e-12)
     assert not slopes[:, :, 0].any()
 
 
-def test_two_solutions_along_each_size_and_one_in_the_middle_are_all_it_takes(added):
-    assert len(added[3]) == 5
-
-
 def test_a_mode_that_is_lost_to_one_side_goes_on_straight_and_what_a_mass_adds_to_it_is_not_told(monkeypatch):
     """One mode and one spot, one size; the mode has lost its name where the effect is large."""
-    prior = Quantity.from_mean(0.0, 1.0, "normal")
-    form = FormTerms(np.arange(3), None, ("made",), (SimpleNamespace(name="a", prior=prior),), np.array([1]))
     mean = np.column_stack([np.zeros(3), [-0.5, 0.0, 0.5]])
-    one = Belief(
-        members=("made",), words="", probability=1.0, mean=mean, covariance=np.tile(0.01 * np.eye(2), (3, 1, 1)),
-        noise=np.ones((3, 1)), middle=np.zeros((3, 0)), wanted=np.zeros((3, 0, 2)), forms=(form,),
-    )  # fmt: skip
-    monkeypatch.setattr(home, "_beside", lambda *a: np.full(2, np.nan if a[3][0] > 0.2 else 0.1 * a[3][0]))
-    known = SimpleNamespace(board=SimpleNamespace(symmetry=SimpleNamespace(n=1)))
-    shift, slopes = np.zeros((3, 2)), np.zeros((3, 2, 2))
 
+    def solved(known, law, form, sizes, constants):
+        return np.full(2, np.nan if sizes[0] > 0.2 else 0.1 * sizes[0])
+
+    one, known, shift, slopes = with_effect(monkeypatch, mean, solved)
     home.add_effects(one, known, SimpleNamespace(middle=np.zeros(1)), shift, slopes)
 
     assert shift[:, 0] + slopes[:, 0, 1] * mean[:, 1] == pytest.approx(0.1 * np.clip(mean[:, 1], -0.47, 0.47))

@@ -35,10 +35,22 @@ def board(edges, beams=READ):
     return made_board("made", {name: Quantity.exact(value) for name, value in SIZES.items()}, (setup,))
 
 
-def values():
-    inputs = {name: np.asarray(value) for name, value in SIZES.items()}
-    found = rigidities(*(np.asarray(MODULI[n]) for n in ("E_x", "E_y", "G_xy")), inputs["thickness"], np.asarray(0.4))
-    return {**inputs, **found._asdict()}
+VALUES = {name: np.asarray(value) for name, value in SIZES.items()}
+VALUES |= rigidities(*map(np.asarray, MODULI.values()), VALUES["thickness"], VALUES["poisson_xy"])._asdict()
+PLATE = Plate(**MODULI, nu_xy=0.4, rho=430.0, h=4.7e-3, L_x=0.58, L_y=0.217, edges=FREE)
+
+
+def loaded(made, *at):
+    """ln of the frequencies of the generator's plate with a known mass at a place, or bare."""
+    masses = [AttachedMass(known_mass(made), at)] if at else []
+    found, _ = frequencies(PLATE, masses, READ)
+    return np.log([found[beams] for beams in READ])
+
+
+def held_on_days(*names):
+    """A board in several sessions that share the departures of its modes from the plate."""
+    made = board(FREE)
+    return with_discrepancies(replace(made, setups=tuple(replace(made.setups[0], name=name) for name in names)))
 
 
 def stations(board, values):
@@ -47,11 +59,11 @@ def stations(board, values):
 
 @pytest.fixture(scope="module")
 def free():
-    return stations(board(FREE), values())
+    return stations(board(FREE), VALUES)
 
 
 def test_a_free_board_is_proposed_as_a_cantilever_and_no_board_as_what_it_was(free):
-    clamped = stations(board(CLAMPED, ((0, 0), (0, 1), (1, 0))), values())
+    clamped = stations(board(CLAMPED, ((0, 0), (0, 1), (1, 0))), VALUES)
 
     assert [one.setup.name for one in free] == ["setup", "cantilever"]
     assert free[1].setup.edges == {"x0": "clamped", "x1": "free", "y0": "free", "y1": "free"}
@@ -61,7 +73,7 @@ def test_a_free_board_is_proposed_as_a_cantilever_and_no_board_as_what_it_was(fr
 
 def test_of_a_mode_that_has_lost_its_name_nothing_is_told(free):
     """Neither where it is nor what a known mass adds to it; the others stay as they are."""
-    found = SolvedStation.of(free[0], board(FREE), values())
+    found = SolvedStation.of(free[0], board(FREE), VALUES)
     lost = replace(found, rows=[-1, *found.rows[1:]])
 
     assert found.bare_and_added.shape == (1 + len(free[0].spots), len(free[0].setup.labels))
@@ -70,8 +82,7 @@ def test_of_a_mode_that_has_lost_its_name_nothing_is_told(free):
 
 
 def test_on_the_mesh_for_other_values_the_sides_serve_again_and_the_modes_are_the_same(free):
-    here = values()
-    there = {**here, "D_x": 2.0 * here["D_x"]}
+    here, there = VALUES, VALUES | {"D_x": 2.0 * VALUES["D_x"]}
     first, own, again = (
         SolvedStation.of(free[0], board(FREE), at, meshed)
         for at, meshed in ((here, None), (there, None), (there, here))
@@ -84,23 +95,21 @@ def test_on_the_mesh_for_other_values_the_sides_serve_again_and_the_modes_are_th
 
 
 def test_of_several_sessions_only_the_last_goes_on():
-    made = board(FREE)
-    days = [replace(made.setups[0], name=name) for name in ("monday", "friday", "sunday")]
-    held = with_discrepancies(replace(made, setups=(*days, setup_of(CLAMPED, {(0, 0): 90.0}, name="clamped"))))
+    held, made = held_on_days("monday", "friday", "sunday"), board(FREE)
+    held = replace(held, setups=(*held.setups, setup_of(CLAMPED, {(0, 0): 90.0}, name="clamped")))
 
-    assert [one.setup.name for one in stations(held, values()) if one.goes_on(held)] == ["sunday", "clamped"]
-    assert all(one.goes_on(made) for one in stations(made, values()))
+    assert [one.setup.name for one in stations(held, VALUES) if one.goes_on(held)] == ["sunday", "clamped"]
+    assert all(one.goes_on(made) for one in stations(made, VALUES))
 
 
 def test_a_mode_that_no_session_read_departs_from_the_plate_as_one_that_was_read_does():
     """Its discrepancy is no parameter yet, and its variance is what it will be as one."""
-    made = board(FREE)
-    days = tuple(replace(made.setups[0], name=name) for name in ("monday", "friday"))
-    held = with_discrepancies(replace(made, setups=days))
-    station = stations(held, values())[0]
+    held, made = held_on_days("monday", "friday"), board(FREE)
+    station = stations(held, VALUES)[0]
     new = station.setup.readings[station.n_old]
-    read = with_discrepancies(replace(held, setups=tuple(replace(d, readings=(*d.readings, new)) for d in days)))
-    at = read.nominal() | values()
+    days = tuple(replace(one, readings=(*one.readings, new)) for one in held.setups)
+    read = with_discrepancies(replace(held, setups=days))
+    at = read.nominal() | VALUES
     slopes = bare_law(read, next(one for one in old_stations(read, at) if one.goes_on(read)), at).slopes[0]
     column = 3 + [one.key for one in read.uncertain].index(f"discrepancy {new.label}")
 
@@ -110,10 +119,9 @@ def test_a_mode_that_no_session_read_departs_from_the_plate_as_one_that_was_read
     assert not unknown_discrepancies(made, made.setups[0]).any()
 
 
-def test_planned_readings_carry_it():
-    made = board(FREE)
-    days = tuple(replace(made.setups[0], name=name) for name in ("monday", "friday"))
-    held = with_discrepancies(replace(made, setups=days))
+def test_planned_readings_carry_it(monkeypatch):
+    monkeypatch.setattr("bayesplate.planning.beliefs._N_PLATES", 2)
+    held = held_on_days("monday", "friday")
     believed = prior_beliefs(held, load_prior("spruce"), np.random.default_rng(1))
     (known,) = believed.boards
     law = next(one for one in known.laws if one.station.goes_on(held))
@@ -133,38 +141,34 @@ def test_modes_that_were_read_come_first_and_none_twice(free):
     assert set(labels[len(READ) :]) >= {(1, 2), (3, 0), (3, 1), (2, 2)}
 
 
-def test_a_known_mass_shifts_modes_as_the_generator_has_it(free):
-    """Solved among two dozen modes: within two cents and a hundredth of the shift, which is up to 76 cents."""
-    made = board(FREE)
-    station = free[0]
-    law = bare_law(made, station, values())
-    plate = Plate(**MODULI, nu_xy=0.4, rho=430.0, h=4.7e-3, L_x=0.58, L_y=0.217, edges=FREE)
-    place = station.places(made)[-1]
-    bare, _ = frequencies(plate, [], READ)
-    loaded, _ = frequencies(plate, [AttachedMass(known_mass(made), (place,))], READ)
+@pytest.fixture(scope="module")
+def free_law(free):
+    return bare_law(board(FREE), free[0], VALUES)
 
-    wanted = np.array([np.log(loaded[b] / bare[b]) for b in READ])
-    added = law.solved[len(station.spots), : len(READ)]
+
+def test_a_known_mass_shifts_modes_as_the_generator_has_it(free, free_law):
+    """Solved among two dozen modes: within two cents and a hundredth of the shift, which is up to 76 cents."""
+    made, (station, _) = board(FREE), free
+    bare = loaded(made)
+    wanted = loaded(made, station.places(made)[-1]) - bare
+
+    added = free_law.solved[len(station.spots), : len(READ)]
     assert np.abs(wanted).max() > 0.02
     assert np.all(np.abs(added - wanted) < 0.01 * np.abs(wanted) + 2.0 * np.log(2.0) / 1200.0)
-    assert law.middle[: len(READ)] == pytest.approx([np.log(bare[b]) for b in READ], abs=1e-3)
+    assert free_law.middle[: len(READ)] == pytest.approx(bare, abs=1e-3)
 
 
-def test_a_known_mass_off_its_place_adds_as_much_more_or_less_as_the_independent_solver_says(free):
+def test_a_known_mass_off_its_place_adds_as_much_more_or_less_as_the_independent_solver_says(free, free_law):
     """Near a nodal line a millimetre changes much of a small shift, in a belly hardly any of a large one."""
-    law, station = bare_law(board(FREE), free[0], values()), free[0]
-    plate = Plate(**MODULI, nu_xy=0.4, rho=430.0, h=4.7e-3, L_x=0.58, L_y=0.217, edges=FREE)
-    x, y = station.places(board(FREE))[-1]
-
-    def loaded(x, y):
-        found, _ = frequencies(plate, [AttachedMass(known_mass(board(FREE)), ((x, y),))], READ)
-        return np.log([found[b] for b in READ])
-
+    made, (station, _) = board(FREE), free
+    x, y = station.places(made)[-1]
     wide = 3.0 * PLACED
-    along, across = (loaded(x + dx, y + dy) - loaded(x - dx, y - dy) for dx, dy in ((wide, 0.0), (0.0, wide)))
-    wanted = np.hypot(along, across) / 6.0
-    assert law.off_place[-1, : len(READ)] == pytest.approx(wanted, rel=0.1)
-    relative = law.off_place[-1, : len(READ)] / np.abs(law.solved[len(station.spots), : len(READ)])
+    along = loaded(made, (x + wide, y)) - loaded(made, (x - wide, y))
+    across = loaded(made, (x, y + wide)) - loaded(made, (x, y - wide))
+
+    off_place = free_law.off_place[-1, : len(READ)]
+    assert off_place == pytest.approx(np.hypot(along, across) / 6.0, rel=0.1)
+    relative = off_place / np.abs(free_law.solved[len(station.spots), : len(READ)])
     assert relative.max() > 2.0 * relative.min()
 
 
@@ -174,7 +178,7 @@ def test_a_mode_on_whose_nodal_line_the_sensor_stands_is_not_looked_for():
 
     def labels(kind, elsewhere=False):
         item = AttachedItem(kind, ((0.1, 0.5 * SIZES["length_y"]),), Quantity.exact(1e-6))
-        found = stations(replace(made, setups=(replace(made.setups[0], attached=(item,)),)), values())
+        found = stations(replace(made, setups=(replace(made.setups[0], attached=(item,)),)), VALUES)
         return [one.label for one in found[elsewhere].setup.readings[0 if elsewhere else len(READ) :]]
 
     assert all(one.n % 2 == 0 for one in labels("accelerometer"))
@@ -185,15 +189,15 @@ def test_a_mode_on_whose_nodal_line_the_sensor_stands_is_not_looked_for():
 def test_the_sheet_shows_every_mode_that_is_to_be_found_and_the_sensor_alone_as_one(free):
     """Also the highest that are looked at, where a board was read up to the twentieth."""
     beams = [(one.label.m, one.label.n) for one in free[0].setup.readings]
-    beams = [(one.label.m, one.label.n) for one in stations(board(FREE, beams), values())[0].setup.readings]
+    beams = [(one.label.m, one.label.n) for one in stations(board(FREE, beams), VALUES)[0].setup.readings]
     weight = AttachedItem("weight", ((0.29, 0.1),), Quantity.exact(1e-6))
     read = board(FREE, beams)
     read = replace(read, setups=(replace(read.setups[0], attached=(weight,)),))
-    station = stations(read, values())[0]
+    station = stations(read, VALUES)[0]
     rows = range(station.n_old, len(station.setup.readings))
-    law = bare_law(read, station, values())
+    law = bare_law(read, station, VALUES)
     ends = law.solved[0, list(rows), None] + np.array([-0.01, 0.0, 0.01])
-    bench = bench_of(KnownBoard(read, values(), (law,), np.eye(3)), law, rows, ends, "").entry
+    bench = bench_of(KnownBoard(read, VALUES, (law,), np.eye(3)), law, rows, ends, "").entry
 
     assert len(beams) == 20
     assert {one.label for one in bench.modes} == {str(station.setup.labels[i]) for i in rows}
