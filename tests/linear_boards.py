@@ -98,8 +98,8 @@ def pull_of(board):
     return Pull(board.shared.T @ inverse @ board.shared, board.shared.T @ inverse @ board.readings)
 
 
-def exactly_together(boards):
+def exactly_together(boards, shared=None):
     """Linear boards with their closed forms."""
-    n = boards[0].shared.shape[1]
+    shared = standard_shared(boards[0].shared.shape[1]) if shared is None else shared
     names = [f"board {i}" for i in range(len(boards))]
-    return Together.of(standard_shared(n), names, boards, [pull_of(one) for one in boards])
+    return Together.of(shared, names, boards, [pull_of(one) for one in boards])

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from linear_boards import LinearBoard, pull_of, standard_shared
+from linear_boards import LinearBoard, exactly_together, pull_of, standard_shared
 from scipy.integrate import quad
 from scipy.stats import norm
 
@@ -16,7 +16,7 @@ from bayesplate.campaign.claim import p_value
 from bayesplate.campaign.pulls import Pull
 from bayesplate.campaign.scatter import ScatteredLikelihood
 from bayesplate.campaign.shared import Shared
-from bayesplate.campaign.together import Together, values_of
+from bayesplate.campaign.together import values_of
 
 SCALE = 0.5
 LOG_SD = 0.4
@@ -45,11 +45,6 @@ def closed_form(board, middles, width):
     left = board.readings - np.atleast_2d(middles) @ board.shared.T
     _, log_det = np.linalg.slogdet(2.0 * np.pi * covariance)
     return -0.5 * (np.einsum("ni,ij,nj->n", left, np.linalg.inv(covariance), left) + log_det)
-
-
-def together_of(boards, shared):
-    names = [f"board {i}" for i in range(len(boards))]
-    return Together.of(shared, names, boards, [pull_of(one) for one in boards])
 
 
 @pytest.mark.parametrize("moving", [(0, 2), (0, 1, 2)])
@@ -122,7 +117,7 @@ def by_grid(boards):
 def test_middle_and_scatter_are_those_of_a_fine_grid():
     """Tolerances: four errors of a mean of as many points as the sums rest on."""
     boards, _ = scattered_boards(np.random.default_rng(8), 5, 1, 0.6)
-    together = together_of(boards, numbers(1))
+    together = exactly_together(boards, numbers(1))
     for without in [(), (2,)]:
         kept = [one for i, one in enumerate(boards) if i not in without]
         grid, evidence, square = by_grid(kept)
@@ -141,7 +136,7 @@ def test_what_is_taught_has_a_density_with_its_moments():
     """Within a tenth of an sd, two errors of a mean of 500 points: the fewest that it may rest on."""
     boards, _ = scattered_boards(np.random.default_rng(9), 6, 2, 0.6)
     one, other = numbers(2)
-    together = together_of(boards, (one, replace(other, scatter=0.0)))
+    together = exactly_together(boards, (one, replace(other, scatter=0.0)))
     z = np.random.default_rng(0).uniform(-6.0, 6.0, (40_000, 2))
     weights = np.exp(together.log_taught((1,))(z))
     weights /= weights.sum()
@@ -160,7 +155,7 @@ def test_what_is_taught_keeps_the_bounds_of_a_number_that_does_not_scatter():
     scattering, other = numbers(2)
     bounded = replace(other, scatter=0.0, prior=Quantity.from_mean(0.0, 1.0, "normal", lower=0.0))
     boards, _ = scattered_boards(np.random.default_rng(2), 4, 2, 0.5, z_true=0.05, sd=2.0)
-    together = together_of(boards, (scattering, bounded))
+    together = exactly_together(boards, (scattering, bounded))
     log_taught, rng = together.log_taught(), np.random.default_rng(1)
     z = np.column_stack([rng.uniform(-6.0, 6.0, 40_000), rng.uniform(-1.0, 4.0, 40_000)])
     log_density = log_taught(z)
@@ -187,7 +182,7 @@ def test_p_values_are_uniform_where_boards_scatter_and_not_where_that_is_left_ou
         width = abs(rng.normal()) * SCALE / LOG_SD
         boards, _ = scattered_boards(rng, 5, 1, width, z_true=rng.normal(), sd=0.1)
         for found, numbers_of in ((values, shared), (without, same)):
-            whole = together_of(boards, numbers_of)
+            whole = exactly_together(boards, numbers_of)
             found.append([p_value(whole, i) for i in range(5)])
     n = 60  # boards of one campaign are compared with each other
     error = 4.0 * np.sqrt(0.1 * 0.9 / n)
@@ -199,9 +194,9 @@ def test_p_values_are_uniform_where_boards_scatter_and_not_where_that_is_left_ou
 def test_values_have_names_and_the_scatter_its_own():
     (number,) = numbers(1)
     boards, _ = scattered_boards(np.random.default_rng(3), 3, 1, 0.5)
-    coordinates = together_of(boards, (number,)).coordinates
+    coordinates = exactly_together(boards, (number,)).coordinates
     values = values_of(coordinates, np.array([[0.0, 1.0]]))
 
     assert values == {"effect.z0": pytest.approx([1.0]), "effect.z0 scatter": pytest.approx([SCALE])}
-    assert together_of(boards, (replace(number, scatter=0.0),)).coordinates == (replace(number, scatter=0.0),)
-    assert len(together_of(boards, standard_shared(1)).coordinates) == 1
+    assert exactly_together(boards, (replace(number, scatter=0.0),)).coordinates == (replace(number, scatter=0.0),)
+    assert len(exactly_together(boards, standard_shared(1)).coordinates) == 1
