@@ -20,6 +20,7 @@ from bayesplate.report import campaign as home
 from bayesplate.report.campaign import shared_picture, write_campaign_report
 from bayesplate.results.contract import Spread
 
+SENSOR = "attached_mass.mass"
 PLACES = ("diagnosis", "shared", "boards", "common")
 
 
@@ -27,9 +28,9 @@ PLACES = ("diagnosis", "shared", "boards", "common")
 def diagnosis(fitted_campaign):
     """A diagnosis as the boards left out would have it."""
     summary = fitted_campaign.summary
-    others = summary.shared["attached_mass.mass"].others
+    others = summary.shared[SENSOR].others
     taught = {
-        name: TaughtBoard(gain, 7.0, 5.0, 0.4, False, {"attached_mass.mass": others[name]})
+        name: TaughtBoard(gain, 7.0, 5.0, 0.4, False, {SENSOR: others[name]})
         for name, gain in zip(others, (3.0, 2.5, -0.5), strict=True)
     }
     return CampaignDiagnosis(
@@ -90,27 +91,19 @@ def test_a_text_stays_a_text(fitted_campaign, diagnosis, tmp_path, monkeypatch):
 
 
 def test_what_is_claimed_is_said_and_what_is_not_is_said_too(diagnosis):
+    """Of a group the sentence names what the boards were fitted with."""
     refused = replace(diagnosis, claim=False, conditions=SharedClaim(5.0, 1.5, ("board-1",), 2, False))
     nothing = replace(diagnosis, claim=False, conditions=None, left_out_boards={}, reason="nothing is lacking")
+    both = Explanation("shared", ("transverse_shear", "attached_mass"), "", 0.0, 0.6)
+    other = Explanation("shared", ("transverse_shear", "fluid_loading"), "", 0.0, 0.4)
+    every = ("transverse_shear", "attached_mass", "fluid_loading")
+    group = replace(diagnosis, claim=False, effects=every, explanations=(both, other))
 
     assert claim_sentence(diagnosis).startswith("The boards share attached mass: 2 of 3")
     assert "5.0 ± 1.5 in log score" in claim_sentence(diagnosis)
     assert claim_sentence(refused).startswith("It is not claimed that the boards share attached mass")
     assert "board-1 does not want it" in claim_sentence(refused)
     assert claim_sentence(nothing) == "Nothing is claimed: nothing is lacking."
-
-
-def test_of_a_group_the_sentence_names_what_the_boards_were_fitted_with(diagnosis):
-    both = Explanation("shared", ("transverse_shear", "attached_mass"), "", 0.0, 0.6)
-    other = Explanation("shared", ("transverse_shear", "fluid_loading"), "", 0.0, 0.4)
-    group = replace(
-        diagnosis,
-        verdict="indistinguishable group",
-        claim=False,
-        effects=("transverse_shear", "attached_mass", "fluid_loading"),
-        explanations=(both, other),
-    )
-
     assert "that the boards share transverse shear and attached mass: 2 of 3" in claim_sentence(group)
 
 
@@ -125,16 +118,14 @@ def test_what_the_terminal_shows(fitted_campaign, diagnosis):
 
 def test_figures_and_draws_of_a_result(fitted_campaign):
     plot = fitted_campaign.plot
-    for figure in (plot.shared(), plot.shared("attached_mass.mass"), plot.boards(), plot.common()):
+    for figure in (plot.shared(), plot.shared(SENSOR), plot.boards(), plot.common()):
         assert figure.axes
     with pytest.raises(InputError, match=r"attached_mass\.mass"):
         plot.shared("mass")
     with pytest.raises(InputError, match="leaves them out"):
         plot.left_out()
-    draws = fitted_campaign.to_arviz()["posterior"]["attached_mass.mass"]
-    assert float(draws.mean()) == pytest.approx(
-        fitted_campaign.summary.shared["attached_mass.mass"].all_boards.mean, rel=0.02
-    )
+    draws = fitted_campaign.to_arviz()["posterior"][SENSOR]
+    assert float(draws.mean()) == pytest.approx(fitted_campaign.summary.shared[SENSOR].all_boards.mean, rel=0.02)
     assert "<table" in fitted_campaign._repr_html_()
     assert repr(fitted_campaign) == "<CampaignFitResult of together: 3 boards; attached_mass.mass>"
 
@@ -154,10 +145,10 @@ def test_a_campaign_that_shares_nothing_is_boards_side_by_side(campaign, fitted_
 
 def test_where_boards_differ_the_page_says_by_how_much_and_what_the_band_is(fitted_campaign):
     """And nothing of it where they do not."""
-    summary, name = fitted_campaign.summary, "attached_mass.mass"
-    differing = replace(summary.shared[name], scatter=Spread(0.16, 0.12, 0.01, 0.06, 0.14, 0.23, 0.4, "1"))
-    summaries = {"alike": summary, "differing": replace(summary, shared={name: differing})}
-    captions = {which: shared_picture(one, name).caption for which, one in summaries.items()}
+    summary = fitted_campaign.summary
+    differing = replace(summary.shared[SENSOR], scatter=Spread(0.16, 0.12, 0.01, 0.06, 0.14, 0.23, 0.4, "1"))
+    summaries = {"alike": summary, "differing": replace(summary, shared={SENSOR: differing})}
+    captions = {which: shared_picture(one, SENSOR).caption for which, one in summaries.items()}
     tables = {which: str(shared_table(one.shared).texts) for which, one in summaries.items()}
 
     assert "the grey band is where their median lies" in captions["differing"]

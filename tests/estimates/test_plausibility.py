@@ -93,12 +93,7 @@ def test_shipped_boards_are_asked_nothing():
 
 
 @pytest.mark.parametrize(
-    ("name", "prior"),
-    [
-        ("finnish-spruce-cantilever", "weakly-informative"),
-        ("fiemme-spruce-clamped", "spruce"),
-        ("spruce-free-2R", "weakly-informative"),
-    ],
+    ("name", "prior"), [("finnish-spruce-cantilever", "weakly-informative"), ("fiemme-spruce-clamped", "spruce")]
 )
 def test_units_are_asked_about(name, prior):
     board = board_of(name, prior)
@@ -309,7 +304,7 @@ def metal(ratio: float) -> dict[str, float]:
 @pytest.mark.parametrize(
     ("prior", "constants", "rho", "words", "is_told"),
     [
-        ("spruce", {}, None, "the ", False),
+        ("spruce", {}, None, " ", False),  # not a word
         ("spruce", {"E_x": 40e9}, None, "E_x comes out as 40 GPa, expected were", True),
         (
             "spruce",
