@@ -22,9 +22,9 @@ from bayesplate.posterior.sampling import SamplerSettings, sample
 SHARED = "attached_mass.mass"
 
 
-def joint_run(members, is_exact=False):
+def joint_run(members):
     """Draws of every board's own parameters and the shared ones together, and the effective sizes."""
-    given = [one.given if is_exact else one.quick(one.inference.surrogate) for one in members]
+    given = [one.quick(one.inference.surrogate) for one in members]
     shared = members[0].shared
     sizes = [one.own_columns.size for one in given]
     ends = np.cumsum(sizes)
