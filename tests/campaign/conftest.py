@@ -6,6 +6,7 @@ import pytest
 from made_campaigns import write_campaign
 
 import bayesplate
+from bayesplate.campaign import together
 from bayesplate.commands.fitting import FitResult
 from bayesplate.posterior.slips import Remarks
 
@@ -16,6 +17,13 @@ def _no_slips():
     with pytest.MonkeyPatch.context() as patch:
         leave_out_slips(patch)
         yield
+
+
+@pytest.fixture
+def _few_points(monkeypatch):
+    """For rates over many campaigns, where moments of few points are enough."""
+    monkeypatch.setattr(together, "_N_POINTS", dict.fromkeys((1, 2), 2**11))
+    monkeypatch.setattr(together, "FEWEST_POINTS", 100)
 
 
 def leave_out_slips(patch):

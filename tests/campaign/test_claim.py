@@ -13,6 +13,7 @@ from bayesplate.campaign.claim import TaughtBoard, judge, left_out, p_value, ref
 from bayesplate.campaign.pulls import Pull
 
 
+@pytest.mark.usefixtures("_few_points")
 def test_p_values_of_boards_that_share_are_uniform():
     """Their mean and the shares below one half and a tenth, at the tolerance of so many campaigns."""
     values = []
@@ -28,6 +29,7 @@ def test_p_values_of_boards_that_share_are_uniform():
     assert abs((values < 0.1).mean() - 0.1) < 4.0 * 0.3 / np.sqrt(n)
 
 
+@pytest.mark.usefixtures("_few_points")
 def test_of_two_boards_that_differ_both_are_named_and_of_more_the_odd_one():
     """Which of two is the odd one, nothing tells."""
     for seed in range(3):
@@ -82,6 +84,7 @@ def claimed(seed, size, without):
     return judge(taught).holds
 
 
+@pytest.mark.usefixtures("_few_points")
 @pytest.mark.parametrize(
     ("seeds", "size", "without", "low", "high"),
     [

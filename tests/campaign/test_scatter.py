@@ -11,7 +11,7 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.campaign import scatter, together
+from bayesplate.campaign import scatter
 from bayesplate.campaign.claim import p_value
 from bayesplate.campaign.pulls import Pull
 from bayesplate.campaign.scatter import ScatteredLikelihood
@@ -171,10 +171,9 @@ def test_what_is_taught_keeps_the_bounds_of_a_number_that_does_not_scatter():
 
 
 @pytest.mark.slow
-def test_p_values_are_uniform_where_boards_scatter_and_not_where_that_is_left_out(monkeypatch):
-    """Scatter drawn from its prior: the p-value of a board against the others; moments of few points are enough."""
-    monkeypatch.setattr(together, "_N_POINTS", dict.fromkeys((1, 2), 2**11))
-    monkeypatch.setattr(together, "FEWEST_POINTS", 100)
+@pytest.mark.usefixtures("_few_points")
+def test_p_values_are_uniform_where_boards_scatter_and_not_where_that_is_left_out():
+    """Scatter drawn from its prior: the p-value of a board against the others."""
     shared, same = numbers(1), numbers(1, scale=0.0)
     values, without = [], []
     for seed in range(25):

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from bayesplate.board.material import MODULI, ORTHOTROPIC
 from bayesplate.planning.beliefs import Belief, Beliefs
@@ -103,23 +104,15 @@ def test_explanations_that_expect_the_same_are_not_told_apart_and_distant_ones_f
 
 
 def test_probabilities_after_a_reading_follow_the_two_densities():
-    now = beliefs(explanation(0.0, 0.5), explanation(3.0, 0.5))
-    one = reading(now, [1, 0, 0])
+    """Of other middles and widths: an explanation that expects more scatter pays for it."""
+    narrow, wide = ((sd**2 - SIGMA**2, 1.0, 1.0) for sd in (1.0, 3.0))
+    now = beliefs(explanation(0.0, 0.3, narrow), explanation(3.0, 0.7, wide))
+    read = np.array([[0.0], [3.0], [1.5]])
 
-    after = probabilities_after(now, one, np.array([[0.0], [3.0], [1.5]]))
+    after = probabilities_after(now, reading(now, [1, 0, 0]), read)
 
-    odds = np.exp(0.5 * 3.0**2 / (4.0 + SIGMA**2))
-    assert after[0] == pytest.approx([odds / (1 + odds), 1 / (1 + odds), 0.5])
-
-
-def test_an_explanation_that_expects_more_scatter_pays_for_it():
-    """Standard deviations 1 and 3 about the same mean: at the mean the odds are 3 to 1."""
-    narrow, wide = ((1.0 - SIGMA**2, 1.0, 1.0), (9.0 - SIGMA**2, 1.0, 1.0))
-    now = beliefs(explanation(0.0, 0.5, narrow), explanation(0.0, 0.5, wide))
-
-    after = probabilities_after(now, reading(now, [1, 0, 0]), np.array([[0.0]]))
-
-    assert after[:, 0] == pytest.approx([0.75, 0.25])
+    joint = np.array([[0.3], [0.7]]) * norm.pdf(read[:, 0], [[0.0], [3.0]], [[1.0], [3.0]])
+    assert after == pytest.approx(joint / joint.sum(axis=0))
 
 
 def test_a_score_is_what_was_asked_for():
