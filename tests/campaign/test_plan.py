@@ -40,16 +40,6 @@ def test_what_narrows_the_shared_parameter_most_comes_first(planned):
     assert weighing.gain.E_x > 0.9
 
 
-def test_two_steps_give_more_than_one_and_three_more_than_two(planned):
-    best = planned.summary.proposals[0].gain.score
-    scores = [best, *(one.gain.score for one in planned.summary.sequences)]
-    costs = [one.cost_minutes for one in planned.summary.sequences]
-
-    assert len(scores) == 3
-    assert scores == sorted(scores)
-    assert costs == sorted(costs)
-
-
 @pytest.fixture(scope="module")
 def posed(campaign):
     """Boards, priors and what they share."""

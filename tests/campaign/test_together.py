@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from linear_boards import joint_posterior, linear_boards, log_evidence, standard_shared
+from linear_boards import exactly_together, joint_posterior, linear_boards, log_evidence, standard_shared
 
 from bayesplate.campaign.likelihood import SharedLikelihood
 from bayesplate.campaign.pulls import Pull
@@ -57,7 +57,7 @@ def test_all_boards_and_all_but_one_are_the_closed_form():
 
 def test_the_walk_has_the_moments_of_the_sums():
     rng = np.random.default_rng(3)
-    together = together_of(linear_boards(rng, 4, 2, [1.2, -0.7]), rng)
+    together = exactly_together(linear_boards(rng, 4, 2, [1.2, -0.7]))
     chains, convergence = walk(together, SamplerSettings(seed=1))
     mean, covariance = together.moments()
     sd = np.sqrt(np.diagonal(covariance))
@@ -65,14 +65,6 @@ def test_the_walk_has_the_moments_of_the_sums():
     assert convergence.passed
     assert np.abs((chains.pooled.mean(axis=0) - mean) / sd * np.sqrt(convergence.ess)).max() < 4.0
     assert np.abs(chains.pooled.std(axis=0) / sd - 1.0).max() < 4.0 / np.sqrt(2 * convergence.ess.min())
-
-
-def test_one_board_that_stands_apart_has_points():
-    rng = np.random.default_rng(4)
-    boards = linear_boards(rng, 8, 2, [3.0, 3.0], without=(0,))
-    together = together_of(boards, rng)
-
-    assert together.fewest_points >= FEWEST_POINTS
 
 
 def test_points_find_their_way_to_where_the_boards_are():
