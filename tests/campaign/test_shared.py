@@ -108,10 +108,10 @@ def test_a_sensor_on_all_boards_is_claimed_from_those_left_out(campaign, fitted_
 
     assert judge(taught).holds
     for name, one in taught.items():
-        others = fitted_campaign.summary.shared["attached_mass.mass"].others[name]
+        others = fitted_campaign.summary.shared[SHARED].others[name]
         assert one.log_score_gain > 0.0
         assert one.after_rms_cents < one.before_rms_cents
-        assert one.others["attached_mass.mass"].mean == pytest.approx(others.mean, rel=0.05)
+        assert one.others[SHARED].mean == pytest.approx(others.mean, rel=0.05)
 
 
 @pytest.mark.parametrize("scatter", [0.0, pytest.param(0.5, marks=pytest.mark.slow)])
