@@ -150,13 +150,11 @@ def test_boards_that_tell_most_may_be_held_another_way(planner, listed):
     assert of_shared[0] < 1.0
 
 
-def test_the_sheets_are_those_of_the_steps_that_are_proposed_together(campaign, planner, tmp_path, monkeypatch):
+def test_the_sheets_are_those_of_the_steps_that_are_proposed_together(campaign, planner, listed, tmp_path, monkeypatch):
     """Where modes are all that could be read, the best three are of three boards; two of them get a sheet."""
     monkeypatch.setattr("bayesplate.commands.plan.beliefs_together", lambda *_: planner.beliefs)
-    every = Planner.ranked
-    monkeypatch.setattr(
-        Planner, "ranked", lambda *given: tuple(one for one in every(*given) if one.entry.what in ("modes", "edges"))
-    )
+    of_modes = tuple(one for one in listed if one.entry.what in ("modes", "edges"))
+    monkeypatch.setattr(Planner, "ranked", lambda *_: of_modes)
     found = bayesplate.plan(campaign, goal="E_y", out=tmp_path / "out")
     asked = found.summary.sequences[-1].steps
 
