@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from bayesplate.diagnosis.laws import Following
 from bayesplate.plate.reduced import ReducedClass
@@ -22,20 +23,16 @@ def modes() -> ReducedClass:
     return ReducedClass(Parity(0, 0), stiffness, mass, N, (), np.empty((N, 0)), np.eye(N), nothing)
 
 
-def followed(*groups: tuple[int, ...], wanted: tuple[int, ...] = (0, 1, 2)) -> np.ndarray:
-    """At the plate itself, where the raised mode has crossed the next one, and at no plate."""
+@pytest.mark.parametrize(
+    ("groups", "crossed"),
+    [
+        ((), [1.0, 11.0, 9.0]),  # a mode that crosses another is found by its shape
+        (((1, 2),), [1.0, 9.0, 11.0]),  # within a class the lower reading is the lower mode
+    ],
+)
+def test_a_mode_is_followed_at_the_plate_itself_beyond_a_crossing_and_at_no_plate(groups, crossed):
     without = Weights(np.array([[1.0, 0.0]]), np.array([[1.0]]))
-    following = Following.of(modes(), without, np.array(wanted), tuple(np.array(group) for group in groups))
-    return following.eigenvalues(Weights(np.array([[1.0, 0.0], [1.0, 7.0], [-9.0, 0.0]]), np.ones((3, 1))))
-
-
-def test_a_mode_that_crosses_another_is_found_by_its_shape():
-    found = followed()
-    np.testing.assert_allclose(found[:2], [[1.0, 4.0, 9.0], [1.0, 11.0, 9.0]], rtol=1e-12)
-    assert np.isnan(found[2]).all()
-
-
-def test_within_a_class_the_lower_reading_is_the_lower_mode():
-    found = followed((1, 2))
-    np.testing.assert_allclose(found[:2], [[1.0, 4.0, 9.0], [1.0, 9.0, 11.0]], rtol=1e-12)
+    following = Following.of(modes(), without, np.array((0, 1, 2)), tuple(np.array(group) for group in groups))
+    found = following.eigenvalues(Weights(np.array([[1.0, 0.0], [1.0, 7.0], [-9.0, 0.0]]), np.ones((3, 1))))
+    np.testing.assert_allclose(found[:2], [[1.0, 4.0, 9.0], crossed], rtol=1e-12)
     assert np.isnan(found[2]).all()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from made_searches import baseline, candidate, decided, found_among, singles
 
 from bayesplate.board.quantity import Quantity
@@ -35,45 +36,39 @@ def folded(ratio: float) -> Nested:
     return Nested(before, ratio * before, np.ones((1, N_MODES), dtype=int))
 
 
-def told(found: Found, ratio: float = 0.5, others=()) -> tuple[str, ...]:
-    return named_in_part(found, decided(found), folded(ratio), others)
+LIMITS = [
+    ({}, 0.5, None, True),  # certainly there, and not all
+    ({"none": 0.99e-4}, 0.5, None, True),  # no effect is less probable than one in ten thousand
+    ({"none": 1.01e-4}, 0.5, None, False),
+    ({}, 0.666, None, True),  # the nested left-out error falls by a third
+    ({}, 0.667, None, False),
+    ({}, np.nan, None, False),
+    ({"rival": 0.24}, 0.5, None, True),  # it stands out by three to one
+    ({"rival": 0.26}, 0.5, None, False),
+    ({}, 0.5, 0.24, True),  # and does so with another noise
+    ({}, 0.5, 0.26, False),
+    ({"prior": BOUNDED}, 0.5, None, True),  # its size is not at the limit of its range
+    ({"prior": BOUNDED, "planted": 10.0}, 0.5, None, False),
+]
+"""Of a search: what it is made with, the nested ratio, and how probable a rival is under another assumption."""
 
 
-def test_what_is_certainly_there_and_not_all_is_named_in_part():
-    found = made()
+@pytest.mark.parametrize(("changed", "ratio", "rival_elsewhere", "is_named"), LIMITS)
+def test_each_limit_of_what_is_named_in_part(changed, ratio, rival_elsewhere, is_named):
+    found = made(**changed)
     verdict = decided(found)
     assert (verdict.word, verdict.effects, verdict.index) == ("unexplained", (), 0)
-    assert found.p_value(1) < PASSES
-    assert told(found) == ("a",)
+    others = [] if rival_elsewhere is None else [("with another noise", made(rival=rival_elsewhere))]
+    assert named_in_part(found, verdict, folded(ratio), others) == (("a",) if is_named else ())
 
 
 def test_what_passes_the_gate_is_named_and_not_in_part():
     found = made(rest=0.0)
     assert decided(found).word == "named"
-    assert told(found) == ()
     gated = replace(decided(made()), best=decided(found).best)  # were the word unexplained for another reason
     assert found.p_value(1) >= PASSES
-    assert named_in_part(found, gated, folded(0.5), ()) == ()
-
-
-def test_no_effect_is_less_probable_than_one_in_ten_thousand():
-    for none, names in [(0.99e-4, ("a",)), (1.01e-4, ())]:
-        assert told(made(none=none)) == names
-
-
-def test_the_nested_left_out_error_falls_by_at_least_a_third():
-    for ratio, names in [(0.666, ("a",)), (0.667, ()), (np.nan, ())]:
-        assert told(made(), ratio) == names
-
-
-def test_it_stands_out_by_three_to_one():
-    for rival, names in [(0.24, ("a",)), (0.26, ())]:
-        assert told(made(rival=rival)) == names
-
-
-def test_its_name_survives_every_other_assumption():
-    for rival, names in [(0.24, ("a",)), (0.26, ())]:
-        assert told(made(), others=[("if the noise is 1.5 times larger", made(rival=rival))]) == names
+    for verdict in (decided(found), gated):
+        assert named_in_part(found, verdict, folded(0.5), ()) == ()
 
 
 def test_the_usual_variants_are_asked_where_none_are_given(monkeypatch):
@@ -81,11 +76,6 @@ def test_the_usual_variants_are_asked_where_none_are_given(monkeypatch):
     assert named_in_part(found, decided(found), folded(0.5), None) == ("a",)
     monkeypatch.setattr(claim, "variants", lambda found: iter([("with other priors", made(rival=0.26))]))
     assert named_in_part(found, decided(found), folded(0.5), None) == ()
-
-
-def test_its_size_is_not_at_the_limit_of_its_range():
-    for planted, names in [(1.0, ("a",)), (10.0, ())]:
-        assert told(made(prior=BOUNDED, planted=planted)) == names
 
 
 def test_a_verdict_that_is_not_unexplained_has_no_part():

@@ -58,19 +58,30 @@ def test_constants_are_those_of_a_direct_regression():
     assert abs(np.sqrt(row @ spread @ row) / sd[2] - 1.0) > 0.05
 
 
-def test_simulated_nulls_have_the_noise_of_its_prior(small):
-    """Log-normal: ln of the mean square over a set is far wider than where the noise is known."""
-    ground, _ = small
-    (setup,) = ground.baseline.board.setups
-    n_sets = 20_000
-    simulated = noise_of_board(ground.baseline, np.random.default_rng(5), n_sets)
-    squares = np.log(np.mean(simulated**2, axis=1))
+def test_simulated_nulls_have_the_noise_of_its_prior_are_rounded_and_have_the_spread_of_the_inputs():
+    """Covariance of the sets: noise, a rounding of one Hz (variance 1/12 over f^2), and what the inputs do together.
+
+    The noise is log-normal: ln of the mean square over a set is far wider than where it is known.
+    """
+    plain, rounded = (baseline(np.random.default_rng(1), **kind) for kind in ({}, {"resolution": 1.0, "n_inputs": 2}))
+    (setup,) = plain.board.setups
+    noise = float(setup.noise.median**2 * np.exp(2.0 * setup.noise.log_sd**2))  # mean square of the noise prior
+    without = np.diag(np.full(6, noise))
+    more = np.diag(1.0 / 12.0 / np.exp(rounded.log_frequency) ** 2) + rounded.input_slopes @ rounded.input_slopes.T
+    n_sets = 40_000
+    for base, expected in ((plain, without), (rounded, without + more)):
+        simulated = noise_of_board(base, np.random.default_rng(5), n_sets)
+        assert np.abs(simulated.mean(axis=0)).max() < 4.0 * np.sqrt(expected.max() / n_sets)
+        products = np.einsum("ni,nj->nij", simulated, simulated)
+        error = products.std(axis=0) / np.sqrt(n_sets)
+        assert np.abs((products.mean(axis=0) - expected) / error).max() < 4.5
+    assert np.abs((products.mean(axis=0) - without) / error).max() > 15.0  # control: it shows
+
+    squares = np.log(np.mean(noise_of_board(plain, np.random.default_rng(5), n_sets) ** 2, axis=1))
     known = np.log(np.mean(np.random.default_rng(6).standard_normal((n_sets, 6)) ** 2, axis=1))
     variance = known.var() + (2.0 * setup.noise.log_sd) ** 2
     assert squares.var() == pytest.approx(variance, rel=5.0 * np.sqrt(2.0 / n_sets))
     assert known.var() < 0.7 * variance  # control
-    expected = setup.noise.median**2 * np.exp(2.0 * setup.noise.log_sd**2)
-    assert np.abs(simulated.mean(axis=0)).max() < 4.0 * np.sqrt(expected / n_sets)
 
 
 def test_the_null_control_finds_little_where_there_is_nothing_and_sees_what_there_is(small):
@@ -106,17 +117,13 @@ def test_fewer_null_sets_are_made_where_chance_is_certain(small):
     assert null_control(ground, np.random.default_rng(8), 250).against.size == 250
 
 
-def test_chance_is_certain_from_the_lower_bound_of_the_share_on():
-    """Of a hundred sets: the bound of 99 % is 0.0180 with six above, 0.0238 with seven."""
-    for larger, stops in [(6, False), (7, True)]:
-        low, _ = _share(np.arange(100) < larger)
-        assert (low > FALSE_ALARMS) is stops
-
-
 def test_bounds_of_a_share_are_those_of_the_binomial_distribution():
-    low, high = _share(np.arange(100) < 5)
-    assert binom.sf(4, 100, low) == pytest.approx(0.01)
-    assert binom.cdf(5, 100, high) == pytest.approx(0.01)
+    """Of a hundred sets with seven above, the lower bound of 99 % is beyond the false alarms, and not with six."""
+    for n_above in (5, 6, 7):
+        low, high = _share(np.arange(100) < n_above)
+        assert binom.sf(n_above - 1, 100, low) == pytest.approx(0.01)
+        assert binom.cdf(n_above, 100, high) == pytest.approx(0.01)
+        assert (low > FALSE_ALARMS) is (n_above == 7)
     assert _share(np.zeros(100, dtype=bool)) == (0.0, pytest.approx(1.0 - 0.01**0.01))
     assert _share(np.ones(100, dtype=bool)) == (pytest.approx(0.01**0.01), 1.0)
 
@@ -129,7 +136,6 @@ def test_fewer_sets_are_made_to_choose_where_the_threshold_is_clearly_passed_or_
     whole = made_to_choose(ground, control)
     board = np.quantile(whole.ratio, place) if place else 0.9 * whole.ratio.min()
     found = made_to_choose(ground, control, float(board))
-    assert found.ratio.size == n
     np.testing.assert_array_equal(found.ratio, whole.ratio[:n])
     if place != 0.05:
         assert (board < found.ratio_to_beat) == (board < whole.ratio_to_beat) == (place == 0.0)

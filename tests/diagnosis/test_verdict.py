@@ -11,11 +11,11 @@ from made_searches import bare, baseline, candidate, decided, exchanged, found_a
 from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.hypotheses import RELABELLING, Hypothesis, Swap
 from bayesplate.diagnosis.null_control import NullControl
-from bayesplate.diagnosis.search import PASSES, Found
+from bayesplate.diagnosis.search import Found
 from bayesplate.diagnosis.shifts import nothing, together
 from bayesplate.diagnosis.sizes import at_limit, size_posterior
 from bayesplate.diagnosis.terms import noise_grid
-from bayesplate.diagnosis.verdict import NOTHING_LEFT, alternatives, answers
+from bayesplate.diagnosis.verdict import answers
 
 NAMES = ("a", "b", "c")
 PAIR = ("a", "b")
@@ -41,25 +41,59 @@ def found_with(base, probability, size=0.05, residual=None, prior=None):
     return found_among(base, candidates, every, [probability.get(one.members, 0.0) for one in every], residual)
 
 
-NOTHING = np.zeros(6)
-
-
 def large(base):
     """Readings that neither noise nor any effect explains."""
     return 0.3 * base.log_frequency * np.array([1, -1, 1, 1, -1, -1])
 
 
-def test_none_needed(base):
-    verdict = decided(found_with(base, {(): 0.1, ("a",): 0.9}, residual=NOTHING))
-    assert verdict.word == "none needed"
-    assert (verdict.effects, verdict.index) == ((), 0)
-    assert verdict.best.members == ("a",)
+def mixed(base):
+    """Readings of which two have each other's labels."""
+    return exchanged(base, Swap(1, 2), np.zeros((1, 6)))[0]
+
+
+def quiet(base):
+    return np.zeros(6)
+
+
+DECISIONS = {
+    "none is needed from a probability of a tenth on": (quiet, {(): 0.1, ("a",): 0.9}, "none needed", (), 0),
+    "nor then, though the bare model fails": (large, {(): 0.1, ("a",): 0.9}, "unexplained", (), 0),
+    "the best fails the gate": (large, {("a",): 1.0}, "unexplained", (), 0),
+    "below a tenth it is named": (None, {(): 0.0999, ("a",): 0.9001}, "named", ("a",), 1),
+    "three times the next": (None, {("a",): 0.75, ("b",): 0.25}, "named", ("a",), 1),
+    "less than that": (None, {("a",): 0.7, ("b",): 0.24, ("c",): 0.03}, "indistinguishable group", ("a", "b"), 1),
+    "within ten": (None, {("a",): 0.6, ("b",): 0.33, ("c",): 0.061}, "indistinguishable group", ("a", "b", "c"), 1),
+    "beyond ten": (None, {("a",): 0.6, ("b",): 0.33, ("c",): 0.059}, "indistinguishable group", ("a", "b"), 1),
+    "a pair three times its better member": (None, {("a",): 0.2, ("b",): 0.1, PAIR: 0.7}, "named", PAIR, 5),
+    "a pair counts for its better member": (None, {("a",): 0.3, ("b",): 0.15, PAIR: 0.55}, "named", ("a",), 1),
+    "exchanged labels": (mixed, {SWAPPED: 0.9, ("a",): 0.1}, "named", SWAPPED, 4),
+}
+"""Readings (those of "a" where none are given), probabilities, and the verdict with its effects and its hypothesis."""
+
+
+@pytest.mark.parametrize("case", DECISIONS)
+def test_the_decision_table(base, case):
+    readings, probability, *expected = DECISIONS[case]
+    found = found_with(base, probability, residual=None if readings is None else readings(base))
+    verdict = decided(found)
+    assert [verdict.word, verdict.effects, verdict.index] == expected
+    assert verdict.best == answers(found)[0]
+    is_nearest = case == "the best fails the gate"
+    assert verdict.nearest == (verdict.best if is_nearest else None)
+    assert verdict.fitted_again == ((verdict.best,) if is_nearest else verdict.stands_for)
+    assert sum(one.support for one in answers(found)) == pytest.approx(sum(found.probability[1:]))
+
+
+def test_the_reason_of_a_misfit_and_what_a_pair_adds_to_its_better_member(base):
+    assert "p < 0.001" in decided(found_with(base, {("a",): 1.0}, residual=large(base))).reason
+    best = answers(found_with(base, {("a",): 0.3, ("b",): 0.15, PAIR: 0.55}))[0]
+    assert (best.members, best.index, best.support) == (("a",), 1, pytest.approx(0.85))
 
 
 def test_undetectable_if_every_effect_is_below_sight_and_not_if_one_could_be_seen(base):
-    found = found_with(base, {(): 0.5, ("a",): 0.5}, size=1e-4, residual=NOTHING)
+    found = found_with(base, {(): 0.5, ("a",): 0.5}, size=1e-4, residual=quiet(base))
     assert decided(found).word == "undetectable"
-    seen = found_with(base, {}, residual=NOTHING).ground.candidates["b"]
+    seen = found_with(base, {}).ground.candidates["b"]
     ground = replace(found.ground, candidates={**found.ground.candidates, "b": seen})
     assert decided(replace(found, ground=ground)).word == "none needed"
 
@@ -76,55 +110,6 @@ def test_an_effect_is_seen_from_twice_the_noise_over_root_n_on(base, times, is_s
     assert ground.paired == (("a",) if is_seen else ())
 
 
-def test_undetectable_where_three_modes_leave_nothing_to_judge_by():
-    few = baseline(np.random.default_rng(1), 3)
-    effects = {"a": candidate(few, "a", np.zeros(3))}
-    verdict = decided(found_among(few, effects, singles(few, effects), [0.01, 0.99], np.zeros(3)))
-    assert (verdict.word, verdict.reason) == ("undetectable", NOTHING_LEFT)
-
-
-def test_unexplained_if_the_bare_model_fails_and_what_comes_nearest_is_told_where_something_is_needed(base):
-    """The best of the answers is as improbable as chance leaves it, or fails the gate."""
-    idle = decided(found_with(base, {(): 0.1, ("a",): 0.9}, residual=large(base)))
-    assert (idle.word, idle.effects, idle.index, idle.nearest, idle.fitted_again) == ("unexplained", (), 0, None, ())
-    found = found_with(base, {("a",): 1.0}, residual=large(base))
-    assert found.p_value(1) < PASSES
-    needed = decided(found)
-    assert (needed.word, needed.effects, needed.index, needed.nearest) == ("unexplained", (), 0, needed.best)
-    assert "p < 0.001" in needed.reason
-
-
-def test_the_bound_for_none_is_a_tenth(base):
-    assert decided(found_with(base, {(): 0.0999, ("a",): 0.9001})).word == "named"
-    assert decided(found_with(base, {(): 0.1, ("a",): 0.9})).word != "named"
-
-
-def test_named_from_three_times_the_next_on_and_a_group_below(base):
-    verdict = decided(found_with(base, {("a",): 0.75, ("b",): 0.25}))
-    assert (verdict.word, verdict.effects, verdict.index) == ("named", ("a",), 1)
-    verdict = decided(found_with(base, {("a",): 0.70, ("b",): 0.24, ("c",): 0.03}))
-    assert (verdict.word, verdict.effects, verdict.index) == ("indistinguishable group", ("a", "b"), 1)
-
-
-def test_a_group_holds_what_is_within_a_factor_ten(base):
-    within = found_with(base, {("a",): 0.60, ("b",): 0.33, ("c",): 0.061})
-    beyond = found_with(base, {("a",): 0.60, ("b",): 0.33, ("c",): 0.059})
-    assert decided(within).effects == ("a", "b", "c")
-    assert decided(beyond).effects == ("a", "b")
-    assert [one.members for one in alternatives(beyond, answers(beyond))] == [("a",), ("b",)]
-
-
-def test_a_pair_stands_for_itself_from_three_times_its_better_member_on_and_else_counts_for_that(base):
-    verdict = decided(found_with(base, {("a",): 0.2, ("b",): 0.1, PAIR: 0.7}))
-    assert (verdict.word, verdict.effects, verdict.index) == ("named", PAIR, 5)
-    found = found_with(base, {("a",): 0.3, ("b",): 0.15, PAIR: 0.55})
-    best = answers(found)[0]
-    assert (best.members, best.index) == (("a",), 1)
-    assert best.support == pytest.approx(0.85)
-    assert decided(found).effects == ("a",)
-    assert sum(one.support for one in answers(found)) == pytest.approx(1.0)
-
-
 def test_a_pair_that_the_card_states_stands_for_itself_however_improbable(base, monkeypatch):
     monkeypatch.setattr("bayesplate.diagnosis.verdict.are_stated", lambda board, members: members == PAIR)
     found = found_with(base, {("a",): 0.9, ("b",): 0.09, PAIR: 0.01})
@@ -132,32 +117,16 @@ def test_a_pair_that_the_card_states_stands_for_itself_however_improbable(base, 
     assert answers(found)[0].support == pytest.approx(0.9)
 
 
-def test_exchanged_labels_can_win(base):
-    swap = Swap(1, 2)
-    mixed = exchanged(base, swap, np.zeros((1, 6)))[0]
-    verdict = decided(found_with(base, {SWAPPED: 0.9, ("a",): 0.1}, residual=mixed))
-    assert (verdict.word, verdict.effects, verdict.index) == ("named", SWAPPED, 4)
-
-
-@pytest.mark.parametrize(("z", "limited"), [(0.0, False), (2.4, False), (2.6, True), (-2.55, True)])
-def test_a_size_at_the_limit_of_its_range_is_never_named(base, z, limited):
-    """A Poisson ratio between 0 and 0.9: most probable at 0.4, 0.76, 0.79 and 0.02."""
+def test_a_size_at_the_limit_of_its_range_is_never_named(base):
+    """A Poisson ratio between 0 and 0.9: most probable at 0.76 and 0.79."""
     found = found_with(base, {("a",): 1.0}, size=1.0, prior=BOUNDED)
-    of_a = found.ground.candidates["a"]
-    cell = int(np.argmin(np.abs(of_a.fine.z[:, 0] - z)))
-    found = replace(found, residual=of_a.fine.shift[cell])
-    verdict = decided(found)
-    assert bool(at_limit(found, 1)) is limited
-    assert verdict.word == ("unexplained" if limited else "named")
-    assert ("limit" in verdict.reason) is limited
-
-
-def test_zero_is_no_limit_of_a_size_that_may_be_nothing_and_a_limit_is_found_in_a_pair_too(base):
-    assert at_limit(found_with(base, {("a",): 1.0}, residual=NOTHING), 1) == ""
-    found = found_with(base, {PAIR: 1.0}, size=1.0, prior=BOUNDED)
-    of_b = found.ground.candidates["b"]
-    found = replace(found, residual=of_b.coarse.shift[np.argmax(of_b.coarse.z[:, 0])])
-    assert at_limit(found, 5) != ""
+    cells = found.ground.candidates["a"].fine
+    for z, word in [(2.4, "named"), (2.6, "unexplained")]:
+        verdict = decided(replace(found, residual=cells.shift[int(np.argmin(np.abs(cells.z[:, 0] - z)))]))
+        assert verdict.word == word
+        assert verdict.reason.startswith("a fits only at the limit of its range: size = 0.7") is (word != "named")
+    nothing_there = found_with(base, {("a",): 1.0}, residual=quiet(base))
+    assert at_limit(nothing_there, 1) == ""  # zero is no limit of a size that may be nothing
 
 
 @pytest.mark.parametrize(
@@ -167,13 +136,12 @@ def test_zero_is_no_limit_of_a_size_that_may_be_nothing_and_a_limit_is_found_in_
 def test_a_cell_may_be_wider_than_what_counts_as_the_limit(base, members, index, size, limited):
     """An angle of up to two standard deviations: the last of nine cells has three hundredths of its prior.
 
-    A two hundredth lies between 1.956 and the bound.
+    A two hundredth lies between 1.956 and the bound. Of a pair it is the second effect that is looked at.
     """
     prior = Quantity.from_mean(0.0, 1.0, "normal", lower=0.0, upper=2.0)
     found = found_with(base, {members: 1.0}, size=1.0, prior=prior)
-    other = 0.0 if len(members) == 1 else visible_of(found.ground.candidates["b"])
-    found = replace(found, residual=size * visible_of(found.ground.candidates["a"]) + other)
-    assert bool(at_limit(found, index)) is limited
+    *others, last = (visible_of(found.ground.candidates[name]) for name in members)
+    assert bool(at_limit(replace(found, residual=size * last + sum(others)), index)) is limited
 
 
 @pytest.mark.parametrize("share", [0.55, 0.45])
@@ -208,20 +176,17 @@ def test_a_form_that_is_not_the_likelier_one_may_be_at_its_limit(base, share):
 
 def test_without_candidates_there_is_nothing_to_name(base):
     ground = ground_of(base, bare(base, noise_grid(base.board)))
-    calm = Found(ground, NOTHING, np.zeros(1), np.ones(1))
-    assert decided(calm).word == "none needed"
-    assert decided(calm).best is None
-    assert decided(replace(calm, residual=large(base))).word == "unexplained"
+    for residual, word in [(quiet(base), "none needed"), (large(base), "unexplained")]:
+        verdict = decided(Found(ground, residual, np.zeros(1), np.ones(1)))
+        assert (verdict.word, verdict.best) == (word, None)
 
 
 def test_needed_is_what_the_null_simulations_do_not_reach(base):
     """Odds against no effect of two to one: beyond 98 % of the null sets, or within them."""
     found = found_with(base, {(): 1 / 3, ("a",): 2 / 3})
-    calm, loud = (NullControl(np.linspace(-4.0, top, 101), None) for top in (0.0, 2.0))
-    assert decided(found, calm).word == "named"
-    assert decided(found, calm).is_needed
-    assert decided(found, loud).word != "named"
-    assert not decided(found, loud).is_needed
+    for top, is_needed in [(0.0, True), (2.0, False)]:
+        verdict = decided(found, NullControl(np.linspace(-4.0, top, 101), None))
+        assert (verdict.word == "named") is verdict.is_needed is is_needed
 
 
 def turned(base, probability, words="if the noise is larger"):
