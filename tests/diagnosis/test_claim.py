@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from made_searches import baseline, candidate, decided, ground_of, singles, visible_of
 
-from bayesplate.diagnosis.claim import Claim, Condition, judge_claim, nested_of, score_gain
+from bayesplate.diagnosis.claim import Claim, Condition, judge_claim, nested_of
 from bayesplate.diagnosis.folds import Nested, log_score, log_score_gains
 from bayesplate.diagnosis.null_control import NullControl, made_to_choose, null_control
 from bayesplate.diagnosis.search import search
@@ -47,15 +47,10 @@ def folds(found, ratio: float = 0.1) -> Nested:
     return Nested(told.before, ratio * told.before, np.ones_like(told.chosen))
 
 
-def met(claim: Claim) -> dict[str, bool]:
-    return {one.name: one.is_met for one in claim.conditions}
-
-
 def test_an_effect_that_is_there_meets_all_of_them(found):
     claim = judged(found, decided(found), CONTROL)
-    assert met(claim) == dict.fromkeys(
-        ("chance selection", "log score", "probability of none", "probability of another", "prior predictive"), True
-    )
+    names = ["chance selection", "log score", "probability of none", "probability of another", "prior predictive"]
+    assert [(one.name, one.is_met) for one in claim.conditions] == [(name, True) for name in names]
     assert claim.holds
 
 
@@ -82,7 +77,6 @@ def test_the_log_score_rises_by_two_standard_errors_of_the_paired_differences(fo
     )
     assert told.value == pytest.approx(gains.sum())
     assert told.limit == pytest.approx(2.0 * 3.0 * gains.std(ddof=1))
-    assert told.is_met is (told.value > told.limit)
     none = replace(folds(found), chosen=np.zeros((1, 9), dtype=int))
     told = judge_claim(found, decided(found), CONTROL, none).conditions[1]
     assert (told.value, told.limit, told.is_met) == (0.0, 0.0, False)
@@ -93,11 +87,6 @@ def test_a_gain_within_two_standard_errors_is_not_enough():
     told = judge_claim(weak, replace(decided(weak), index=1), CONTROL, folds(weak)).conditions[1]
     assert 0.0 < told.value < told.limit
     assert not told.is_met
-
-
-def test_a_gain_that_rests_on_one_reading_is_within_its_standard_error():
-    gain, error = score_gain([9.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    assert gain == pytest.approx(error)
 
 
 @pytest.mark.parametrize(("size", "widest"), [(0.15, 2.0), (1.2, 0.5)])
@@ -170,27 +159,23 @@ def test_the_folds_of_the_board_add_an_effect_where_the_null_simulations_call_fo
 
 def test_modes_that_alone_carry_something_count_in_no_condition(found):
     """Not in the ratio, not in that of the null sets, not in the score; before and after by the same modes."""
-    control = made_to_choose(found.ground, null_control(found.ground, np.random.default_rng(5), 100))
-    whole = folds(found, 0.5)
-    spoilt = replace(whole, before=whole.before.copy())
+    null = null_control(found.ground, np.random.default_rng(5), 100)
+    control = made_to_choose(found.ground, null)
+    spoilt = folds(found, 0.5)
     spoilt.before[0, 3] = 1.0  # without the reading that nobody else foretells the error was hundreds of cents
     assert spoilt.ratio[0] < 0.2
-    folded = spoilt.without((3,))
-    assert folded.ratio[0] == pytest.approx(0.5)
-    same = control.without((3,))
+    folded, same = spoilt.without((3,)), control.without((3,))
     kept = np.delete(np.arange(9), 3)
     after, before = (getattr(control.folded, name)[:, kept] for name in ("after", "before"))
     assert same.ratio == pytest.approx(np.sqrt((after**2).sum(axis=1) / (before**2).sum(axis=1)))
-    again = made_to_choose(found.ground, null_control(found.ground, np.random.default_rng(5), 100), carried=(3,))
-    assert again.ratio == pytest.approx(same.ratio)
+    assert made_to_choose(found.ground, null, carried=(3,)).ratio == pytest.approx(same.ratio)
     gains = log_score_gains(found.ground, found.residual, np.ones(9, dtype=int))
-    told = judge_claim(found, decided(found), same, folded).conditions
-    assert told[0].value == pytest.approx(0.5)
-    assert told[1].value == pytest.approx(gains[kept].sum())
-    assert told[1].value != pytest.approx(gains.sum())
-    assert log_score(found.ground, 1, found.residual, (3,)) - log_score(
-        found.ground, 0, found.residual, (3,)
-    ) == pytest.approx(gains[kept].sum())
+    by_ratio, by_score, *_ = judge_claim(found, decided(found), same, folded).conditions
+    assert by_ratio.value == pytest.approx(0.5)
+    assert by_score.value == pytest.approx(gains[kept].sum())
+    assert by_score.value != pytest.approx(gains.sum())
+    scores = [log_score(found.ground, index, found.residual, (3,)) for index in (0, 1)]
+    assert scores[1] - scores[0] == pytest.approx(gains[kept].sum())
 
 
 def test_nothing_is_claimed_where_every_mode_alone_carries_something(found):
@@ -201,15 +186,12 @@ def test_nothing_is_claimed_where_every_mode_alone_carries_something(found):
     assert np.isnan(none.ratio[0])
 
 
-def test_the_folds_of_the_board_do_not_count_what_carries_something(found):
+def test_the_folds_of_the_board_do_not_count_what_carries_something():
     """By the leverages of the search: an effect that shifts one mode alone."""
-    base = found.ground.baseline
     alone = searched(1.5, 0.2 * np.eye(9)[4])
-    carried = nested_of(alone, CONTROL, 1).carried
-    assert 4 in carried
-    assert set(nested_of(alone, CONTROL).carried) < set(carried)
-    assert not nested_of(alone, CONTROL, 1).counted[0, 4]
-    assert base.n_modes == 9
+    folded = nested_of(alone, CONTROL, 1)
+    assert set(nested_of(alone, CONTROL).carried) | {4} == set(folded.carried)
+    assert not folded.counted[0, 4]
     claim = judged(alone, replace(decided(alone), index=1), CONTROL)
-    gains = log_score_gains(alone.ground, alone.residual, nested_of(alone, CONTROL).chosen[0], carried)
+    gains = log_score_gains(alone.ground, alone.residual, folded.chosen[0], folded.carried)
     assert claim.conditions[1].value == pytest.approx(gains.sum())
