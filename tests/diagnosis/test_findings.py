@@ -333,7 +333,7 @@ def test_three_modes_leave_nothing_to_judge_by():
     assert found.ground.n_directions == 0
     priors = np.array([one.prior for one in found.ground.hypotheses])
     assert found.probability == pytest.approx(priors / priors.sum())  # nothing was learned
-    assert (told.verdict, told.effects, told.claim) == ("undetectable", (), False)
+    assert (told.verdict, told.effects, told.refitted, told.claim) == ("undetectable", (), (), False)
     assert told.reason == "three modes determine the three constants and leave nothing to judge by"
     content = diagnosis_json(told)
     for place, name in (

@@ -24,32 +24,28 @@ from bayesplate.posterior.posing import pose
 
 CENTS = np.log(2.0) / 1200.0
 BEFORE = CENTS * np.array([10.0, -10.0, 10.0, -10.0])
-GAINS = np.array([2.0, 1.0, 2.0, 1.0])
-"""Their sum is 6, their standard error sqrt(4 / 3) = 1.1547."""
+GAINS, ERROR = np.array([2.0, 1.0, 2.0, 1.0]), np.sqrt(4.0 / 3.0)
+"""Their sum is 6; their standard error, whatever is added to all of them."""
 
 
-def judged(fall=0.5, gains=GAINS):
-    return judge_stated(("fluid_loading",), "", BEFORE, (1.0 - fall) * BEFORE, np.asarray(gains))
+LIMITS = {
+    "all is well": (0.5, GAINS, True),
+    "the error falls by a fifth": (0.201, GAINS, True),
+    "it falls by less": (0.199, GAINS, False),
+    "it rises": (-0.5, GAINS, False),
+    "the score rises by more than two standard errors": (0.5, GAINS - (6.0 - 2.0 * ERROR - 0.01) / 4.0, True),
+    "it rises by less": (0.5, GAINS - (6.0 - 2.0 * ERROR + 0.01) / 4.0, False),
+}
+"""By how much of it the error falls, the gains of each mode, and whether a lower error is claimed."""
 
 
-def test_the_figures_of_a_claim():
-    found = judged()
-    assert (found.before_rms_cents, found.after_rms_cents) == pytest.approx((10.0, 5.0))
-    assert (found.log_score_gain, found.standard_error) == pytest.approx((6.0, np.sqrt(4.0 / 3.0)))
-    assert (found.n_modes, found.holds) == (4, True)
-
-
-def test_the_error_has_to_fall_by_a_fifth():
-    for fall, holds in [(0.201, True), (0.199, False), (-0.5, False)]:
-        assert judged(fall).holds is holds
-
-
-def test_the_score_has_to_rise_by_more_than_two_standard_errors():
-    """The scatter of these gains is that of +-0.5, whatever is added to all of them."""
-    for shift, holds in [(0.01, True), (-0.01, False)]:
-        error = np.sqrt(4.0) * np.std([0.5, -0.5, 0.5, -0.5], ddof=1)
-        gains = np.array([0.5, -0.5, 0.5, -0.5]) + (2.0 * error + shift) / 4.0
-        assert judged(gains=gains).holds is holds
+@pytest.mark.parametrize("case", LIMITS)
+def test_a_claim_asks_for_a_fall_by_a_fifth_and_a_score_beyond_two_standard_errors(case):
+    fall, gains, holds = LIMITS[case]
+    found = judge_stated(("fluid_loading",), "", BEFORE, (1.0 - fall) * BEFORE, gains)
+    assert (found.before_rms_cents, found.after_rms_cents) == pytest.approx((10.0, 10.0 * (1.0 - fall)))
+    assert (found.log_score_gain, found.standard_error) == pytest.approx((gains.sum(), ERROR))
+    assert (found.n_modes, found.holds) == (4, holds)
 
 
 def test_two_modes_are_too_few_to_judge_by():

@@ -83,16 +83,9 @@ def test_the_json_has_the_names_and_the_order_of_the_contract():
     assert list(content["known"][0]["change_percent"]) == ["E_x", "E_y", "G_xy"]
     assert list(content["p_value"]) == ["before", "after"]
     assert list(content["null_control"]) == [
-        "n_sets",
-        "flagged_percent",
-        "log_odds",
-        "log_odds_needed",
-        "log_odds_of_sets",
-        "nested_ratio",
-        "nested_ratio_to_beat",
-        "nested_ratio_percentile",
-        "nested_ratio_of_sets",
-    ]
+        "n_sets", "flagged_percent", "log_odds", "log_odds_needed", "log_odds_of_sets", "nested_ratio",
+        "nested_ratio_to_beat", "nested_ratio_percentile", "nested_ratio_of_sets",
+    ]  # fmt: skip
     assert list(content["elastic_shift"]["E_x"]) == ["before", "after", "shift_in_sd"]
     spread = ["mean", "sd", "q05", "q25", "q50", "q75", "q95", "unit"]
     assert list(content["elastic_averaged"]["G_xy"]) == spread
@@ -108,9 +101,7 @@ def test_the_json_has_the_values_and_nothing_that_json_lacks():
     content = diagnosis_json(NAMED)
 
     assert json.loads(json.dumps(content, allow_nan=False)) == content
-    assert content["format"] == 1
-    assert content["effects"] == ["membrane_tension"]
-    assert content["before"]["log_score"] == -24.75
+    assert (content["format"], content["effects"], content["before"]["log_score"]) == (1, ["membrane_tension"], -24.75)
     assert content["candidates"][3]["labels"] == ["(1,0)", "(0,1)"]
     assert content["candidates"][3]["bias_percent"] is None
 
@@ -179,22 +170,25 @@ def test_an_error_that_rises_is_said_to_rise():
 
 
 def test_with_too_few_readings_the_error_that_both_models_have_is_told():
-    few = {"nested_leave_one_out_rms_cents": None}
-    one = replace(DIAGNOSES["indistinguishable group"], before=replace(BEFORE, **few), after=replace(AFTER, **few))
-    assert claim_sentence(one).startswith("The left-out error fell from 46.5 to 9.5 cents")
-    fewer = few | {"leave_one_out_rms_cents": None}
-    one = replace(one, before=replace(BEFORE, **fewer), after=replace(AFTER, **fewer))
-    assert claim_sentence(one).startswith("The error in the fit fell from 21.2 to 4.2 cents")
-
-
-def test_conditions_that_too_few_readings_leave_open_are_not_said_to_fail():
-    """Nothing was chosen anew without a reading, and so nothing is known of what that would have given."""
-    group = DIAGNOSES["indistinguishable group"]
-    unjudged = {"chance selection", "log score"}
-    few = [replace(c, value=None, limit=None, is_met=False) if c.name in unjudged else c for c in group.conditions]
-    assert claim_sentence(replace(group, conditions=tuple(few))).endswith(
-        "No improvement is claimed: the readings are too few to choose anew without each of them."
-    )
+    """Nothing was chosen anew without a reading: what that would have given is not said to fail, for nobody knows."""
+    one, missing = DIAGNOSES["indistinguishable group"], {}
+    for lost, told in [
+        ("nested_leave_one_out_rms_cents", "The left-out error fell from 46.5 to 9.5 cents. "),
+        ("leave_one_out_rms_cents", "The error in the fit fell from 21.2 to 4.2 cents. "),
+    ]:
+        missing[lost] = None
+        unjudged = [
+            replace(each, value=None, limit=None, is_met=False)
+            if each.name in ("chance selection", "log score")
+            else each
+            for each in one.conditions
+        ]
+        few = replace(
+            one, before=replace(BEFORE, **missing), after=replace(AFTER, **missing), conditions=tuple(unjudged)
+        )
+        assert claim_sentence(few) == (
+            f"{told}No improvement is claimed: the readings are too few to choose anew without each of them."
+        )
 
 
 def test_the_probabilities_sum_to_one_as_they_are_printed():
@@ -246,19 +240,17 @@ def test_sizes_have_the_units_of_people():
 
 
 def test_the_sizes_of_what_was_fitted_again():
+    """The same effect alone and beside another has two sizes, which nobody could tell apart without the explanation."""
     assert sizes_table(NAMED).texts == (("membrane tension, clamped", "tension", "120 ± 12 N/m", "102 to 138 N/m"),)
     assert sizes_table(DIAGNOSES["none needed"]) is None
-
-
-def test_where_two_explanations_were_fitted_each_size_says_in_which_it_was():
-    """The same effect alone and beside another has two sizes, which nobody could tell apart otherwise."""
     (alone,) = NAMED.finalists
     both = replace(alone, effects=(*alone.effects, "fluid_loading"))
     table = sizes_table(replace(NAMED, finalists=(both, alone)))
-
     assert table.columns[:2] == ("fitted with", "effect")
-    assert [row[0] for row in table.texts] == ["membrane tension and fluid loading", "membrane tension"]
-    assert {row[1] for row in table.texts} == {"membrane tension, clamped"}
+    assert [row[:2] for row in table.texts] == [
+        ("membrane tension and fluid loading", "membrane tension, clamped"),
+        ("membrane tension", "membrane tension, clamped"),
+    ]
 
 
 def test_errors_before_and_after_or_as_they_are():
@@ -302,13 +294,10 @@ def test_candidates_stand_in_the_order_of_their_probability():
     assert candidates_table(DIAGNOSES["undetectable"]) is None
 
 
-def test_an_exchange_of_labels_that_is_out_of_the_question_is_not_shown():
-    for share, shown in ((0.0099, False), (0.01, True)):
+def test_an_improbable_exchange_of_labels_is_not_shown_and_setups_are_named_where_there_are_several():
+    for share, n_shown in ((0.0099, 1), (0.01, 2)):
         one = replace(NAMED, candidates=(TENSION, replace(EXCHANGE, inclusion_probability=share)))
-        assert (len(candidates_table(one).texts) == 2) is shown
-
-
-def test_a_setup_is_named_where_there_are_several():
+        assert len(candidates_table(one).texts) == n_shown
     several = replace(NAMED, candidates=(candidate("fluid_loading", "one"), candidate("fluid_loading", "two")))
     assert [row[0] for row in candidates_table(several).texts] == ["fluid loading, one", "fluid loading, two"]
 
@@ -327,29 +316,24 @@ def test_the_terminal_shows_only_tables_that_there_are():
     assert bare.remarks == (NEXT,)
 
 
-def test_before_and_after_in_one_csv():
-    header, *rows = csv.reader(io.StringIO(render(before_after_table(DIAGNOSES["named"]), "csv")))
-    by_name = {row[0]: dict(zip(header, row, strict=True)) for row in rows}
-
-    assert by_name["error in the fit, rms cents"] | {"quantity": ""} == {
-        "quantity": "", "before": "21.25", "after": "4.25", "shift_in_sd": "", "averaged": "", "averaged_sd": "",
+def test_before_and_after_in_one_csv_and_as_latex():
+    header, *rows = csv.reader(io.StringIO(render(before_after_table(NAMED), "csv")))
+    by_name = {row[0]: dict(zip(header[1:], row[1:], strict=True)) for row in rows}
+    assert by_name["error in the fit, rms cents"] == {
+        "before": "21.25", "after": "4.25", "shift_in_sd": "", "averaged": "", "averaged_sd": "",
     }  # fmt: skip
-    assert float(by_name["E_x, GPa"]["averaged"]) == pytest.approx(10.25)
-    assert float(by_name["E_x, GPa"]["averaged_sd"]) == pytest.approx(1.025)
+    assert {name: float(value) for name, value in by_name["E_x, GPa"].items()} == pytest.approx(
+        {"before": 10.25, "after": 11.5, "shift_in_sd": 2.5, "averaged": 10.25, "averaged_sd": 1.025}
+    )
     assert by_name["membrane tension tension, clamped, N/m"]["after"] == "120.0"
-    assert float(by_name["E_x, GPa"]["before"]) == pytest.approx(10.25)
-    assert float(by_name["E_x, GPa"]["shift_in_sd"]) == 2.5
+    latex = render(before_after_table(NAMED), "latex")
+    assert r"$E_{x}$, GPa & 10.25 & 11.50 & $+2.5$ & 10.2 $\pm$ 1.0 \\" in latex
+    assert r"membrane tension tension, clamped, N/m & -- & 120 & -- & -- \\" in latex
 
-
-def test_the_latex_by_hand():
-    undetectable = before_after_table(replace(DIAGNOSES["undetectable"], before=replace(BEFORE, log_score=None)))
-    named = render(before_after_table(NAMED), "latex")
-
-    assert "after" not in render(undetectable, "latex").partition("\n")[2]
-    assert render(undetectable, "csv").splitlines()[0] == "quantity,before,averaged,averaged_sd"
-    assert r"$E_{x}$, GPa & 10.25 & 11.50 & $+2.5$ & 10.2 $\pm$ 1.0 \\" in named
-    assert r"membrane tension tension, clamped, N/m & -- & 120 & -- & -- \\" in named
-    assert r"log score & -- & -- \\" in render(undetectable, "latex")
+    bare = before_after_table(replace(DIAGNOSES["undetectable"], before=replace(BEFORE, log_score=None)))
+    assert render(bare, "csv").splitlines()[0] == "quantity,before,averaged,averaged_sd"
+    assert "after" not in render(bare, "latex").partition("\n")[2]
+    assert r"log score & -- & -- \\" in render(bare, "latex")
 
 
 def test_it_shows_itself():
