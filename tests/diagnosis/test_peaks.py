@@ -85,37 +85,28 @@ def enumerated(base: Baseline) -> float:
     return float(logsumexp(logs))
 
 
-def noisy(rng, base_of, spoilt=0.0):
+def noisy(rng, spoilt=0.0):
     """Readings of the planted modes with noise; the third one off by so much."""
     middle = baseline(np.random.default_rng(3), N_EVERY).log_frequency[READ]
     readings = middle + NOISE * rng.standard_normal(len(READ))
     readings[2] += spoilt
-    return base_of(np.random.default_rng(3), readings)
+    return peaked(np.random.default_rng(3), readings)
 
 
-def summed(base: Baseline):
-    """The search of no effect, by the labels on the board alone and summed over all."""
-    ground = ground_of(base, bare(base, one_level(base)))
-    ground = replace(ground, hypotheses=(with_every(ground.hypotheses[0]),))
-    return search(ground).log_evidence[0], search(with_own_labels(ground)).log_evidence[0]
+SPOILT = [(0.0, 0.02, 0.02), (0.3, 0.02, 0.02), (0.05, 1.5, 0.1), (0.2, 1.5, 0.1)]
+"""By how much the third peak is off, and by how much the sum may be below and above: between two modes it is a lower
+bound, off by a nat or so, for ways to take the peak that no draw comes near are not in the sum."""
 
 
-@pytest.mark.parametrize("spoilt", [0.0, 0.3], ids=["as labelled", "another mode"])
-def test_the_evidence_is_summed_over_all_assignments(spoilt):
+@pytest.mark.parametrize(("spoilt", "below", "above"), SPOILT)
+def test_the_evidence_is_summed_over_all_assignments(spoilt, below, above):
     """Whatever the labels on the board say; a search by these alone is off."""
-    base = noisy(np.random.default_rng(5), peaked, spoilt)
-    by_labels, found = summed(base)
-    assert found == pytest.approx(enumerated(base), abs=0.02)
-    assert abs(by_labels - enumerated(base)) > 4.0  # control
-
-
-@pytest.mark.parametrize("spoilt", [0.05, 0.2])
-def test_a_peak_between_two_modes_is_hardly_undervalued(spoilt):
-    """Ways to take it that no draw comes near are not in the sum: it is a lower bound, off by a nat or so."""
-    base = noisy(np.random.default_rng(5), peaked, spoilt)
-    by_labels, found = summed(base)
-    assert enumerated(base) - 1.5 < found < enumerated(base) + 0.1
-    assert by_labels < enumerated(base) - 10.0  # control
+    base = noisy(np.random.default_rng(5), spoilt)
+    ground = ground_of(base, with_every(bare(base, one_level(base))))
+    by_labels, found = (search(one).log_evidence[0] for one in (ground, with_own_labels(ground)))
+    expected = enumerated(base)
+    assert expected - below < found < expected + above
+    assert abs(by_labels - expected) > 4.0  # control
 
 
 def with_every(none):
@@ -178,23 +169,20 @@ def test_certain_labels_leave_the_hypotheses_alone():
 
 
 def test_a_reading_that_is_no_mode_is_left_out_of_folds():
-    base = noisy(np.random.default_rng(5), peaked)
-    ground = ground_of(base, bare(base, one_level(base)))
-    rows = base.rows.copy()
-    rows[2] = -1
-    without = replace(with_every(ground.hypotheses[0]), members=("a",))
-    ground = replace(ground, hypotheses=(ground.hypotheses[0], without.labelled(base, rows)))
+    base = noisy(np.random.default_rng(5))
+    none = bare(base, one_level(base))
+    rows = np.where(np.arange(6) == 2, -1, base.rows)
+    without = replace(with_every(none), members=("a",)).labelled(base, rows)
+    ground = ground_of(base, none, without)
     folded = nested(ground, base.residual[None, :], -np.inf)
     assert np.isnan(folded.after[0]).tolist() == [False, False, True, False, False, False]
     kept = np.arange(6) != 2
     rms = [np.sqrt(np.mean(part[0, kept] ** 2)) for part in (folded.after, folded.before)]
     assert folded.ratio[0] == pytest.approx(rms[0] / rms[1])
     gains = log_score_gains(ground, base.residual, np.array([0, 0, 1, 0, 0, 0]))
-    alone = np.log(6 * SPURIOUS) + base.residual[2] + base.log_frequency[2] - (base.residual + base.log_frequency).max()
-    own = log_score_gains(ground, base.residual, np.array([0, 0, 0, 0, 0, 0]))
-    assert own[2] == 0.0
-    expected = log_score_of(ground, 2)
-    assert gains[2] == pytest.approx(alone - expected)
+    alone = np.log(6 * SPURIOUS) + base.log_readings[2] - base.log_readings.max()
+    assert gains[2] == pytest.approx(alone - log_score_of(ground, 2))
+    assert log_score_gains(ground, base.residual, np.zeros(6, dtype=int))[2] == 0.0
 
 
 def log_score_of(ground, mode):
@@ -220,10 +208,7 @@ def test_labels_are_exchanged_only_where_all_are_certain(confidence):
 
 def test_the_sum_counts_sure_readings_once():
     """Readings whose label is certain enter with their own density, the others by their assignments."""
-    base = noisy(np.random.default_rng(5), peaked)
-    (setup,) = base.board.setups
+    base = noisy(np.random.default_rng(5))
     noise = np.full((3, 1), NOISE)
     there = base.every.log_frequency + 0.003 * np.random.default_rng(2).standard_normal((3, N_EVERY))
-    total = log_summed(base, there, noise)
-    assert total == pytest.approx(base.every.peaks[0].log_likelihood(there, noise[:, 0]))
-    assert len(setup.readings) == 6
+    assert log_summed(base, there, noise) == pytest.approx(base.every.peaks[0].log_likelihood(there, noise[:, 0]))

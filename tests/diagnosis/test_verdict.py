@@ -123,7 +123,7 @@ def test_a_size_at_the_limit_of_its_range_is_never_named(base):
     cells = found.ground.candidates["a"].fine
     for z, word in [(2.4, "named"), (2.6, "unexplained")]:
         verdict = decided(replace(found, residual=cells.shift[int(np.argmin(np.abs(cells.z[:, 0] - z)))]))
-        assert verdict.word == word
+        assert (verdict.word, verdict.is_needed) == (word, True)
         assert verdict.reason.startswith("a fits only at the limit of its range: size = 0.7") is (word != "named")
     nothing_there = found_with(base, {("a",): 1.0}, residual=quiet(base))
     assert at_limit(nothing_there, 1) == ""  # zero is no limit of a size that may be nothing
