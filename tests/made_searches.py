@@ -15,11 +15,11 @@ from bayesplate.board.reading import Reading
 from bayesplate.board.setup import Setup
 from bayesplate.diagnosis.baseline import Baseline, PossibleModes
 from bayesplate.diagnosis.forms import Form
-from bayesplate.diagnosis.hypotheses import Hypothesis, Swap
+from bayesplate.diagnosis.hypotheses import RELABELLING, Hypothesis, Swap
 from bayesplate.diagnosis.laws import FormLaw
 from bayesplate.diagnosis.null_control import NullControl
 from bayesplate.diagnosis.search import Candidate, Found, Ground
-from bayesplate.diagnosis.shifts import Cells, nothing
+from bayesplate.diagnosis.shifts import Cells, nothing, together
 from bayesplate.diagnosis.signatures import signature
 from bayesplate.diagnosis.terms import NoiseGrid, noise_grid
 from bayesplate.diagnosis.verdict import Verdict, decide
@@ -177,6 +177,37 @@ def candidate(
     shift = direction * float(prior.value(1.0))
     seen = signature(base, name, (free,), base.log_frequency + shift)
     return Candidate(name, (law,), fine, coarse, seen, float(np.linalg.norm(seen.visible / cents(base.scales))))
+
+
+def found_with(
+    probability: Mapping[tuple[str, ...], float],
+    names: Sequence[str] = ("a", "b", "c"),
+    *,
+    n_modes: int = 6,
+    size: float = 0.05,
+    prior: Quantity = HALF_NORMAL,
+    residual: np.ndarray | None = None,
+) -> Found:
+    """A search of three effects, of an exchange of two labels, and of the first two effects together, in this order.
+
+    It found given probabilities by members. By default the readings are those of the first effect at its nominal size.
+    """
+    base = baseline(np.random.default_rng(1), n_modes)
+    directions = size * np.linalg.qr(np.random.default_rng(2).standard_normal((n_modes, n_modes)))[0][: len(names)]
+    effects = {name: candidate(base, name, one, prior) for name, one in zip(names, directions, strict=True)}
+    first, second, *_ = effects.values()
+    every, swap = singles(base, effects), Swap(1, 2)
+    levels, both = every[0].noise, together(first.coarse, second.coarse)
+    every += [Hypothesis((RELABELLING,), 0.1, nothing(n_modes), levels, swap.applied(base), swap)]
+    every += [Hypothesis((first.name, second.name), 0.1, both, levels, base)]
+    residual = visible_of(first) if residual is None else residual
+    return found_among(base, effects, every, [probability.get(one.members, 0.0) for one in every], residual)
+
+
+QUIET = np.zeros(6)
+"""Residual of six readings without any noise."""
+BEYOND_NOISE = 0.3 * np.log(60.0 * np.exp(0.3 * np.arange(6))) * np.array([1, -1, 1, 1, -1, -1])
+"""That of six readings that neither noise nor any effect explains."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,16 +9,15 @@ import numpy as np
 import pytest
 from diagnoses import spread
 from made_searches import (
+    BEYOND_NOISE,
     HALF_NORMAL,
     NOISE,
+    QUIET,
     bare,
     baseline,
-    candidate,
     decided,
-    found_among,
+    found_with,
     ground_of,
-    singles,
-    visible_of,
 )
 from made_summaries import SUMMARY, mode
 
@@ -30,11 +29,10 @@ from bayesplate.diagnosis.claim import Claim, Condition
 from bayesplate.diagnosis.entries import effect_entry, exchange_entries, fate_of
 from bayesplate.diagnosis.findings import Case, Side, _nearest_sentence, diagnosis_of
 from bayesplate.diagnosis.folds import Nested, log_score, nested
-from bayesplate.diagnosis.hypotheses import RELABELLING, Hypothesis, Swap, probabilities
+from bayesplate.diagnosis.hypotheses import RELABELLING, Swap, probabilities
 from bayesplate.diagnosis.null_control import NullControl, null_control
 from bayesplate.diagnosis.result import Diagnosis, EffectEntry, diagnosis_json
 from bayesplate.diagnosis.search import Found, search
-from bayesplate.diagnosis.shifts import nothing, together
 from bayesplate.diagnosis.terms import noise_grid
 from bayesplate.diagnosis.verdict import Answer, answers
 from bayesplate.diagnosis.words import verdict_sentence, verdict_sentences, warnings
@@ -59,29 +57,15 @@ MOVED = replace(
 )
 
 
-def made(probability, size=0.05, residual=None, n_modes=6):
-    """A search of three effects and one exchange of labels that found given probabilities by members.
-
-    The readings are those of shear at its nominal size.
-    """
-    base = baseline(np.random.default_rng(1), n_modes)
-    directions = size * np.linalg.qr(np.random.default_rng(2).standard_normal((n_modes, n_modes)))[0][:3]
-    candidates = {name: candidate(base, name, one) for name, one in zip(NAMES, directions, strict=True)}
-    every, swap = singles(base, candidates), Swap(1, 2)
-    every += [Hypothesis((RELABELLING,), 0.1, nothing(n_modes), every[0].noise, swap.applied(base), swap)]
-    residual = visible_of(candidates[SHEAR]) if residual is None else residual
-    return found_among(base, candidates, every, [probability.get(one.members, 0.0) for one in every], residual)
+def made(probability, **changed) -> Found:
+    """The search of the three effects; the readings are those of shear at its nominal size."""
+    return found_with(probability, NAMES, **changed)
 
 
 def entries(found: Found) -> dict[str, EffectEntry]:
     verdict, ranked = decided(found), answers(found)
     told = [effect_entry(found, verdict, ranked, one, 0.5) for one in found.ground.candidates.values()]
     return {one.name: one for one in told} | {RELABELLING: exchange_entries(found, verdict, ranked)[0]}
-
-
-def misfit_of(found: Found) -> np.ndarray:
-    """Readings that neither noise nor any effect explains."""
-    return 0.3 * found.ground.baseline.log_frequency * np.array([1, -1, 1, 1, -1, -1])
 
 
 def draws_of(predictive: np.ndarray, E_x: float = 10e9) -> SimpleNamespace:
@@ -127,7 +111,7 @@ def test_what_became_of_each_candidate_of_a_named_effect():
 
 def test_less_probable_is_only_what_is_so_and_would_fit():
     """Readings of pure noise, which every candidate fits: the answer's own probability beside the winner's."""
-    quiet = made({(SHEAR,): 0.6, (AIR,): 0.1, (RELABELLING,): 0.05}, residual=np.zeros(6))
+    quiet = made({(SHEAR,): 0.6, (AIR,): 0.1, (RELABELLING,): 0.05}, residual=QUIET)
     told = entries(quiet)
     assert told[SHEAR].fate == "in the verdict"
     assert (told[AIR].fate, told[AIR].rejected_because) == (
@@ -141,8 +125,8 @@ def test_less_probable_is_only_what_is_so_and_would_fit():
 def test_an_exchange_is_told_with_its_likelihood_ratio():
     for gained, words in [(3.0, "20 times likelier"), (-1.0, "2.7 times less likely"),
                                               (30.0, "more than a million times likelier")]:  # fmt: skip
-        found = made({(): 0.5, (RELABELLING,): 0.1}, residual=np.zeros(6))
-        found = replace(found, log_evidence=np.array([2.0, 0.0, 0.0, 0.0, 2.0 + gained]))
+        found = made({(): 0.5, (RELABELLING,): 0.1}, residual=QUIET)
+        found = replace(found, log_evidence=np.array([2.0, 0.0, 0.0, 0.0, 2.0 + gained, 0.0]))
         told = entries(found)[RELABELLING]
         assert told.rejected_because.startswith("not needed: nothing lacking has a probability of 0.50; with these")
         assert told.rejected_because.endswith(f" labels exchanged the readings are {words}")
@@ -167,8 +151,8 @@ def test_only_the_exchange_that_the_verdict_stands_for_is_in_it():
 
 def test_the_constants_to_quote_are_averaged_and_never_those_of_one_member(monkeypatch):
     """Draws of each model that was fitted, by its probability: here 10 GPa without and 20 GPa with shear."""
-    found = made({(): 0.4, (SHEAR,): 0.6}, residual=np.zeros(6))
-    found = replace(found, probability=np.array([0.04, 0.96, 0.0, 0.0, 0.0]))
+    found = made({(): 0.4, (SHEAR,): 0.6}, residual=QUIET)
+    found = replace(found, probability=np.array([0.04, 0.96, 0.0, 0.0, 0.0, 0.0]))
     case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25))
     monkeypatch.setattr(sensitivity, "under_exact_law", lambda _: None)  # the probabilities are made by hand
     group = replace(case.verdict, word="indistinguishable group", index=1)
@@ -196,26 +180,25 @@ def test_a_size_that_the_card_fixes_is_shown():
 
 
 def test_a_candidate_that_is_not_needed_is_told_with_the_probability_of_none():
-    calm = made({(): 0.1, (SHEAR,): 0.9}, residual=np.zeros(6))
-    for found, fate in ((calm, "not needed"), (replace(calm, residual=misfit_of(calm)), "not established")):
+    calm = made({(): 0.1, (SHEAR,): 0.9}, residual=QUIET)
+    for found, fate in ((calm, "not needed"), (replace(calm, residual=BEYOND_NOISE), "not established")):
         told = entries(found)[SHEAR]
         assert (told.fate, told.rejected_because) == (fate, f"{fate}: nothing lacking has a probability of 0.10")
 
 
 def test_the_winner_that_fails_the_gate_is_told_so():
-    found = made({(SHEAR,): 1.0})
-    told = entries(replace(found, residual=misfit_of(found)))
+    told = entries(made({(SHEAR,): 1.0}, residual=BEYOND_NOISE))
     assert {told[name].fate for name in (SHEAR, AIR)} == {"does not fit"}
     assert told[SHEAR].rejected_because.startswith("with transverse shear the misfit is still too large (p ")
 
 
 def test_what_would_not_show_at_its_usual_size_is_told_so_unless_it_is_probable_at_another():
     """A candidate that is found with a tenth or more is told by its probability; with less it could not have been."""
-    hidden = entries(made({(): 0.5, (SHEAR,): 0.5}, size=1e-4, residual=np.zeros(6)))
+    hidden = entries(made({(): 0.5, (SHEAR,): 0.5}, size=1e-4, residual=QUIET))
     assert {hidden[name].fate for name in NAMES} == {"not detectable"}
     assert hidden[AIR].rejected_because == "its visible part is below what these readings could show"
     assert all(hidden[name].below_detection_limit for name in NAMES)
-    probable = entries(made({(SHEAR,): 0.8, (AIR,): 0.11, (GRAIN,): 0.09}, size=1e-4, residual=np.zeros(6)))
+    probable = entries(made({(SHEAR,): 0.8, (AIR,): 0.11, (GRAIN,): 0.09}, size=1e-4, residual=QUIET))
     assert [probable[name].fate for name in NAMES] == ["in the verdict", "less probable", "not detectable"]
 
 
@@ -364,7 +347,7 @@ def test_four_and_five_modes_are_judged():
 def test_a_misfit_beyond_all_doubt_has_odds():
     """Probabilities of none below the smallest number there is: the odds are those of the logarithms."""
     found = made(NAMED)
-    evidence = np.array([-2000.0, -3.0, -9.0, -9.0, -9.0])
+    evidence = np.array([-2000.0, -3.0, -9.0, -9.0, -9.0, -np.inf])
     sure = Found(found.ground, found.residual, evidence, probabilities(found.ground.hypotheses, evidence))
     assert sure.none == 0.0
     wanted = 1997.0 + np.log(0.1 / 0.5) + np.log1p(3.0 * np.exp(-6.0))
@@ -387,13 +370,7 @@ def test_a_board_that_declares_every_effect_has_no_odds():
 
 
 def test_two_effects_that_are_one_alternative_stay_together():
-    found = made({}, residual=np.zeros(6))
-    ground = found.ground
-    tables = [ground.candidates[name].coarse for name in (SHEAR, AIR)]
-    pair = Hypothesis((SHEAR, AIR), 0.1, together(*tables), ground.hypotheses[0].noise, ground.baseline)
-    shares = np.array([0.02, 0.01, 0.01, 0.4, 0.01, 0.55])
-    ground = replace(ground, hypotheses=(*ground.hypotheses, pair))
-    found = Found(ground, found.residual, np.log(shares), shares)
+    found = made({(): 0.02, (SHEAR,): 0.01, (AIR,): 0.01, (SHEAR, AIR): 0.55, (GRAIN,): 0.41}, residual=QUIET)
     told = diagnosis_of(case_of(found, control_of(found, 0.5), folds_of(found, 0.25)))
     assert (told.verdict, told.effects) == ("indistinguishable group", (SHEAR, AIR, GRAIN))
     assert told.words == "transverse shear and fluid loading, or grain angle"

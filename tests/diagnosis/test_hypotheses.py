@@ -142,19 +142,6 @@ def test_labels_are_exchanged_in_their_own_setup():
     assert second.labels == tuple(base.board.setups[1].labels[i] for i in (1, 0, 2))
 
 
-@pytest.mark.parametrize("mode", [0, 3])
-def test_a_fold_knows_nothing_of_the_reading_that_is_left_out(base, mode):
-    """Also where labels are exchanged: the reading is then left out under its other label."""
-    rng = np.random.default_rng(5)
-    one = Hypothesis(("a",), 0.1, table(rng), one_level(base), base)
-    residuals = 0.01 * rng.standard_normal((1, 6))
-    changed = residuals + 0.1 * np.eye(6)[mode]
-    for each in (bare(base, one_level(base)), one, swap_of(base, 3, 4)):
-        before, after = (each.terms.left_out(each.seen(base, seen))[0][:, 0] for seen in (residuals, changed))
-        assert after[mode] == pytest.approx(before[mode], abs=1e-9)
-        assert np.abs(np.delete(after - before, mode)).min() > 1e-6
-
-
 def test_every_fold_that_can_see_an_exchange_makes_it_and_none_where_labels_are_right(base):
     straight = 1e-4 * np.random.default_rng(6).standard_normal((1, 6))
     swap = swap_of(base, 3, 4)
