@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 
 from bayesplate.diagnosis import peaks
 from bayesplate.diagnosis.baseline import Baseline, PossibleModes
-from bayesplate.diagnosis.folds import log_score_gains, nested
+from bayesplate.diagnosis.folds import log_score, log_score_gains, nested
 from bayesplate.diagnosis.hypotheses import Hypothesis, confusable
 from bayesplate.diagnosis.peaks import log_summed, with_own_labels
 from bayesplate.diagnosis.search import search
@@ -181,20 +181,9 @@ def test_a_reading_that_is_no_mode_is_left_out_of_folds():
     assert folded.ratio[0] == pytest.approx(rms[0] / rms[1])
     gains = log_score_gains(ground, base.residual, np.array([0, 0, 1, 0, 0, 0]))
     alone = np.log(6 * SPURIOUS) + base.log_readings[2] - base.log_readings.max()
-    assert gains[2] == pytest.approx(alone - log_score_of(ground, 2))
+    given_the_others = log_score(ground, 0, base.residual, carried=np.flatnonzero(kept))
+    assert gains[2] == pytest.approx(alone - given_the_others)
     assert log_score_gains(ground, base.residual, np.zeros(6, dtype=int))[2] == 0.0
-
-
-def log_score_of(ground, mode):
-    """Density of one reading given the others without an effect: normal about the fit to the others."""
-    base = ground.baseline
-    others = np.arange(6) != mode
-    x = base.slopes
-    precision = x[others].T @ x[others] / NOISE**2
-    fitted = np.linalg.solve(precision, x[others].T @ base.residual[others] / NOISE**2)
-    variance = NOISE**2 + x[mode] @ np.linalg.solve(precision, x[mode])
-    off = base.residual[mode] - x[mode] @ fitted
-    return -0.5 * off**2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
 
 
 @pytest.mark.parametrize("confidence", [0.0, 0.9])

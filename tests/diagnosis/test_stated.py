@@ -88,20 +88,18 @@ def with_item(board, mass):
     return replace(board, setups=(replace(setup, attached=(weighed,)),))
 
 
-def posed(board, effects=()):
-    return Problem.from_card(board, effects=effects).posed
-
-
-def both_fits(problem):
-    """Without the mass and with it."""
-    return [known_fit(problem, one) for one in ((), ("attached_mass",))]
+@pytest.fixture(scope="module")
+def problem(weighed):
+    """The board with its true mass, which it declares."""
+    return Problem.from_card(with_item(weighed, 0.012), effects=("attached_mass",)).posed
 
 
 @pytest.mark.parametrize(("effects", "mass", "is_there"), [(("attached_mass",), 0.012, True), ((), 0.05, False)])
-def test_a_stated_mass_that_is_there_is_claimed_and_one_that_is_not_is_not(weighed, effects, mass, is_there):
+def test_a_stated_mass_that_is_there_is_claimed_and_one_that_is_not_is_not(problem, weighed, effects, mass, is_there):
     """Whether the card's list of effects has it or leaves it out."""
-    problem = posed(with_item(weighed, mass), effects)
-    (claim,) = stated_claims(problem, both_fits(problem))
+    board = Problem.from_card(with_item(weighed, mass), effects=effects).prepared.board
+    stating = replace(problem, board=board)
+    (claim,) = stated_claims(stating, [known_fit(stating, one) for one in ((), ("attached_mass",))])
     assert claim.effects == ("attached_mass",)
     assert claim.holds is is_there
     assert (claim.after_rms_cents < 0.5 * claim.before_rms_cents) is is_there
