@@ -130,6 +130,7 @@ def test_an_exchange_is_told_with_its_likelihood_ratio():
         told = entries(found)[RELABELLING]
         assert told.rejected_because.startswith("not needed: nothing lacking has a probability of 0.50; with these")
         assert told.rejected_because.endswith(f" labels exchanged the readings are {words}")
+        assert told.log_bayes_factor == pytest.approx(gained)
 
 
 def test_only_the_exchange_that_the_verdict_stands_for_is_in_it():

@@ -122,16 +122,15 @@ PASSAGES = [
 ]  # fmt: skip
 
 
-def test_the_terminal_and_the_page_tell_the_same():
-    for word, words in PASSAGES:
-        one = DIAGNOSES[word]
-        closing = verdict_sentence(one)
-
-        assert closing.startswith(f"Verdict: {word}. {verdict_sentences(one)[0]}")
-        assert words in closing
-        assert ("reduced" in closing) is one.claim
-        assert ("No improvement is claimed" in closing) is (one.is_refitted and not one.claim)
-        assert verdict_sentences(one)[-1] == closing[-len(verdict_sentences(one)[-1]) :] or not one.is_refitted
+@pytest.mark.parametrize(("word", "words"), PASSAGES)
+def test_the_terminal_and_the_page_tell_the_same(word, words):
+    one = DIAGNOSES[word]
+    closing, page = verdict_sentence(one), verdict_sentences(one)
+    assert closing.startswith(f"Verdict: {word}. {page[0]}")
+    assert words in closing
+    assert ("reduced" in closing) is one.claim
+    assert ("No improvement is claimed" in closing) is (one.is_refitted and not one.claim)
+    assert closing.endswith(page[-1]) or not one.is_refitted
 
 
 def test_the_page_says_what_its_constants_are():
@@ -229,14 +228,13 @@ SIZES = [
 ]
 
 
-def test_sizes_have_the_units_of_people():
-    for unit, sizes, shown in SIZES:
-        low, middle, high = sizes
-        size = Amplitude(parameter="mass", form="", q05=low, q50=middle, q95=high, unit=unit)
-        one = replace(NAMED, candidates=(replace(TENSION, amplitude=size),))
-        for narrow in (False, True):
-            table = candidates_table(one, narrow=narrow)
-            assert dict(zip(table.columns, table.texts[0], strict=True))["size (90 %)"] == shown
+@pytest.mark.parametrize(("unit", "sizes", "shown"), SIZES)
+def test_sizes_have_the_units_of_people(unit, sizes, shown):
+    size = Amplitude(parameter="mass", form="", **dict(zip(("q05", "q50", "q95"), sizes, strict=True)), unit=unit)
+    one = replace(NAMED, candidates=(replace(TENSION, amplitude=size),))
+    for narrow in (False, True):
+        table = candidates_table(one, narrow=narrow)
+        assert dict(zip(table.columns, table.texts[0], strict=True))["size (90 %)"] == shown
 
 
 def test_the_sizes_of_what_was_fitted_again():
