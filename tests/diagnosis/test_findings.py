@@ -102,7 +102,7 @@ def test_what_became_of_each_candidate_of_a_named_effect():
     assert {name: one.fate for name, one in told.items()} == {
         SHEAR: "in the verdict", AIR: "does not fit", GRAIN: "does not fit", RELABELLING: "does not fit",
     }  # fmt: skip
-    assert told[SHEAR].rejected_because is None
+    assert (told[SHEAR].rejected_because, told[SHEAR].setup) == (None, "board")
     p_value = found.p_value([one.members for one in found.ground.hypotheses].index((AIR,)))
     assert 0.001 < p_value < 0.05
     assert told[AIR].rejected_because == f"with it alone the misfit is still too large (p = {p_value:.3f})"
