@@ -110,8 +110,8 @@ def test_a_size_at_the_limit_of_its_range_is_never_named():
         verdict = decided(replace(found, residual=cells.shift[int(np.argmin(np.abs(cells.z[:, 0] - z)))]))
         assert (verdict.word, verdict.is_needed) == (word, True)
         assert verdict.reason.startswith("a fits only at the limit of its range: size = 0.7") is (word != "named")
-    nothing_there = found_with({("a",): 1.0}, residual=QUIET)
-    assert at_limit(nothing_there, 1) == ""  # zero is no limit of a size that may be nothing
+    at_zero = found_with({("a",): 1.0}, size=1.0, residual=QUIET)
+    assert at_limit(at_zero, 1) == ""  # zero is no limit of a size that may be nothing
 
 
 @pytest.mark.parametrize(
