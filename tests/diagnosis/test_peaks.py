@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from made_searches import NOISE, bare, baseline, candidate, ground_of, one_level
 from scipy.special import logsumexp
+from scipy.stats import norm
 
 from bayesplate.diagnosis import peaks
 from bayesplate.diagnosis.baseline import Baseline, PossibleModes
@@ -30,15 +31,15 @@ READ = [0, 1, 2, 4, 5, 7]
 MISSED, SPURIOUS = 0.2, 0.02
 
 
-def peaked(rng, readings, labels=READ, confidence=0.0, spacing=0.3) -> Baseline:
+def peaked(rng, readings, labels=READ, confidence=(0.0,) * 6, spacing=0.3) -> Baseline:
     """A baseline of nine modes, whose readings (ln f) have labels that the card does not state."""
     whole = baseline(rng, N_EVERY, spacing=spacing)
     order = [*labels, *(i for i in range(N_EVERY) if i not in labels)]
     board = baseline(rng, len(labels)).board
     (setup,) = board.setups
     told = tuple(
-        replace(one, frequency=type(one.frequency).exact(float(np.exp(at))), confidence=confidence, beams=(2 + i, 0))
-        for i, (one, at) in enumerate(zip(setup.readings, readings, strict=True))
+        replace(one, frequency=type(one.frequency).exact(float(np.exp(at))), confidence=known, beams=(2 + i, 0))
+        for i, (one, at, known) in enumerate(zip(setup.readings, readings, confidence, strict=True))
     )
     setup = replace(setup, readings=told, missed=MISSED, spurious=SPURIOUS)
     others = tuple(OtherMode(PLACE, (20 + i, 0)) for i in range(N_EVERY - len(labels)))
@@ -85,12 +86,12 @@ def enumerated(base: Baseline) -> float:
     return float(logsumexp(logs))
 
 
-def noisy(rng, spoilt=0.0):
+def noisy(rng, spoilt=0.0, **stated):
     """Readings of the planted modes with noise; the third one off by so much."""
     middle = baseline(np.random.default_rng(3), N_EVERY).log_frequency[READ]
     readings = middle + NOISE * rng.standard_normal(len(READ))
     readings[2] += spoilt
-    return peaked(np.random.default_rng(3), readings)
+    return peaked(np.random.default_rng(3), readings, **stated)
 
 
 SPOILT = [(0.0, 0.02, 0.02), (0.3, 0.02, 0.02), (0.05, 1.5, 0.1), (0.2, 1.5, 0.1)]
@@ -191,13 +192,16 @@ def test_labels_are_exchanged_only_where_all_are_certain(confidence):
     """Elsewhere the sum over assignments does it, and two exchanges would be one explanation."""
     near = baseline(np.random.default_rng(3), N_EVERY, spacing=0.05, parities=[(i % 2, 0) for i in range(N_EVERY)])
     assert len(confusable(near)) > 1
-    doubted = peaked(np.random.default_rng(3), near.log_frequency[READ], confidence=confidence, spacing=0.05)
+    doubted = peaked(np.random.default_rng(3), near.log_frequency[READ], confidence=(confidence,) * 6, spacing=0.05)
     assert not confusable(doubted)
 
 
 def test_the_sum_counts_sure_readings_once():
     """Readings whose label is certain enter with their own density, the others by their assignments."""
-    base = noisy(np.random.default_rng(5))
+    base = noisy(np.random.default_rng(5), confidence=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     noise = np.full((3, 1), NOISE)
     there = base.every.log_frequency + 0.003 * np.random.default_rng(2).standard_normal((3, N_EVERY))
-    assert log_summed(base, there, noise) == pytest.approx(base.every.peaks[0].log_likelihood(there, noise[:, 0]))
+    sure = norm.logpdf(base.log_readings[0], there[:, 0], NOISE)
+    others = base.every.peaks[0].log_likelihood(there, noise[:, 0])
+    assert np.abs(sure).min() > 1.0
+    assert log_summed(base, there, noise) == pytest.approx(sure + others)
