@@ -33,7 +33,7 @@ def test_constants_are_those_of_a_direct_regression():
     base = baseline(rng, n_inputs=1, resolution=1.0)
     thickness = Quantity.from_mean(3e-3, 3e-5)
     base = replace(base, board=base.board.with_priors({"thickness": thickness}))
-    prior = Quantity.from_mean(0.0, 1.0, "normal")
+    prior = Quantity.from_mean(1.0, 1.0, "normal")
     one = candidate(base, "a", 0.02 * rng.standard_normal(6), prior, n_cells=1)
     ground = ground_of(base, Hypothesis(("a",), 1.0, one.fine, one_level(base), base), candidates={"a": one})
     residual = 0.01 * rng.standard_normal(6)
