@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import ndtri
+from scipy.stats import halfnorm
 from statistics_checks import differences_from_normal
 
 from bayesplate.errors import BayesplateError, InputError, NotConvergedError, NotIdentifiableError
@@ -23,6 +25,52 @@ PRECISION = np.linalg.inv(COVARIANCE)
 def log_normal_density(theta):
     away = theta - MEAN
     return -0.5 * np.einsum("ij,jk,ik->i", away, PRECISION, away)
+
+
+def standardised(theta):
+    return (theta - MEAN) / SD
+
+
+def straightened(theta):
+    """Standard normal, where theta is of the curved density."""
+    straight = theta.copy()
+    straight[:, 1] -= 0.5 * (theta[:, 0] ** 2 - 1)
+    return straight
+
+
+def curved(theta):
+    return -0.5 * np.sum(straightened(theta) ** 2, axis=1)
+
+
+def half_normal(theta):
+    return np.where((theta > 0).all(axis=1), -0.5 * np.sum(theta**2, axis=1), -np.inf)
+
+
+def deviates(theta):
+    """Standard normal, where theta is half-normal; below zero they are none."""
+    return ndtri(halfnorm.cdf(theta))
+
+
+KNOWN = {
+    "correlated, of unlike units": (log_normal_density, MEAN, COVARIANCE, standardised),
+    "curved": (curved, np.zeros(3), np.eye(3), straightened),
+    "bounded": (half_normal, np.zeros(3), np.eye(3), deviates),
+}
+"""Log density, centre and covariance of the starts, and what of the draws is standard normal."""
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_a_known_posterior_is_recovered_and_a_wider_one_is_told_apart(name):
+    log_density, centre, covariance, normal = KNOWN[name]
+    settings = SamplerSettings(seed=11, gate=Gate(ess_min=2500))
+    chains, convergence = sample(log_density, centre, covariance, settings)
+    assert convergence.passed, convergence.reasons
+    assert convergence.ess_min >= 2500
+
+    found, n_dim = normal(chains.pooled), centre.size
+    assert differences_from_normal(found, convergence.ess, np.zeros(n_dim), np.ones(n_dim)) == []
+    wider = differences_from_normal(1.15 * found, convergence.ess, np.zeros(n_dim), np.ones(n_dim))
+    assert sum("standard deviation" in difference for difference in wider) == n_dim
 
 
 def short(seed=1, max_steps=100, **changes):
@@ -49,48 +97,66 @@ def test_a_run_that_lacks_effective_draws_alone_goes_on():
 
 def test_a_run_goes_on_while_single_walkers_hardly_move():
     """More steps may free them, where a small acceptance of all stays small: here none moves as often as is wanted."""
-    settings = SamplerSettings(seed=3, max_steps=3000, gate=Gate(walker_acceptance_min=0.99))
+    gate = Gate(tau_count_min=25.0, walker_acceptance_min=0.99)
+    settings = SamplerSettings(seed=3, n_ensembles=2, n_walkers=8, max_steps=1500, gate=gate)
     chains, convergence = sample(log_normal_density, MEAN, COVARIANCE, settings)
     assert not convergence.passed
-    assert convergence.ess_min > 4.0 * settings.gate.ess_min
-    assert chains.draws.shape[1] == 3000
+    assert convergence.n_taus > 4.0 * gate.tau_count_min
+    assert convergence.ess_min > 4.0 * gate.ess_min
+    assert chains.draws.shape[1] == 1500
 
 
-def test_a_correlated_normal_is_recovered_and_a_wider_one_is_told_apart():
-    settings = SamplerSettings(seed=11, gate=Gate(ess_min=2500))
-    chains, convergence = sample(log_normal_density, MEAN, COVARIANCE, settings)
+@pytest.mark.parametrize(("n_taus", "is_over"), [(2.49, True), (2.51, False), (0.0, False)])
+def test_sampling_ends_where_twice_the_steps_would_not_suffice(n_taus, is_over):
+    """2000 of 20,000 steps with a twentieth of the 50 autocorrelation times: twice as many would hold those 50.
+
+    Where a walker has not moved yet the length is 0, and nobody knows.
+    """
+    assert is_hopeless(n_taus, 2000, SamplerSettings(seed=1)) is is_over
+
+
+def test_a_density_that_no_step_crosses_ends_the_sampling_early():
+    """A washboard, on which one proposal in two hundred is accepted."""
+
+    def washboard(theta):
+        return np.sum(8.0 * np.cos(60.0 * theta) - 0.5 * theta**2, axis=1)
+
+    settings = SamplerSettings(seed=2, n_ensembles=2, n_walkers=8, max_steps=5000)
+    chains, convergence = sample(washboard, np.zeros(4), np.eye(4), settings)
+    assert not convergence.passed
+    assert convergence.tau_max > 2 * settings.max_steps / settings.gate.tau_count_min
+    assert chains.draws.shape[1] < settings.max_steps
+
+
+def test_too_few_steps_do_not_pass_and_say_how_many_are_needed():
+    chains, convergence = sample(log_normal_density, MEAN, COVARIANCE, short())
+    assert not convergence.passed
+    assert f"{convergence.suggested_steps} steps after burn-in would do" in " ".join(convergence.reasons)
+    assert convergence.suggested_steps > convergence.n_kept_steps
+    assert chains.draws.shape == (4, 100, 32, 4)
+    assert chains.kept.shape == (4, 50, 32, 4)
+
+
+def test_separate_peaks_do_not_pass():
+    def two_peaks(theta):
+        apart = np.logaddexp(-0.5 * ((theta[:, 0] - 1) / 1e-4) ** 2, -0.5 * ((theta[:, 0] + 1) / 1e-4) ** 2)
+        return apart - 0.5 * np.sum(theta[:, 1:] ** 2, axis=1)
+
+    settings = SamplerSettings(seed=2, chunk_steps=500, max_steps=1500)
+    _, convergence = sample(two_peaks, np.zeros(3), np.eye(3), settings, names=("D_x", "D_y", "D_s"))
+    assert not convergence.passed
+    assert "D_x" in " ".join(convergence.reasons)
+
+
+def test_a_part_of_the_posterior_that_few_starts_reach_is_left_again():
+    """A second peak forty standard deviations off, with a millionth of the probability: no walker stays there."""
+
+    def two(theta):
+        far = theta - np.array([40.0, 0.0, 0.0])
+        return np.logaddexp(-0.5 * np.sum(theta**2, axis=1), -14.0 - 0.5 * np.sum(far**2, axis=1))
+
+    _, convergence = sample(two, np.zeros(3), np.diag([100.0, 1.0, 1.0]), SamplerSettings(seed=1))
     assert convergence.passed, convergence.reasons
-    assert convergence.ess_min >= 2500
-
-    assert differences_from_normal(chains.pooled, convergence.ess, MEAN, SD) == []
-
-    wider = MEAN + 1.15 * (chains.pooled - MEAN)
-    differences = differences_from_normal(wider, convergence.ess, MEAN, SD)
-    assert sum("standard deviation" in difference for difference in differences) == MEAN.size
-    assert differences_from_normal(chains.pooled[:, ::-1], convergence.ess, MEAN, SD)
-
-
-def test_a_curved_posterior_keeps_its_moments():
-    def banana(theta):
-        straight = theta[:, 1] - 0.5 * (theta[:, 0] ** 2 - 1)
-        return -0.5 * (theta[:, 0] ** 2 + straight**2 + theta[:, 2] ** 2)
-
-    chains, convergence = sample(banana, np.zeros(3), np.eye(3), SamplerSettings(seed=3, gate=Gate(ess_min=4000)))
-    assert convergence.passed, convergence.reasons
-    straight = chains.pooled.copy()
-    straight[:, 1] -= 0.5 * (straight[:, 0] ** 2 - 1)
-    assert differences_from_normal(straight, convergence.ess, np.zeros(3), np.ones(3)) == []
-
-
-def test_a_bounded_posterior_starts_and_stays_inside():
-    def half_normal(theta):
-        return np.where((theta > 0).all(axis=1), -0.5 * np.sum(theta**2, axis=1), -np.inf)
-
-    chains, convergence = sample(half_normal, np.zeros(3), np.eye(3), SamplerSettings(seed=5))
-    assert convergence.passed, convergence.reasons
-    assert (chains.draws > 0).all()
-    error = np.sqrt(1 - 2 / np.pi) / np.sqrt(convergence.ess)
-    assert np.all(np.abs(chains.pooled.mean(axis=0) - np.sqrt(2 / np.pi)) < 4 * error)
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_others():
@@ -131,37 +197,44 @@ def test_the_global_random_state_is_neither_used_nor_changed():
         np.random.set_state(kept)  # noqa: NPY002
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_value_that_is_no_log_density_is_named_with_its_point(value, capsys):
-    def broken(theta):
-        return np.where(theta[:, 0] > 3.5, value, log_normal_density(theta))
-
-    with pytest.raises(BayesplateError, match=rf"got {value} at D_x = .*, D_y = .*report") as caught:
-        sample(broken, MEAN, COVARIANCE, short(), names=("D_x", "D_y", "D_s", "noise"))
-    assert caught.value.exit_code == 70
-    assert capsys.readouterr().out == ""
+def where_large(value):
+    return lambda theta: np.where(theta[:, 0] > 3.5, value, log_normal_density(theta))
 
 
-def test_a_fault_after_the_start_is_named_too(capsys):
+def in_the_end():
+    """A log density that is none from its 200th call on."""
     calls = []
 
-    def breaks_later(theta):
+    def log_density(theta):
         calls.append(len(theta))
         return np.full(len(theta), np.nan) if len(calls) > 200 else log_normal_density(theta)
 
-    with pytest.raises(BayesplateError, match="got nan at parameter 1"):
-        sample(breaks_later, MEAN, COVARIANCE, short())
+    return log_density
+
+
+NAMES = ("D_x", "D_y", "D_s", "noise")
+NO_DENSITIES = {
+    "not a number": (where_large(np.nan), NAMES, BayesplateError, r"got nan at D_x = .*, D_y = .*report"),
+    "infinite": (where_large(np.inf), NAMES, BayesplateError, r"got inf at D_x = .*, D_y = .*report"),
+    "after the start": (in_the_end(), (), BayesplateError, "got nan at parameter 1"),
+    "of another shape": (lambda theta: theta, (), BayesplateError, r"wanted shape \(128,\), got \(128, 4\)"),
+    "zero everywhere": (
+        lambda theta: np.full(len(theta), -np.inf),
+        (),
+        NotConvergedError,
+        "got 0 in 1000 tries",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", NO_DENSITIES)
+def test_what_is_no_log_density_is_refused_with_its_point(case, capsys):
+    log_density, names, kind, message = NO_DENSITIES[case]
+
+    with pytest.raises(kind, match=message) as caught:
+        sample(log_density, MEAN, COVARIANCE, short(), names=names)
+    assert caught.value.exit_code == (5 if kind is NotConvergedError else 70)
     assert capsys.readouterr().out == ""
-
-
-def test_a_log_posterior_of_the_wrong_shape_is_refused():
-    with pytest.raises(BayesplateError, match=r"wanted shape \(128,\), got \(128, 4\)"):
-        sample(lambda theta: theta, MEAN, COVARIANCE, short())
-
-
-def test_no_finite_start_is_not_converged():
-    with pytest.raises(NotConvergedError, match="got 0 in 1000 tries"):
-        sample(lambda theta: np.full(len(theta), -np.inf), MEAN, COVARIANCE, short())
 
 
 @pytest.mark.parametrize("covariance", [np.ones((4, 4)), np.diag([1, 1, 1, 0.0]), np.full((4, 4), np.nan)])
@@ -183,58 +256,6 @@ def test_a_singular_covariance_is_not_identifiable(covariance):
 def test_unusable_settings_are_refused(changes, place):
     with pytest.raises(InputError, match=place):
         sample(log_normal_density, MEAN, COVARIANCE, SamplerSettings(**{"seed": 1} | changes))
-
-
-def test_too_few_steps_do_not_pass_and_say_how_many_are_needed():
-    chains, convergence = sample(log_normal_density, MEAN, COVARIANCE, short())
-    assert not convergence.passed
-    assert f"{convergence.suggested_steps} steps after burn-in would do" in " ".join(convergence.reasons)
-    assert convergence.suggested_steps > convergence.n_kept_steps
-    assert chains.draws.shape == (4, 100, 32, 4)
-    assert chains.kept.shape == (4, 50, 32, 4)
-
-
-def test_separate_peaks_do_not_pass():
-    def two_peaks(theta):
-        apart = np.logaddexp(-0.5 * ((theta[:, 0] - 1) / 1e-4) ** 2, -0.5 * ((theta[:, 0] + 1) / 1e-4) ** 2)
-        return apart - 0.5 * np.sum(theta[:, 1:] ** 2, axis=1)
-
-    settings = SamplerSettings(seed=2, chunk_steps=500, max_steps=1500)
-    _, convergence = sample(two_peaks, np.zeros(3), np.eye(3), settings, names=("D_x", "D_y", "D_s"))
-    assert not convergence.passed
-    assert "D_x" in " ".join(convergence.reasons)
-
-
-@pytest.mark.parametrize(("n_taus", "is_over"), [(2.49, True), (2.51, False), (0.0, False)])
-def test_sampling_ends_where_twice_the_steps_would_not_suffice(n_taus, is_over):
-    """2000 of 20,000 steps with a twentieth of the 50 autocorrelation times: twice as many would hold those 50.
-
-    Where a walker has not moved yet the length is 0, and nobody knows.
-    """
-    assert is_hopeless(n_taus, 2000, SamplerSettings(seed=1)) is is_over
-
-
-def test_a_density_that_no_step_crosses_ends_the_sampling_early():
-    """A washboard, on which one proposal in two hundred is accepted."""
-
-    def washboard(theta):
-        return np.sum(8.0 * np.cos(60.0 * theta) - 0.5 * theta**2, axis=1)
-
-    chains, convergence = sample(washboard, np.zeros(4), np.eye(4), SamplerSettings(seed=2, max_steps=10_000))
-    assert not convergence.passed
-    assert convergence.tau_max > 400
-    assert chains.draws.shape[1] < 10_000
-
-
-def test_a_part_of_the_posterior_that_few_starts_reach_is_left_again():
-    """A second peak forty standard deviations off, with a millionth of the probability: no walker stays there."""
-
-    def two(theta):
-        far = theta - np.array([40.0, 0.0, 0.0])
-        return np.logaddexp(-0.5 * np.sum(theta**2, axis=1), -14.0 - 0.5 * np.sum(far**2, axis=1))
-
-    _, convergence = sample(two, np.zeros(3), np.diag([100.0, 1.0, 1.0]), SamplerSettings(seed=1))
-    assert convergence.passed, convergence.reasons
 
 
 def test_progress_counts_every_chunk():
