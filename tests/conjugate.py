@@ -60,8 +60,9 @@ SLOPES = 0.5 * np.array(
 )
 
 
-def rigidity_prior(medians=PRIOR_MEDIANS, factors=PRIOR_FACTORS):
-    densities = [StatedPrior(Quantity.from_median(m, f), "") for m, f in zip(medians, factors, strict=True)]
+def rigidity_prior():
+    pairs = zip(PRIOR_MEDIANS, PRIOR_FACTORS, strict=True)
+    densities = [StatedPrior(Quantity.from_median(median, factor), "") for median, factor in pairs]
     stated = dict(zip(("D_x", "D_y", "D_s"), densities, strict=True)) | dict.fromkeys(("E_x", "E_y", "G_xy"))
     return load_prior("weakly-informative").model_copy(update=stated)
 
@@ -70,17 +71,21 @@ def fixed_noise(value):
     return Quantity.from_median(value, NARROW)
 
 
-def conjugate(seed):
-    """A board, its power law, and the mean and covariance of its posterior in ln D."""
-    rng = np.random.default_rng(seed)
-    prior_mean, prior_sd = np.log(PRIOR_MEDIANS), np.log(PRIOR_FACTORS)
-    truth = prior_mean + prior_sd * rng.normal(size=3)
+def read_board(rng, truth, noise, believed):
+    """A board with readings of a power law at this ln D, its law, and ln f less what the law has at D = 1."""
     constant = np.log([20.0, 40.0, 130.0, 300.0, 160.0, 330.0])
-    log_f = constant + SLOPES @ truth + NOISE * rng.normal(size=6)
+    log_f = constant + SLOPES @ truth + noise * rng.normal(size=6)
     hertz = dict(zip(CANTILEVER_LABELS, np.exp(log_f).tolist(), strict=True))
-    board = board_of(ritz.FINNISH, [setup_of(ritz.CANTILEVER, hertz, noise=fixed_noise(NOISE))])
-    mean, covariance = closed_form(log_f - constant, np.full(6, NOISE))
-    return board, PowerLaw(SLOPES, constant, board.setups[0]), log_f - constant, mean, covariance
+    board = board_of(ritz.FINNISH, [setup_of(ritz.CANTILEVER, hertz, noise=believed)])
+    return board, PowerLaw(SLOPES, constant, board.setups[0]), log_f - constant
+
+
+def conjugate(seed):
+    """A board of known noise, its power law and data, and the mean and covariance of its posterior in ln D."""
+    rng = np.random.default_rng(seed)
+    truth = np.log(PRIOR_MEDIANS) + np.log(PRIOR_FACTORS) * rng.normal(size=3)
+    board, law, data = read_board(rng, truth, NOISE, fixed_noise(NOISE))
+    return board, law, data, *closed_form(data, np.full(6, NOISE))
 
 
 def closed_form(data, scales):
@@ -128,12 +133,8 @@ def unknown_noise(seed):
     rng = np.random.default_rng(seed)
     noise = np.sqrt(SCALE / rng.gamma(SHAPE))
     truth = np.log(PRIOR_MEDIANS) + noise * PRIOR_SDS * rng.normal(size=3)
-    constant = np.log([20.0, 40.0, 130.0, 300.0, 160.0, 330.0])
-    log_f = constant + SLOPES @ truth + noise * rng.normal(size=6)
-    hertz = dict(zip(CANTILEVER_LABELS, np.exp(log_f).tolist(), strict=True))
-    board = board_of(ritz.FINNISH, [setup_of(ritz.CANTILEVER, hertz, noise=Quantity.from_median(NOISE, 1.5))])
-    location, scale, shape, rate = student_form(log_f - constant)
-    model = PowerLaw(SLOPES, constant, board.setups[0])
+    board, model, data = read_board(rng, truth, noise, Quantity.from_median(NOISE, 1.5))
+    location, scale, shape, rate = student_form(data)
     problem = stated(board, rigidity_prior(), model, location, scale * rate / shape)
     posterior = NormalInverseGamma(board, problem.prior, (model,), "linear")
     return replace(problem, posterior=posterior), student_truth(location, scale, shape, rate)

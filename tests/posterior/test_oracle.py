@@ -1,14 +1,12 @@
-"""The whole of `infer` against posteriors that are known: one in closed form, one by quadrature.
+"""The whole of `infer` against posteriors that are known: two in closed form, one by quadrature.
 
-A difference is more Monte Carlo errors of a mean, a standard deviation or a quantile than chance allows. Each
-comparison
-is made again with a posterior that is wrong in a known way, which must differ.
+A difference is more Monte Carlo errors of a mean, a standard deviation or a quantile than chance allows. Draws and
+posteriors that are wrong in a known way must differ.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -17,125 +15,93 @@ from conjugate import ESS, NOISE, closed_form, conjugate, fixed_noise, rigidity_
 from made_boards import CANTILEVER_LABELS, board_of, setup_of, with_noise
 from scipy import stats
 from scipy.special import ndtr
-from statistics_checks import Truth, differences, differences_from_normal
+from statistics_checks import Truth, differences, normal_truth
 
 from bayesplate.board.prior import load_prior
 from bayesplate.campaign.evidence import bridge_sampling
+from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.posing import pose
 
 THINNING_LOSS = 0.9
 """Share of the effective size that thinning to half an autocorrelation time leaves."""
 
 
+@dataclass(frozen=True, eq=False)
+class Case:
+    """Draws of `infer`, and what is known of their first columns."""
+
+    inference: Inference
+    truth: Truth
+
+    @property
+    def draws(self):
+        return self.inference.chains.pooled[:, : self.truth.mean.size]
+
+    @property
+    def ess(self):
+        return self.inference.convergence.ess[: self.truth.mean.size]
+
+    def differs(self, *, draws=None, truth=None):
+        """In what the draws, or others, differ from the truth, or from another."""
+        draws = self.draws if draws is None else draws
+        return differences(draws, self.ess, self.truth if truth is None else truth)
+
+
+def truth_of(mean, covariance):
+    return normal_truth(mean, np.sqrt(np.diagonal(covariance)))
+
+
+def case_of_known_noise(seed):
+    """A problem of known noise, whose constants are normal; the data, and the covariance of the closed form."""
+    board, law, data, mean, covariance = conjugate(seed)
+    inference = sampled(stated(board, rigidity_prior(), law, mean, covariance), seed=seed + 1)
+    return Case(inference, truth_of(mean, covariance)), data, covariance
+
+
 @pytest.fixture(scope="module")
 def known():
-    board, law, data, mean, covariance = conjugate(seed=1)
-    inference = sampled(stated(board, rigidity_prior(), law, mean, covariance), seed=2)
-    return inference, data, mean, covariance
+    return case_of_known_noise(seed=1)
 
 
-def found_differences(inference, mean, covariance, draws=None):
-    draws = inference.chains.pooled[:, :3] if draws is None else draws
-    return differences_from_normal(draws, inference.convergence.ess[:3], mean, np.sqrt(np.diagonal(covariance)))
+@pytest.fixture(scope="module")
+def unknown():
+    """A problem of unknown noise, whose constants are Student's."""
+    problem, truth = unknown_noise(1)
+    return Case(sampled(problem, seed=11), truth)
 
 
 def test_a_normal_posterior_is_recovered(known):
-    inference, _, mean, covariance = known
+    case, _, covariance = known
+    inference = case.inference
     assert inference.convergence.ess_min >= ESS
-    assert found_differences(inference, mean, covariance) == []
-    drawn = np.corrcoef(inference.chains.pooled[:, :3].T)[np.triu_indices(3, 1)]
-    sd = np.sqrt(np.diagonal(covariance))
-    true = (covariance / np.outer(sd, sd))[np.triu_indices(3, 1)]
-    error = (1 - true**2) / np.sqrt(inference.convergence.ess[:3].min())
-    assert np.all(np.abs(drawn - true) < 4 * error)
+    assert case.differs() == []
+    drawn = np.corrcoef(case.draws.T)[np.triu_indices(3, 1)]
+    true = (covariance / np.outer(case.truth.sd, case.truth.sd))[np.triu_indices(3, 1)]
+    assert np.all(np.abs(drawn - true) < 4 * (1 - true**2) / np.sqrt(case.ess.min()))
 
-
-def test_the_thinned_draws_are_of_the_same_posterior(known):
-    from bayesplate.posterior.statistics import thin_walker_major
-
-    inference, _, mean, covariance = known
-    every_second = max(4.0, inference.convergence.tau_max)  # half of it is the step; walkers forget in 3 or 4 steps
-    thinned = thin_walker_major(inference.chains.draws, inference.chains.burn_in, every_second)
-    flat = thinned.reshape(-1, 4)[:, :3]
-    sd = np.sqrt(np.diagonal(covariance))
-    n_kept = inference.chains.kept.shape[1]
-    assert len(flat) <= len(inference.chains.pooled) * (n_kept // 2 + 1) / n_kept
-    assert differences_from_normal(flat, THINNING_LOSS * inference.convergence.ess[:3], mean, sd) == []
-
-
-def test_the_log_posterior_of_the_draws_is_that_of_theta(known):
-    inference, *_ = known
-    some = (slice(None), slice(-3, None))
-    theta = inference.chains.draws[some]
-    expected = inference.problem.posterior(theta.reshape(-1, 4)).reshape(theta.shape[:-1])
-    assert inference.chains.log_prob[some] == pytest.approx(expected, abs=1e-8)
-
-
-def test_control_a_wider_posterior_differs(known):
-    inference, _, mean, covariance = known
-    wider = mean + 1.15 * (inference.chains.pooled[:, :3] - mean)
-    assert sum("standard deviation" in one for one in found_differences(inference, mean, covariance, wider)) == 3
-
-
-def test_control_exchanged_rigidities_differ(known):
-    inference, _, mean, covariance = known
-    assert found_differences(inference, mean, covariance, inference.chains.pooled[:, [1, 0, 2]])
-
-
-@pytest.mark.parametrize("mode", [0, 3, 5])
-def test_control_a_posterior_without_one_mode_differs(known, mode):
-    inference, data, *_ = known
-    scales = np.full(6, NOISE)
-    scales[mode] = np.inf
-    assert found_differences(inference, *closed_form(data, scales))
-
-
-@pytest.fixture(scope="module", params=[1])
-def unknown(request):
-    """Draws of a problem of unknown noise, and its closed form: Student's marginals."""
-    problem, truth = unknown_noise(request.param)
-    return sampled(problem, seed=10 + request.param), truth
-
-
-def unknown_differences(inference, truth, draws=None):
-    draws = inference.chains.pooled if draws is None else draws
-    return differences(draws, inference.convergence.ess, truth)
+    thinned = inference.theta.reshape(-1, 4)
+    assert len(thinned) < len(case.draws)
+    ess = np.minimum(THINNING_LOSS * case.ess, len(thinned))
+    assert differences(thinned[:, :3], ess, case.truth) == []
+    assert inference.log_posterior.ravel() == pytest.approx(inference.problem.posterior(thinned), abs=1e-8)
 
 
 def test_constants_of_unknown_noise_are_student_s(unknown):
-    inference, truth = unknown
-    assert unknown_differences(inference, truth) == []
-
-    wider = truth.mean + 1.15 * (inference.chains.pooled - truth.mean)
-    assert sum("standard deviation" in one for one in unknown_differences(inference, truth, wider)) == 4
-    assert unknown_differences(inference, truth, inference.chains.pooled[:, [1, 0, 2, 3]])
-
-
-def test_control_a_normal_posterior_of_the_same_width_is_not_student_s(unknown):
-    """Five per cent of it lie where Student's has more: what forgetting that the noise is unknown would give."""
-    _, truth = unknown
-    draws = np.random.default_rng(1).normal(truth.mean, truth.sd / np.sqrt(1.2), (100_000, 4))  # 12 degrees of freedom
-    assert differences(draws, np.full(4, 1e5), truth)
+    assert unknown.differs() == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3])
 def test_other_normal_posteriors_are_recovered(seed):
-    board, law, _, mean, covariance = conjugate(seed)
-    inference = sampled(stated(board, rigidity_prior(), law, mean, covariance), seed=seed + 1)
-    assert found_differences(inference, mean, covariance) == []
+    case, _, _ = case_of_known_noise(seed)
+    assert case.differs() == []
 
 
 @pytest.mark.slow
 def test_fifty_normal_posteriors_have_normal_errors():
     """At most one of 150 standardised errors of the means beyond three; all of them normal."""
-    z = []
-    for seed in range(50):
-        board, law, _, mean, covariance = conjugate(seed=100 + seed)
-        inference = sampled(stated(board, rigidity_prior(), law, mean, covariance), seed=seed)
-        error = np.sqrt(np.diagonal(covariance) / inference.convergence.ess[:3])
-        z.extend((inference.chains.pooled[:, :3].mean(axis=0) - mean) / error)
-    z = np.array(z)
+    cases = [case_of_known_noise(seed)[0] for seed in range(100, 150)]
+    z = np.ravel([(one.draws.mean(axis=0) - one.truth.mean) / one.truth.sd * np.sqrt(one.ess) for one in cases])
     assert np.sum(np.abs(z) > 3) <= 1
     assert stats.kstest(z, stats.norm.cdf).pvalue > 1e-3
     assert stats.kstest(1.5 * z, stats.norm.cdf).pvalue < 0.05  # control: the errors are not merely small
@@ -213,44 +179,48 @@ def rounded():
     hertz = with_noise(ritz.simulate(ritz.FINNISH, CANTILEVER_LABELS), 0.005, np.random.default_rng(3), resolution=1.0)
     setup = setup_of(ritz.CANTILEVER, hertz, resolution=1.0, noise=fixed_noise(0.005))
     problem = pose(board_of(ritz.FINNISH, [setup]), load_prior("weakly-informative"), law="linear")
-    return sampled(problem, seed=4)
+    return Case(sampled(problem, seed=4), Quadrature.of(problem).truth())
 
 
-@pytest.fixture(scope="module")
-def quadrature(rounded):
-    """The posterior by quadrature, with all modes or without one: each computed once."""
-    return cache(lambda left_out=None: Quadrature.of(rounded.problem, left_out))
+def test_the_linear_law_with_rounded_readings_agrees_with_quadrature(rounded):
+    assert rounded.differs() == []
 
 
-def test_the_linear_law_with_rounded_readings_agrees_with_quadrature(rounded, quadrature):
-    truth = quadrature().truth()
-    draws, ess = rounded.chains.pooled[:, :3], rounded.convergence.ess[:3]
-    assert differences(draws, ess, truth) == []
-
-    wider = truth.mean + 1.15 * (draws - truth.mean)
-    assert differences(wider, ess, truth)
-    assert differences(draws[:, [1, 0, 2]], ess, truth)
-
-
-def test_the_evidence_from_draws_is_that_of_quadrature(rounded, quadrature):
+def test_the_evidence_from_draws_is_that_of_quadrature(rounded):
     """By bridge sampling, as a campaign takes it; the narrow prior of the noise integrates to one."""
-    problem = rounded.problem
-    exact = quadrature().log_evidence
-    rng = np.random.default_rng(5)
-    found = bridge_sampling(problem.posterior, rng.permutation(rounded.chains.pooled), rng)
+    problem, rng = rounded.inference.problem, np.random.default_rng(5)
+    exact = Quadrature.of(problem).log_evidence
+    found = bridge_sampling(problem.posterior, rng.permutation(rounded.inference.chains.pooled), rng)
 
     assert found == pytest.approx(exact, abs=0.02)
-    assert quadrature(5).log_evidence != pytest.approx(exact, abs=0.02)
+    assert Quadrature.of(problem, left_out=5).log_evidence != pytest.approx(exact, abs=0.02)
 
 
-@pytest.mark.parametrize("mode", [4, 5])
-def test_control_quadrature_without_one_mode_differs(rounded, quadrature, mode):
-    truth = quadrature(mode).truth()
-    assert differences(rounded.chains.pooled[:, :3], rounded.convergence.ess[:3], truth)
+@pytest.mark.parametrize("name", ["known", "unknown", "rounded"])
+def test_control_draws_of_another_width_or_with_exchanged_rigidities_differ(request, name):
+    case = request.getfixturevalue(name)
+    case = case[0] if name == "known" else case
+    wider = case.differs(draws=case.truth.mean + 1.15 * (case.draws - case.truth.mean))
+    exchanged = case.draws[:, [1, 0, *range(2, case.truth.mean.size)]]
+
+    assert sum("standard deviation" in one for one in wider) == case.truth.mean.size
+    assert case.differs(draws=exchanged)
 
 
-def test_control_quadrature_that_ignores_the_rounding_differs(rounded):
-    setup = rounded.problem.board.setups[0]
-    sharp = replace(rounded.problem.board, setups=(replace(setup, resolution=1e-3),))
-    truth = Quadrature.of(replace(rounded.problem, board=sharp)).truth()
-    assert differences(rounded.chains.pooled[:, :3], rounded.convergence.ess[:3], truth)
+def test_control_a_posterior_without_one_mode_or_without_the_rounding_differs(known, rounded):
+    case, data, _ = known
+    problem = rounded.inference.problem
+    for mode in (0, 3, 5):
+        scales = np.where(np.arange(6) == mode, np.inf, NOISE)
+        assert case.differs(truth=truth_of(*closed_form(data, scales))), mode
+    for mode in (4, 5):
+        assert rounded.differs(truth=Quadrature.of(problem, left_out=mode).truth()), mode
+    sharp = replace(problem.board, setups=(replace(problem.board.setups[0], resolution=1e-3),))
+    assert rounded.differs(truth=Quadrature.of(replace(problem, board=sharp)).truth())
+
+
+def test_control_a_normal_posterior_of_the_same_width_is_not_student_s(unknown):
+    """Five per cent of it lie where Student's has more: what forgetting that the noise is unknown would give."""
+    truth = unknown.truth
+    draws = np.random.default_rng(1).normal(truth.mean, truth.sd / np.sqrt(1.2), (100_000, 4))  # 12 degrees of freedom
+    assert differences(draws, np.full(4, 1e5), truth)
