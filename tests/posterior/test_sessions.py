@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -33,25 +32,25 @@ from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.sampling import SamplerSettings
 
-SCATTER, DISCREPANCY, N_SESSIONS, N_BOARDS = 0.003, 0.006, 4, 400
-SCALE = "discrepancy[day 1 to day 4]"
+SCATTER, DISCREPANCY, N_SESSIONS = 0.003, 0.006, 3
+SCALE = "discrepancy[day 1 to day 3]"
 
 
-def board(n_sessions: int = N_SESSIONS, discrepancy: float | None = DISCREPANCY, *, is_rough: bool = False) -> Board:
+def board(discrepancy: float | None = DISCREPANCY, *, is_rough: bool = False) -> Board:
     """A board in some sessions of one setup, of known noise and, unless it is none, known discrepancy."""
     hertz = ritz.simulate(ritz.FINNISH, CANTILEVER_LABELS)
     noise = Quantity.from_median(SCATTER, NARROW)
     if is_rough:  # the third and the fifth mode of the board lie elsewhere than those of its plate, every day
         hertz |= {label: 1.03 * hertz[label] for label in (CANTILEVER_LABELS[2], CANTILEVER_LABELS[4])}
-    days = [setup_of(ritz.CANTILEVER, hertz, name=f"day {i + 1}", noise=noise) for i in range(n_sessions)]
+    days = [setup_of(ritz.CANTILEVER, hertz, name=f"day {i + 1}", noise=noise) for i in range(N_SESSIONS)]
     made = with_discrepancies(board_of(ritz.FINNISH, days))
     return made if discrepancy is None else made.with_priors({SCALE: Quantity.exact(discrepancy)})
 
 
-@lru_cache(maxsize=4)
-def posed(discrepancy: float = DISCREPANCY, n_sessions: int = N_SESSIONS) -> PosedProblem:
-    """The problem of such a board."""
-    return pose(board(n_sessions, discrepancy), load_prior("weakly-informative"), law="linear")
+@pytest.fixture(scope="module")
+def problem() -> PosedProblem:
+    """The problem of a board of known discrepancy."""
+    return pose(board(), load_prior("weakly-informative"), law="linear")
 
 
 def test_setups_that_hold_and_load_the_board_alike_are_sessions():
@@ -79,50 +78,21 @@ def test_setups_that_hold_and_load_the_board_alike_are_sessions():
     assert with_discrepancies(alone) == alone
 
 
-def test_the_constants_are_as_uncertain_as_readings_that_share_a_part_of_their_errors():
+def test_the_constants_are_as_uncertain_as_readings_that_share_a_part_of_their_errors(problem):
     """Generalised least squares with the covariance of the readings written out, and what independent errors say."""
-    problem = posed()
     slopes = problem.estimate.sensitivities
     mode = np.tile(np.arange(len(CANTILEVER_LABELS)), N_SESSIONS)
     alike = (mode[:, None] == mode).astype(float)
-    expected, taken_for_independent = (
-        np.linalg.inv(slopes.T @ np.linalg.solve(one, slopes))
-        for one in (
-            SCATTER**2 * np.eye(mode.size) + DISCREPANCY**2 * alike,
-            (SCATTER**2 + DISCREPANCY**2) * np.eye(mode.size),
-        )
-    )
+    covariances = SCATTER**2 * np.eye(mode.size) + DISCREPANCY**2 * np.stack([alike, np.eye(mode.size)])
+    expected, if_independent = (np.linalg.inv(slopes.T @ np.linalg.solve(one, slopes)) for one in covariances)
 
     assert problem.covariance[:3, :3] == pytest.approx(expected, rel=0.01)
-    ratio = np.sqrt(np.diagonal(expected) / np.diagonal(taken_for_independent))
-    of_sessions, of_all = SCATTER**2 / N_SESSIONS, (SCATTER**2 + DISCREPANCY**2) / N_SESSIONS
-    assert ratio == pytest.approx(np.full(3, np.sqrt((of_sessions + DISCREPANCY**2) / of_all)))
-    assert ratio.min() > 1.8
+    assert (np.sqrt(np.diagonal(expected) / np.diagonal(if_independent)) > 1.6).all()  # control
 
 
-@pytest.mark.parametrize("believed", [DISCREPANCY, 1e-9], ids=["shared", "taken for nothing"])
-def test_constants_of_boards_with_a_discrepancy_are_covered(believed):
-    """The negative control takes every session for new evidence, and covers far less than it says."""
-    case = NormalCase.of(posed(believed))
-    rng = np.random.default_rng(3)
-    n_modes = len(CANTILEVER_LABELS)
-    log_noise = np.log(np.full((1, N_SESSIONS), SCATTER))
-    held = np.zeros(3)
-    for _ in range(N_BOARDS):
-        shared = np.tile(DISCREPANCY * rng.standard_normal(n_modes), N_SESSIONS)
-        read = replace(case, misfit=shared + SCATTER * rng.standard_normal(shared.size))
-        mean, covariance = read.given_noise(log_noise)
-        off = (mean[0] - case.at[case.parameters.fitted_columns])[:3]
-        held += np.abs(off) < 1.6449 * np.sqrt(np.diagonal(covariance[0])[:3])
-    tolerance = 3.5 * np.sqrt(0.9 * 0.1 / N_BOARDS)
-
-    assert (np.abs(held / N_BOARDS - 0.9) < tolerance).all() == (believed == DISCREPANCY), held / N_BOARDS
-    assert believed == DISCREPANCY or (held / N_BOARDS).max() < 0.6
-
-
-def test_draws_of_constants_and_discrepancies_are_those_of_the_closed_form():
-    inference = infer(posed(), SamplerSettings(seed=5))
-    case, (theta, log_posterior) = NormalCase.of(posed()), draws_of(inference)
+def test_draws_of_constants_and_discrepancies_are_those_of_the_closed_form(problem):
+    inference = infer(problem, SamplerSettings(seed=5))
+    case, (theta, log_posterior) = NormalCase.of(problem), draws_of(inference)
     discrepancy = case.parameters.n_constants + N_SESSIONS
     control = theta.copy()
     control[..., discrepancy:] *= 0.8
@@ -131,25 +101,22 @@ def test_draws_of_constants_and_discrepancies_are_those_of_the_closed_form():
     assert differences(case, control, log_posterior)
 
 
-def test_a_discrepancy_moves_the_mode_in_all_sessions_and_no_other():
-    problem = posed()
+def test_a_discrepancy_moves_the_mode_in_all_sessions_and_no_other(problem):
     parameters, label = problem.parameters, problem.board.setups[0].labels[2]
     theta = np.tile(problem.centre, (2, 1))
     _, standard = discrepancy_names(problem.board.setups[0], label)
     theta[1, parameters.names.index(f"z[{standard}]")] += 1.5
-    moved = np.diff(
-        [np.concatenate(one) for one in zip(*problem.posterior.log_frequencies(theta), strict=True)], axis=0
-    )
+    moved = [there[1] - there[0] for there in problem.posterior.log_frequencies(theta)]
 
     expected = np.zeros((N_SESSIONS, len(CANTILEVER_LABELS)))
     expected[:, 2] = 1.5 * DISCREPANCY
-    assert moved.reshape(expected.shape) == pytest.approx(expected, abs=1e-12)
+    assert np.stack(moved) == pytest.approx(expected, abs=1e-12)
 
 
 def test_a_peak_that_may_be_the_mode_is_moved_too():
     made = board()
     setup = replace(made.setups[0], readings=made.setups[0].readings[:3], peaks=peaks_of(300.0))
-    beams, values = CANTILEVER_LABELS[3], {**made.nominal(), "discrepancy (0,2)[day 1 to day 4]": np.array([2.0, -1.0])}
+    beams, values = CANTILEVER_LABELS[3], {**made.nominal(), "discrepancy (0,2)[day 1 to day 3]": np.array([2.0, -1.0])}
     (model,) = models_at(replace(made, setups=(setup,)), [30.0, 1.6, 6.0])
     model = replace(model, others=(OtherMode(Place(Parity(0, 1), 1, 0.9), beams), OtherMode(model.places[0], None)))
 
@@ -159,7 +126,7 @@ def test_a_peak_that_may_be_the_mode_is_moved_too():
 @pytest.fixture(scope="module")
 def rough():
     """A board that is far from its plate in two modes, every day, with a discrepancy that may follow."""
-    return pose(board(discrepancy=None, is_rough=True), load_prior("weakly-informative"), law="linear")
+    return pose(board(None, is_rough=True), load_prior("weakly-informative"), law="linear")
 
 
 def test_a_search_begins_where_the_board_is_and_not_where_its_plate_would_be(rough):
@@ -192,7 +159,7 @@ def test_a_scale_that_has_followed_the_residual_does_not_excuse_it(judge, rough,
 @pytest.mark.parametrize("effects", [(), ("clamp_rotation",)])
 def test_sessions_that_are_one_plate_have_one_law_and_others_each(effects):
     """A clamp that gives way differently on each day makes them different plates."""
-    days = board(3, None)
+    days = board(None)
     sizes = {q.name: q.prior for q in days.parameters if q.owner == BOARD}
     made = declare(made_board("made", sizes, [replace(one, group=None) for one in days.setups], effects=effects))
     problem = pose(made, load_prior("weakly-informative"), law="exact")
