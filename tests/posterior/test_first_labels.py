@@ -10,11 +10,13 @@ import ritz
 from made_boards import board_of, setup_of, with_noise
 
 from bayesplate.board.board import Board
+from bayesplate.board.material import RIGIDITIES
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Peak
 from bayesplate.commands.prepare import prepare
 from bayesplate.errors import NotIdentifiableError
+from bayesplate.estimates.wide_search import Guess
 from bayesplate.labels import Label
 from bayesplate.posterior import first_labels
 from bayesplate.posterior.first_labels import Way, only_way, probable_ways, propose_labels
@@ -42,15 +44,32 @@ TRUE = {round(hertz, 3): label for label, hertz in HERTZ.items()}
 ALL = [*HERTZ.values()]
 
 
-@pytest.mark.parametrize("n_labelled", [4, 0])
-def test_peaks_get_the_labels_of_their_modes(n_labelled):
-    labelled = LABELS[:n_labelled]
-    rest = [hertz for label, hertz in HERTZ.items() if label not in labelled]
-    proposed = propose_labels(board_with(labelled, [*rest, SPURIOUS]), PRIOR).board
+def test_peaks_get_the_labels_of_their_modes():
+    rest = [hertz for label, hertz in HERTZ.items() if label not in LABELS[:4]]
+    proposed = propose_labels(board_with(LABELS[:4], [*rest, SPURIOUS]), PRIOR).board
 
     assert labels_of(proposed) == TRUE
     assert proposed.setups[0].unlabelled == (SPURIOUS,)
-    assert [one.confidence for one in proposed.setups[0].readings] == [1.0] * n_labelled + [0.0] * (10 - n_labelled)
+    assert [one.confidence for one in proposed.setups[0].readings] == [1.0] * 4 + [0.0] * 6
+
+
+def test_bare_peaks_of_which_one_is_missing_are_labelled_with_probabilities(monkeypatch):
+    """Seven of the lowest eight modes, with noise, in no order, under the prior of the wood: searched once for both."""
+    read = {beams: HERTZ[beams] for beams in LABELS[:8] if beams != (0, 2)}
+    hertz = with_noise(read, 0.003, np.random.default_rng(5))
+    board, labels = board_with((), hertz.values()), {round(each, 3): beams for beams, each in hertz.items()}
+    guesses = first_labels.search_widely(board, PRIOR, np.random.default_rng(0))
+    monkeypatch.setattr(first_labels, "search_widely", lambda *_: guesses)
+    proposed = propose_labels(board, PRIOR).board
+    ways = probable_ways(board, PRIOR)
+    (best, share), *others = ways
+
+    assert labels_of(proposed) == labels_of(best.board) == labels
+    assert {one.confidence for one in proposed.setups[0].readings} == {0.0}
+    assert best.board.setups[0].peaks == ()
+    assert share > 0.9
+    assert share + sum(one for _, one in others) == pytest.approx(1.0)
+    assert [one for _, one in ways] == sorted((one for _, one in ways), reverse=True)
 
 
 def test_sure_labels_are_left_as_they_are():
@@ -78,16 +97,28 @@ def test_too_few_peaks_get_none():
 WIDE = load_prior("weakly-informative")
 
 
-def test_peaks_that_fit_a_plate_with_its_grain_the_other_way_are_refused():
-    """Seven peaks of a free plate, and a prior of any solid: both plates are told, and the label that decides."""
+def guess(board, *rigidities):
+    """A region of a hundredth about a plate."""
+    logs = np.log(rigidities) + 0.01 * np.random.default_rng(0).standard_normal((64, 3))
+    return Guess(board.nominal() | dict(zip(RIGIDITIES, map(np.asarray, rigidities), strict=True)), logs, 0.01)
+
+
+def test_peaks_that_fit_a_plate_with_its_grain_the_other_way_are_refused(monkeypatch):
+    """Both plates are told, and the label that decides.
+
+    The other plate bends along y as this one along x: its D_x is D_y (L_x / L_y)^4, and D_y likewise.
+    """
     plate = ritz.FREE_SPRUCE
+    sides = (plate.L_x / plate.L_y) ** 4
+    both = (plate.D_x, plate.D_y, plate.D_s), (plate.D_y * sides, plate.D_x / sides, plate.D_s)
+    monkeypatch.setattr(first_labels, "search_widely", lambda board, *_: [guess(board, *one) for one in both])
     with pytest.raises(NotIdentifiableError, match=r"lie far apart, E_x .* or E_x .*%\); the peak at") as told:
         propose_labels(board_with((), ALL[:7]), WIDE)
     assert "(2,0) in the" in str(told.value)
     assert "(0,2) in the" in str(told.value)
 
     proposed = propose_labels(board_with([(2, 0)], [hertz for hertz in ALL[:7] if hertz != HERTZ[2, 0]]), WIDE)
-    apart = np.log(proposed.rigidities / [plate.D_x, plate.D_y, plate.D_s])
+    apart = np.log(proposed.rigidities / np.array(both[0]))
     assert apart == pytest.approx(0.0, abs=0.004)  # the noise of the card, doubled for a square: the peaks have none
     assert labels_of(proposed.board) == {round(hertz, 3): label for label, hertz in [*HERTZ.items()][:7]}
 
@@ -131,21 +162,6 @@ def test_a_fit_begins_with_the_way_that_is_probable_whatever_the_plate_lacks(mon
 
     assert proposed.rigidities == pytest.approx(np.exp(HERE.log_rigidities))
     assert proposed.spread == pytest.approx(0.0)
-
-
-def test_bare_peaks_of_which_one_is_missing_are_labelled_with_probabilities():
-    """Seven of the lowest eight modes, with noise, in no order, under the prior of the wood."""
-    hertz = with_noise(
-        {beams: HERTZ[beams] for beams in LABELS[:8] if beams != (0, 2)}, 0.003, np.random.default_rng(5)
-    )
-    ways = probable_ways(board_with((), hertz.values()), PRIOR)
-    (best, share), *others = ways
-
-    assert labels_of(best.board) == {round(each, 3): beams for beams, each in hertz.items()}
-    assert best.board.setups[0].peaks == ()
-    assert share > 0.9
-    assert share + sum(one for _, one in others) == pytest.approx(1.0)
-    assert [one for _, one in ways] == sorted((one for _, one in ways), reverse=True)
 
 
 @pytest.mark.slow

@@ -32,8 +32,8 @@ from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.sampling import SamplerSettings
 
-SCATTER, DISCREPANCY, N_SESSIONS = 0.003, 0.006, 3
-SCALE = "discrepancy[day 1 to day 3]"
+SCATTER, DISCREPANCY, N_SESSIONS = 0.003, 0.006, 2
+SCALE = "discrepancy[day 1 to day 2]"
 
 
 def board(discrepancy: float | None = DISCREPANCY, *, is_rough: bool = False) -> Board:
@@ -87,7 +87,7 @@ def test_the_constants_are_as_uncertain_as_readings_that_share_a_part_of_their_e
     expected, if_independent = (np.linalg.inv(slopes.T @ np.linalg.solve(one, slopes)) for one in covariances)
 
     assert problem.covariance[:3, :3] == pytest.approx(expected, rel=0.01)
-    assert (np.sqrt(np.diagonal(expected) / np.diagonal(if_independent)) > 1.6).all()  # control
+    assert (np.sqrt(np.diagonal(expected) / np.diagonal(if_independent)) > 1.3).all()  # control
 
 
 def test_draws_of_constants_and_discrepancies_are_those_of_the_closed_form(problem):
@@ -116,7 +116,7 @@ def test_a_discrepancy_moves_the_mode_in_all_sessions_and_no_other(problem):
 def test_a_peak_that_may_be_the_mode_is_moved_too():
     made = board()
     setup = replace(made.setups[0], readings=made.setups[0].readings[:3], peaks=peaks_of(300.0))
-    beams, values = CANTILEVER_LABELS[3], {**made.nominal(), "discrepancy (0,2)[day 1 to day 3]": np.array([2.0, -1.0])}
+    beams, values = CANTILEVER_LABELS[3], {**made.nominal(), "discrepancy (0,2)[day 1 to day 2]": np.array([2.0, -1.0])}
     (model,) = models_at(replace(made, setups=(setup,)), [30.0, 1.6, 6.0])
     model = replace(model, others=(OtherMode(Place(Parity(0, 1), 1, 0.9), beams), OtherMode(model.places[0], None)))
 
