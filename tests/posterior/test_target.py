@@ -10,7 +10,6 @@ import ritz
 from made_boards import CANTILEVER_LABELS, FREE_LABELS, board_of, models_at, setup_of, swapped, with_noise
 from scipy import stats
 
-from bayesplate.board.material import moduli
 from bayesplate.board.parameter import BOARD
 from bayesplate.board.prior import StatedPrior, load_prior
 from bayesplate.board.quantity import Quantity
@@ -73,61 +72,6 @@ def problem(prior):
     return pose(two_setups(), prior, law="exact")
 
 
-def with_uncertain_poisson(mean, sd, density):
-    setup = setup_of(ritz.CANTILEVER, dict.fromkeys(CANTILEVER_LABELS, 100.0))
-    stated = StatedPrior(density, "")
-    prior = load_prior("weakly-informative").model_copy(update=dict.fromkeys(("E_x", "E_y", "G_xy"), stated))
-    board = board_of(ritz.FINNISH, [setup], poisson_xy=Quantity.from_mean(mean, sd, "normal"))
-    return Posterior(board, prior, (), "linear")
-
-
-def test_logarithms_of_moduli_and_of_rigidities_have_the_same_volume():
-    rng = np.random.default_rng(0)
-    step = 1e-5
-
-    def to_moduli(log_D):
-        return np.log(moduli(*np.exp(log_D), 3e-3, 0.9))
-
-    for log_D in np.log([30.0, 10.0, 6.0]) + 0.3 * rng.normal(size=(10, 3)):
-        columns = [(to_moduli(log_D + e) - to_moduli(log_D - e)) / (2 * step) for e in step * np.eye(3)]
-        slopes = np.stack(columns, axis=1)
-        assert np.abs(slopes - np.eye(3)).max() > 1e-2  # at nu_xy = 0.9 the map is far from the identity
-        assert np.linalg.det(slopes) == pytest.approx(
-            1.0, abs=1e-7
-        )  # differences of second order: step^2 times a curvature
-
-
-def test_the_prior_of_the_constants_is_normalised_over_the_materials_that_exist():
-    """Drawn from a wider normal distribution in ln D and weighted; nu_xy = 0.9 with E_y unbounded cuts a tenth off."""
-    density = Quantity.from_median(3e9, 2.0)
-    posterior = with_uncertain_poisson(0.9, 1e-6, density)
-    n, spread = 400_000, 1.0
-    rng = np.random.default_rng(4)
-    h = ritz.FINNISH.h
-    centre = np.log([3e9 * h**3 / 12, 3e9 * h**3 / 12, 3e9 * h**3 / 3])
-    theta = np.zeros((n, posterior.parameters.n_dim))
-    z = rng.normal(size=(n, 3))
-    theta[:, :3] = centre + np.array([1.5, 1.5, 1.0]) * spread * z
-    log_proposal = stats.norm.logpdf(z).sum(axis=1) - np.log(1.5 * 1.5)
-    log_prior = posterior.log_prior_constants(theta)
-    weights = np.exp(log_prior - log_proposal)
-    error = weights.std() / np.sqrt(n)
-    # ln(E_y / E_x) is normal with sd sqrt(2) ln 2, and nu_xy^2 E_y / E_x < 1 is what exists
-    exists = stats.norm.cdf(-2 * np.log(0.9) / (np.sqrt(2) * np.log(2.0)))
-    assert error < 0.01
-    assert weights.mean() == pytest.approx(exists, abs=4 * error)
-
-    inside = np.isfinite(log_prior)
-    log_G = np.log(moduli(*np.exp(theta[inside, :3]).T, h, 0.9).G_xy)
-    mean = np.average(log_G, weights=weights[inside])
-    error_of_mean = np.std(weights[inside] * (log_G - mean)) * np.sqrt(inside.sum()) / weights.sum()
-    assert mean == pytest.approx(np.log(density.median), abs=4 * error_of_mean)
-
-    # control: with D = E h^3 / 12, as if there were no Poisson factor, the same sum comes to one
-    without = sum(density.log_density_of_log(theta[:, i] + np.log(f / h**3)) for i, f in enumerate((12.0, 12.0, 3.0)))
-    assert np.exp(without - log_proposal).mean() > exists + 20 * error
-
-
 def test_a_prior_on_moduli_is_the_same_prior_on_rigidities_where_nothing_couples_them(prior):
     """At nu_xy = 0, D = E h^3 / 12 and G h^3 / 3: a log-normal density keeps its factor and moves its median."""
     board = two_setups(nu_xy=0.0)
@@ -144,7 +88,9 @@ def test_a_prior_on_moduli_is_the_same_prior_on_rigidities_where_nothing_couples
 
 
 def test_outside_nu_xy_nu_yx_below_one_there_is_nothing(prior):
-    posterior = with_uncertain_poisson(0.5, 0.1, prior.constants["E_x"])
+    setup = setup_of(ritz.CANTILEVER, dict.fromkeys(CANTILEVER_LABELS, 100.0))
+    board = board_of(ritz.FINNISH, [setup], poisson_xy=Quantity.from_mean(0.5, 0.1, "normal"))
+    posterior = Posterior(board, prior, (), "linear")
     limit = 2 * np.log(1 / 0.5)  # of ln(D_y / D_x) at nu_xy = 0.5
     theta = np.zeros((2, posterior.parameters.n_dim))
     theta[:, 1] = limit + np.array([-1e-9, 1e-9])
@@ -179,59 +125,40 @@ def test_the_likelihood_is_a_sum_over_setups(problem, prior):
     assert both(theta) == pytest.approx(total, rel=1e-13)
 
 
-ORDER = np.random.default_rng(6).permutation(6)
+@pytest.mark.parametrize("robust", [False, True], ids=["normal", "student"])
+def test_the_order_of_the_modes_changes_nothing(prior, robust):
+    board, order = two_setups(), np.random.default_rng(6).permutation(6)
+    shuffled = replace(board.setups[0], readings=tuple(board.setups[0].readings[i] for i in order))
+    both = [pose(one, prior, robust=robust) for one in (board, replace(board, setups=(shuffled, board.setups[1])))]
+    for law in ("linear", "exact"):
+        first, second = (problem.under(law) for problem in both)
+        assert second.estimate.rigidities == pytest.approx(first.estimate.rigidities, rel=EXACT)
+        assert second.identifiability.leverages[:6] == pytest.approx(first.identifiability.leverages[order], rel=1e-9)
+        theta = points(first)
+        (found, of_free), (expected, free) = (one.posterior.log_frequencies(theta) for one in (second, first))
+        assert found == pytest.approx(expected[:, order], rel=0, abs=EXACT)
+        assert of_free == pytest.approx(free, rel=0, abs=EXACT)
+        allowed = EXACT * slope(first.posterior, theta)
+        assert_same(second.posterior(theta), first.posterior(theta), allowed)
+        by_mode = first.posterior.log_likelihood(theta)[:, order]
+        assert_same(second.posterior.log_likelihood(theta)[:, :6], by_mode, allowed[:, None])
 
 
-@pytest.fixture(scope="module", params=[False, True], ids=["normal", "student"])
-def reordered(request, prior):
-    """A problem, and the same with the modes of its first setup in another order."""
-    board = two_setups()
-    shuffled = replace(board.setups[0], readings=tuple(board.setups[0].readings[i] for i in ORDER))
-    other = replace(board, setups=(shuffled, board.setups[1]))
-    return [pose(one, prior, robust=request.param) for one in (board, other)]
-
-
-@pytest.mark.parametrize("law", ["linear", "exact"])
-def test_the_order_of_the_modes_changes_nothing(reordered, law):
-    first, second = (problem.under(law) for problem in reordered)
-    order = ORDER
-    assert second.estimate.rigidities == pytest.approx(first.estimate.rigidities, rel=EXACT)
-    assert second.identifiability.leverages[:6] == pytest.approx(first.identifiability.leverages[order], rel=1e-9)
-    theta = points(first)
-    for predicted, expected in zip(_permuted(second, theta), _permuted(first, theta, order), strict=True):
-        assert predicted == pytest.approx(expected, rel=0, abs=EXACT)
-    allowed = EXACT * slope(first.posterior, theta)
-    assert_same(second.posterior(theta), first.posterior(theta), allowed)
-    by_mode = first.posterior.log_likelihood(theta)[:, order]
-    assert_same(second.posterior.log_likelihood(theta)[:, :6], by_mode, allowed[:, None])
-
-
-def _permuted(problem, theta, order=slice(None)):
-    cantilever, free = problem.posterior.log_frequencies(theta)
-    return cantilever[:, order], free
-
-
-@pytest.fixture(scope="module")
-def exchanged(prior):
-    """A problem without Poisson coupling, and the same with x and y exchanged."""
-    board = two_setups(nu_xy=0.0)
-    return [pose(one, prior) for one in (board, swapped(board))]
-
-
-@pytest.mark.parametrize("law", ["linear", "exact"])
-def test_exchanging_x_and_y_changes_nothing(exchanged, law):
-    """The exchanged board is the same problem: estimate, leverages, log posterior."""
-    first, second = (problem.under(law) for problem in exchanged)
-    exchange = [1, 0, 2]
-    assert second.estimate.rigidities == pytest.approx(first.estimate.rigidities[exchange], rel=EXACT)
-    assert second.identifiability.leverages == pytest.approx(first.identifiability.leverages, rel=1e-8)
-    assert second.identifiability.covariance == pytest.approx(
-        first.identifiability.covariance[np.ix_(exchange, exchange)], rel=1e-8
-    )
-    theta = points(first)
-    allowed = EXACT * slope(first.posterior, theta)
-    assert_same(second.posterior(theta[:, [1, 0, 2, 3, 4]]), first.posterior(theta), allowed)
-    assert np.all(np.abs(second.posterior(theta) - first.posterior(theta)) > allowed)  # control: columns not exchanged
+def test_exchanging_x_and_y_changes_nothing(prior):
+    """The exchanged board without Poisson coupling is the same problem: estimate, leverages, log posterior."""
+    board, exchange = two_setups(nu_xy=0.0), [1, 0, 2]
+    both = [pose(one, prior) for one in (board, swapped(board))]
+    for law in ("linear", "exact"):
+        first, second = (problem.under(law) for problem in both)
+        assert second.estimate.rigidities == pytest.approx(first.estimate.rigidities[exchange], rel=EXACT)
+        assert second.identifiability.leverages == pytest.approx(first.identifiability.leverages, rel=1e-8)
+        covariance = first.identifiability.covariance[np.ix_(exchange, exchange)]
+        assert second.identifiability.covariance == pytest.approx(covariance, rel=1e-8)
+        theta = points(first)
+        allowed = EXACT * slope(first.posterior, theta)
+        assert_same(second.posterior(theta[:, [1, 0, 2, 3, 4]]), first.posterior(theta), allowed)
+        # control: columns not exchanged
+        assert np.all(np.abs(second.posterior(theta) - first.posterior(theta)) > allowed)
 
 
 def test_exchanging_x_and_y_takes_the_other_poisson_ratio_along(prior):
@@ -252,9 +179,8 @@ def test_exchanging_x_and_y_takes_the_other_poisson_ratio_along(prior):
     assert np.all(np.abs(Posterior(exchanged, prior, wrong, "linear")(other) - first) > 1e3 * allowed)
 
 
-@pytest.mark.parametrize("factor", [2.0, 0.1])
-def test_a_denser_board_is_as_much_stiffer(problem, prior, factor):
-    board = problem.board
+def test_a_denser_board_is_as_much_stiffer(problem, prior):
+    board, factor = problem.board, 0.1
     heavy = board.with_priors({"density": Quantity.exact(ritz.FINNISH.rho * factor)})
     estimate = weighted_least_squares(heavy)
     assert estimate.rigidities == pytest.approx(factor * problem.estimate.rigidities, rel=EXACT)
@@ -265,13 +191,3 @@ def test_a_denser_board_is_as_much_stiffer(problem, prior, factor):
     as_heavy = Posterior(heavy, prior, problem.posterior.models, "exact")
     allowed = EXACT * slope(problem.posterior, theta)[:, None]
     assert_same(as_heavy.log_likelihood(moved), problem.posterior.log_likelihood(theta), allowed)
-
-
-def test_the_same_readings_twice_halve_the_variance(problem):
-    board = problem.board
-    again = tuple(replace(setup, name=f"{setup.name} again") for setup in board.setups)
-    twice = replace(board, setups=(*board.setups, *again))
-    estimate = weighted_least_squares(twice.with_parameters(one for setup in again for one in setup.clamped_parameters))
-    found = identifiability(estimate.sensitivities, estimate.scales)
-    assert estimate.rigidities == pytest.approx(problem.estimate.rigidities, rel=EXACT)
-    assert 2 * found.covariance == pytest.approx(problem.identifiability.covariance, rel=1e-8)
