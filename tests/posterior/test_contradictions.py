@@ -42,7 +42,7 @@ def with_noise(board, median: float, factor: float):
     return replace(board, setups=setups)
 
 
-@pytest.mark.parametrize(("errors_away", "is_refused"), [(-0.5, False), (4.0, False), (20.0, True)])
+@pytest.mark.parametrize(("errors_away", "is_refused"), [(4.0, False), (20.0, True)])
 def test_a_prior_is_refused_where_none_of_a_thousand_draws_reaches_it(board, problem, errors_away, is_refused):
     """Draws three standard errors wide: they reach an edge 4 away (one in ten is beyond it), none one of 20 away."""
     estimate, error = problem.centre[0], np.sqrt(problem.covariance[0, 0])
@@ -76,22 +76,22 @@ def test_a_noise_is_refused_a_hundredth_of_the_residuals(board, share, is_refuse
     assert f"at a noise of {100.0 * share * limit:.2g} %" in str(no.value)
 
 
-def test_a_small_noise_that_may_grow_or_coarse_rounding_explain_the_residuals(board):
+def test_a_small_noise_that_may_grow_or_coarse_rounding_explain_the_residuals(board, problem):
     """Six standard deviations of the logarithm reach from 1e-6 to the residuals; coarse rounding hides them."""
-    prior = load_prior("weakly-informative")
     residuals = weighted_least_squares(with_noise(board, 0.01, 2.0)).residuals
     limit = float(np.sqrt(np.sum(residuals**2) / 3.0)) / 100.0
     reach = (limit / 1e-6) ** (1.0 / 6.0)
 
-    assert pose(with_noise(board, 1e-6, reach * 1.05), prior)
+    def require(declared):
+        require_possible_noise(replace(problem.posterior, board=declared), problem.centre)
+
+    require(with_noise(board, 1e-6, reach * 1.05))
     with pytest.raises(NotIdentifiableError, match="declared noise"):
-        pose(with_noise(board, 1e-6, reach * 0.95), prior)
+        require(with_noise(board, 1e-6, reach * 0.95))
     tiny = with_noise(board, 1e-6, ALMOST_EXACT)
-    rounded = replace(tiny, setups=tuple(replace(setup, resolution=50.0) for setup in tiny.setups))
-    posed = pose(board, prior)
-    require_possible_noise(replace(posed.posterior, board=rounded), posed.centre)
+    require(replace(tiny, setups=tuple(replace(setup, resolution=50.0) for setup in tiny.setups)))
     with pytest.raises(NotIdentifiableError, match="declared noise"):
-        require_possible_noise(replace(posed.posterior, board=tiny), posed.centre)
+        require(tiny)
 
 
 @pytest.mark.parametrize(
