@@ -1,4 +1,4 @@
-"""Statistics of draws by ArviZ: weights with a heavy tail are seen, light ones kept, and draws follow their weights."""
+"""Statistics of draws: how they are thinned, weights with a heavy tail are seen, and draws follow their weights."""
 
 from __future__ import annotations
 
@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from bayesplate.posterior.statistics import LARGEST_K, effective_share, may_stand, resampled, smoothed
+from bayesplate.posterior.statistics import (
+    LARGEST_K,
+    effective_share,
+    may_stand,
+    resampled,
+    smoothed,
+    thin_walker_major,
+)
 
 RNG = np.random.default_rng(2)
 
@@ -51,3 +58,19 @@ def test_each_draw_comes_as_often_as_its_weight_says_to_one():
     weights = RNG.dirichlet(np.ones(50))
     counts = np.bincount(resampled(weights, 1000, RNG), minlength=50)
     assert np.all(np.abs(counts - 1000 * weights) < 1.0)
+
+
+def test_thinned_draws_are_walker_major():
+    ensemble, step, walker = np.meshgrid(np.arange(2), np.arange(100), np.arange(3), indexing="ij")
+    draws = np.stack([ensemble, step, walker], axis=-1).astype(float)
+    thinned = thin_walker_major(draws, burn_in=40, tau_max=20.9)
+    assert thinned.shape == (2, 3 * 6, 3)
+    assert thinned[1, :7].tolist() == [*([1, step, 0] for step in range(40, 100, 10)), [1, 40, 1]]
+    np.testing.assert_array_equal(thin_walker_major(draws[..., 1], 40, 20.9), thinned[..., 1])
+
+
+def test_thinning_keeps_every_draw_of_independent_steps_and_obeys_the_limit():
+    draws = np.zeros((2, 100, 3, 1))
+    assert thin_walker_major(draws, 0, 1.0).shape == (2, 300, 1)
+    assert thin_walker_major(draws, 0, np.inf).shape == (2, 300, 1)
+    assert thin_walker_major(draws, 0, 1.0, n_draws_max=30).shape == (2, 30, 1)
