@@ -50,33 +50,16 @@ _EDGE = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class NormalCase:
-    """The joint density of columns and noise of a board with a linear law, normal errors and a normal prior.
-
-    Attributes
-    ----------
-    parameters : Parameters
-    at : (n_dim,) array
-        Where the law is the tangent and the prior is expanded; nothing of it comes from draws.
-    slopes : (n_modes, n_fitted) array
-        Derivatives of ln f by the fitted columns there.
-    misfit : (n_modes,) array
-        ln measured - ln predicted there.
-    own_variance : (n_modes,) array
-        Relative variance of a reading apart from the noise: its own, and that of its rounding.
-    setup : (n_modes,) array of int
-        Of which setup a reading is.
-    prior_slope, prior_precision : (n_fitted,) and (n_fitted, n_fitted) arrays
-        Derivatives of the log prior there, and less its second ones.
-    """
+    """The joint density of columns and noise of a board with a linear law, normal errors and a normal prior."""
 
     parameters: Parameters
-    at: Floats
-    slopes: Floats
-    misfit: Floats
-    own_variance: Floats
-    setup: NDArray[np.intp]
-    prior_slope: Floats
-    prior_precision: Floats
+    at: Floats  # (n_dim,), where the law is the tangent and the prior is expanded; nothing of it comes from draws
+    slopes: Floats  # (n_modes, n_fitted), derivatives of ln f by the fitted columns there
+    misfit: Floats  # (n_modes,), ln measured - ln predicted there
+    own_variance: Floats  # (n_modes,), relative variance of a reading apart from the noise: its own, and its rounding's
+    setup: NDArray[np.intp]  # (n_modes,), of which setup a reading is
+    prior_slope: Floats  # (n_fitted,), derivatives of the log prior there
+    prior_precision: Floats  # (n_fitted, n_fitted), less its second ones
 
     @classmethod
     def of(cls, problem: PosedProblem) -> NormalCase:
@@ -119,16 +102,7 @@ class NormalCase:
         return np.asarray(readings + prior + self.parameters.log_prior_noise(theta))
 
     def given_noise(self, log_noise: Floats) -> tuple[Floats, Floats]:
-        """Mean and covariance of the fitted columns given the noise, by the normal equations.
-
-        Parameters
-        ----------
-        log_noise : (n_draws, n_setups) array
-
-        Returns
-        -------
-        (n_draws, n_fitted) and (n_draws, n_fitted, n_fitted) arrays
-        """
+        """Mean and covariance of the fitted columns given (n_draws, n_setups) noises, by the normal equations."""
         weights = 1.0 / self._variances(log_noise)
         squares = (self.slopes[:, :, None] * self.slopes[:, None, :]).reshape(len(self.misfit), -1)
         n_fitted = self.slopes.shape[1]
@@ -139,16 +113,13 @@ class NormalCase:
         return mean, np.asarray(covariance)
 
     def column_deviates(self, theta: Floats) -> Floats:
-        """Each fitted column less its mean given the noise, over its standard deviation: (n_draws, n_fitted) array.
-
-        Standard normal, each of them, if the draws are of this case.
-        """
+        """Each fitted column less its mean given the noise, over its standard deviation: (n_draws, n_fitted) array."""
         mean, covariance = self.given_noise(self.parameters.log_noise(theta))
         sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
         return np.asarray((theta[:, self.parameters.fitted_columns] - mean) / sd)
 
     def noise_deviates(self, theta: Floats) -> Floats:
-        """The normal deviates of each noise given the columns: (n_draws, n_setups) array, standard normal likewise."""
+        """The normal deviates of each noise given the columns: (n_draws, n_setups) array."""
         found = np.empty((len(theta), self.parameters.n_setups))
         log_noise = self.parameters.log_noise(theta)
         for i in range(self.parameters.n_setups):
@@ -188,9 +159,7 @@ class NormalCase:
 def draws_of(inference: Inference) -> tuple[Floats, Floats]:
     """Draws after burn-in and their log posterior, every so many steps that there are not too many of them.
 
-    Returns
-    -------
-    (n_ensembles, n_steps, n_walkers, n_dim) and (n_ensembles, n_steps, n_walkers) arrays
+    (n_ensembles, n_steps, n_walkers, n_dim) and (n_ensembles, n_steps, n_walkers) arrays.
     """
     chains = inference.chains
     log_posterior = chains.log_prob[:, chains.burn_in :]
@@ -199,21 +168,10 @@ def draws_of(inference: Inference) -> tuple[Floats, Floats]:
 
 
 def differences(case: NormalCase, theta: Floats, log_posterior: Floats) -> list[str]:
-    """List in what draws, weighted to the normal case, differ from its closed form.
+    """List in what draws, weighted to the normal case, differ from its closed form, a sentence each; empty if in none.
 
-    Compared are the mean, the standard deviation and the 5, 50 and 95 % quantiles of every column and noise.
-
-    Parameters
-    ----------
-    case : NormalCase
-    theta : (n_ensembles, n_steps, n_walkers, n_dim) array
-    log_posterior : (n_ensembles, n_steps, n_walkers) array
-        But for a constant.
-
-    Returns
-    -------
-    list of str
-        One sentence a difference, or that too few draws count for any; empty if the draws agree.
+    Compared are the mean, the standard deviation and the 5, 50 and 95 % quantiles of every column and noise, which
+    are standard normal as deviates. Draws and their log posterior, but for a constant, are as of `draws_of`.
     """
     flat = theta.reshape(-1, theta.shape[-1])
     log_weights = case.log_density(flat) - log_posterior.ravel()

@@ -53,28 +53,25 @@ def test_peaks_get_the_labels_of_their_modes():
     assert [one.confidence for one in proposed.setups[0].readings] == [1.0] * 4 + [0.0] * 6
 
 
-def test_bare_peaks_of_which_one_is_missing_are_labelled_with_probabilities(monkeypatch):
-    """Seven of the lowest eight modes, with noise, in no order, under the prior of the wood: searched once for both."""
+def test_bare_peaks_of_which_one_is_missing_are_labelled_with_probabilities():
+    """Seven of the lowest eight modes, with noise, in no order, under the prior of the wood."""
     read = {beams: HERTZ[beams] for beams in LABELS[:8] if beams != (0, 2)}
     hertz = with_noise(read, 0.003, np.random.default_rng(5))
-    board, labels = board_with((), hertz.values()), {round(each, 3): beams for beams, each in hertz.items()}
-    guesses = first_labels.search_widely(board, PRIOR, np.random.default_rng(0))
-    monkeypatch.setattr(first_labels, "search_widely", lambda *_: guesses)
-    proposed = propose_labels(board, PRIOR).board
-    ways = probable_ways(board, PRIOR)
+    ways = probable_ways(board_with((), hertz.values()), PRIOR)
     (best, share), *others = ways
 
-    assert labels_of(proposed) == labels_of(best.board) == labels
-    assert {one.confidence for one in proposed.setups[0].readings} == {0.0}
+    assert labels_of(best.board) == {round(each, 3): beams for beams, each in hertz.items()}
     assert best.board.setups[0].peaks == ()
     assert share > 0.9
     assert share + sum(one for _, one in others) == pytest.approx(1.0)
     assert [one for _, one in ways] == sorted((one for _, one in ways), reverse=True)
 
 
-def test_sure_labels_are_left_as_they_are():
-    board = board_with(LABELS, ())
-    assert propose_labels(board, PRIOR).board is board
+def test_sure_labels_and_too_few_peaks_are_left_as_they_are():
+    for board in (board_with(LABELS, ()), board_with((), ALL[:2])):
+        assert propose_labels(board, PRIOR).board is board
+    assert probable_ways(board_with((), ALL[:3]), PRIOR) == []
+    assert probable_ways(board_with([(1, 1)], ALL[1:8]), PRIOR) == []
 
 
 def test_a_doubtful_label_that_is_wrong_is_corrected_and_remembered():
@@ -87,11 +84,6 @@ def test_a_doubtful_label_that_is_wrong_is_corrected_and_remembered():
 
     assert labels_of(proposed) == TRUE
     assert [reading.stated for reading in found.readings] == [None] * 6 + [Label(2, 3)] + [None] * 3
-
-
-def test_too_few_peaks_get_none():
-    board = board_with((), ALL[:2])
-    assert propose_labels(board, PRIOR).board is board
 
 
 WIDE = load_prior("weakly-informative")
@@ -172,11 +164,6 @@ def test_a_plate_stiffer_across_its_grain_is_an_unlikely_way(monkeypatch):
     assert shares[True] > 0.9 > 10 * shares[False]
     monkeypatch.setattr(first_labels, "_UNUSUAL", 1.0)
     assert {way.is_usual: share for way, share in reversed(probable_ways(board, WIDE))}[False] > 0.1
-
-
-def test_three_peaks_and_boards_with_a_label_are_left_alone():
-    assert probable_ways(board_with((), ALL[:3]), PRIOR) == []
-    assert probable_ways(board_with([(1, 1)], ALL[1:8]), PRIOR) == []
 
 
 FALSE = {49.51: 0.17, 401.91: 0.18, 441.52: 0.46}

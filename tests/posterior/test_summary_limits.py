@@ -10,7 +10,6 @@ import pytest
 
 import bayesplate.frequencies.spectrum
 import bayesplate.posterior.assessment
-from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.board.prior import load_prior
 from bayesplate.commands.prepare import prepare
 from bayesplate.estimates.identifiability import Identifiability, remarks
@@ -29,8 +28,6 @@ from bayesplate.posterior.statistics import walker_major
 from bayesplate.posterior.target import linear_suffices
 from bayesplate.results.budget import input_remarks, prior_remarks
 from bayesplate.results.summarise import summarise
-
-NAMES = (*MODULI, *RIGIDITIES)
 
 
 @pytest.fixture(scope="module")
@@ -96,13 +93,6 @@ def names_mode(correlation, inference, patch):
     return lowest.name == "(0,0)"
 
 
-def gives_means_of_other_law(effective, inference, patch):
-    patch.setattr(bayesplate.posterior.assessment, "means_under", lambda *_: (dict.fromkeys(NAMES, 1e10), effective))
-    means = summary_of(inference).exact_means
-    assert (means.E_x, means.effective_draws) in ((1e10, effective), (None, effective))
-    return means.E_x is not None
-
-
 def names_input(share, inference, patch):
     """ln E = sqrt(share) a + sqrt(1 - share) b, with a the logarithm of the thickness and b at right angles to it."""
     a, b = np.linalg.qr(np.column_stack([np.ones(500), np.random.default_rng(1).standard_normal((500, 2))]))[0].T[1:]
@@ -158,7 +148,6 @@ LIMITS = {
     "the exact law is warned of from half a cent on": (warns_of_exact_law, 0.499, 0.501),
     "a label is doubted below a correlation of three quarters": (doubts_label, 0.751, 0.749),
     "a mode is named from a correlation of three quarters on": (names_mode, 0.749, 0.751),
-    "means of the other law need two hundred effective draws": (gives_means_of_other_law, 199.0, 200.0),
     "an input is named that makes half of the variance": (names_input, 0.49, 0.51),
     "a prior is named at most twice as wide as the posterior": (names_prior, 0.49, 0.51),
     "a mode carries a constant from a leverage of nine tenths on": (says_what_carries, 0.899, 0.901),
