@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import ritz
-from bars import meets
+from limits import meets
 from made_boards import CANTILEVER_LABELS, FREE_LABELS, board_of, models_at, setup_of, with_noise
 from scipy.optimize import least_squares
 

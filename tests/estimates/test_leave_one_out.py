@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bars import meets
+from limits import meets
 from scipy import optimize, stats
 
 from bayesplate.commands.prepare import prepare

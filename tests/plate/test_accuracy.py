@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 import pytest
 import ritz
-from bars import meets
 from closed_forms import navier
 from either_theory import G_SPRUCE, SQUARE, SUPPORTS, cents, solved, with_thickness
+from limits import meets
 
 from bayesplate.plate.mesh import ELEMENTS_PER_SIDE, mesh
 from bayesplate.plate.terms import Weights
@@ -58,8 +58,8 @@ SUPPORTED = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("board", "shear_moduli", "shape", "words", "bar"), SUPPORTED.values(), ids=SUPPORTED)
-def test_supported_plate_has_the_exact_spectrum(board, shear_moduli, shape, words, bar):
+@pytest.mark.parametrize(("board", "shear_moduli", "shape", "words", "limit"), SUPPORTED.values(), ids=SUPPORTED)
+def test_supported_plate_has_the_exact_spectrum(board, shear_moduli, shape, words, limit):
     board = replace(board, edges=ritz.ALL_SUPPORTED)
     n_modes = 12 if shear_moduli is None else 6
 
@@ -67,7 +67,7 @@ def test_supported_plate_has_the_exact_spectrum(board, shear_moduli, shape, word
 
     # The first mode of the thin plate within 0.01 %.
     assert off[0] < 0.173
-    meets("V10", words, off.max(), at_most=bar, unit="cents")
+    meets("V10", words, off.max(), at_most=limit, unit="cents")
 
 
 def test_the_exact_sheared_plate_is_not_the_thin_one():

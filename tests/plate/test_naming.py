@@ -49,7 +49,7 @@ def hertz(found):
 
 @BOARDS
 def test_modes_of_known_boards_have_their_names_in_order_and_the_frequencies_of_ritz(board, order):
-    """Ritz names its modes by another rule. 0.02 % is the bar of the production mesh."""
+    """Ritz names its modes by another rule. 0.02 % is the limit of the production mesh."""
     plate, weights = prepared(board)
     names = name_modes(solve(plate, weights, len(order)))
 

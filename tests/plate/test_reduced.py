@@ -9,9 +9,9 @@ from itertools import product
 import numpy as np
 import pytest
 import ritz
-from bars import meets
 from dense_pencils import together
 from either_theory import cents
+from limits import meets
 
 from bayesplate.plate import reduction
 from bayesplate.plate.mesh import mesh

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import ritz
-from bars import meets
 from dense_pencils import dense, spectrum, whole
 from either_theory import G_SPRUCE, SQUARE, SUPPORTS, assembled, solved, weights_of
+from limits import meets
 from scipy.linalg import eig, eigh
 
 from bayesplate.plate.line import line

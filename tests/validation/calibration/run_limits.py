@@ -21,7 +21,7 @@ from xml.etree import ElementTree
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from bars import NOTES
+from limits import NOTES
 from validation import measured as of_pages
 from validation.calibration.limit_rows import ROWS, Row
 
@@ -33,7 +33,7 @@ COMMAND = "make limits"
 def measuring() -> list[Path]:
     """Test files that hold something against a limit."""
     every = sorted((ROOT / "tests").rglob("test_*.py"))
-    files = {file for file in every if "from bars import" in file.read_text(encoding="utf-8")}
+    files = {file for file in every if "from limits import" in file.read_text(encoding="utf-8")}
     named = (test.partition("::")[0] for rows in ROWS.values() for row in rows for test in row.tests)
     return sorted(files | {ROOT / "tests" / name for name in named})
 

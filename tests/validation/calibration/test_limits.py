@@ -6,7 +6,7 @@ import json
 from xml.etree import ElementTree
 
 import pytest
-from bars import NOTES, meets
+from limits import NOTES, meets
 from validation.calibration.limit_rows import ROWS
 from validation.calibration.run_limits import ROOT, measuring, page, passed
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import os
 
-NOTES = "BAYESPLATE_BARS"
+NOTES = "BAYESPLATE_LIMITS"
 """Environment variable that names the file for the notes, a line of JSON each; without it nothing is noted."""
 
 
