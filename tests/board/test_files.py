@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import socket
@@ -10,6 +11,7 @@ import tracemalloc
 from pathlib import Path
 
 import pytest
+from stated import CARD, changed, read
 
 from bayesplate.board.board import Board
 from bayesplate.board.coefficients import load_coefficients
@@ -19,23 +21,16 @@ from bayesplate.errors import InputError
 
 
 @pytest.fixture
-def write(tmp_path):
-    def write_card(content: bytes | str) -> Path:
-        path = tmp_path / "my-board.toml"
-        path.write_bytes(content.encode() if isinstance(content, str) else content)
-        return path
-
-    return write_card
+def path(tmp_path):
+    """The file of a sound card."""
+    path = tmp_path / "my-board.toml"
+    path.write_text(CARD, encoding="utf-8")
+    return path
 
 
-def refused(message: str) -> object:
+def refused(message):
+    """A refusal that says so."""
     return pytest.raises(InputError, match=re.escape(message))
-
-
-def test_a_missing_file_names_the_path_and_the_folder(tmp_path):
-    path = tmp_path / "nowhere.toml"
-    with refused(f"{path}: wanted a card, got no such file (looked in {tmp_path})"):
-        Board.from_toml(str(path))
 
 
 MISSPELT = [
@@ -49,56 +44,39 @@ MISSPELT = [
 
 def test_a_misspelt_name_names_the_shelf_and_the_nearest_card():
     for load, kind, name, meant in MISSPELT:
-        with refused(
-            f'"{name}": wanted the name of a {kind} card, or a path that ends in .toml, got no card'
-        ) as caught:
+        wanted = f'"{name}": wanted the name of a {kind} card, or a path that ends in .toml, got no card'
+        with refused(wanted) as caught:
             load(name)
         assert f"models{os.sep}{kind}" in str(caught.value)
         assert f"did you mean {meant}?" in str(caught.value)
 
 
-def test_a_part_of_several_names_stands_for_none():
-    with refused("(a card in") as caught:
-        Board.from_toml("free")
-    assert "did you mean" not in str(caught.value)
-
-
-def test_a_name_far_from_all_others_names_the_working_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    with refused(f"(a card in {tmp_path} is given as a path)"):
-        Board.from_toml("qqqq")
-
-
-def test_a_table_of_readings_is_no_card(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_what_is_no_name_of_a_card_is_answered_with_what_to_do(path, monkeypatch):
+    """A part of several names stands for none; a path tells where it led; a file of that name here is offered."""
+    here = path.parent
+    monkeypatch.chdir(here)
     Path("peaks.csv").write_text("label,hz\n(1;1),35\n", encoding="utf-8")
-    for name in ("peaks.csv", "./peaks.csv"):
-        with refused("a card is a TOML file"):
+    for name, said in [
+        ("free", f"(a card in {here} is given as a path)"),
+        (str(here / "no.toml"), f"{here / 'no.toml'}: wanted a card, got no such file (looked in {here})"),
+        ("my-board", '(there is a file here: write "my-board.toml")'),
+        ("peaks.csv", "a card is a TOML file"),
+        ("./peaks.csv", "a card is a TOML file"),
+    ]:
+        with refused(said):
             Board.from_toml(name)
+    for argument in (str(path), path, "my-board.toml"):
+        card = Board.from_toml(argument)
+        assert (card.folder, card.file, card.name) == (Path(argument).parent, "my-board.toml", "my-board")
 
 
-def test_a_file_of_that_name_here_is_offered(board_file, monkeypatch):
-    monkeypatch.chdir(board_file.parent)
-    with refused('(there is a file here: write "my-board.toml")'):
-        Board.from_toml("my-board")
-    assert Board.from_toml("my-board.toml").name == "my-board"
-
-
-def test_a_card_is_read_by_path(board_file):
-    for as_argument in [str, Path]:
-        card = Board.from_toml(as_argument(board_file))
-
-        assert (card.folder, card.file) == (board_file.parent, "my-board.toml")
-        assert card.name == "my-board"
-
-
-def test_the_name_must_be_that_of_the_file(board_file):
-    other = board_file.rename(board_file.with_name("other.toml"))
+def test_the_name_must_be_that_of_the_file(path):
+    other = path.rename(path.with_name("other.toml"))
     with refused('other.toml name: wanted "other", the name of the file, got "my-board"'):
         Board.from_toml(other)
     rule = "A-Z, a-z, 0-9, '.', '_' or '-', beginning with a letter or digit, at most 80 characters"
     with refused(f'my board.toml: wanted {rule}, got "my board" (rename the file to my-board.toml)'):
-        Board.from_toml(other.rename(board_file.with_name("my board.toml")))
+        Board.from_toml(other.rename(path.with_name("my board.toml")))
 
 
 def test_neither_shelf_is_there(tmp_path, monkeypatch):
@@ -118,61 +96,48 @@ def make_socket(path: Path) -> None:
         os.chdir(place)
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs FIFOs and sockets in the file system")
-@pytest.mark.parametrize(
-    ("make", "kind"), [(Path.mkdir, "a directory"), (os.mkfifo, "a FIFO"), (make_socket, "a socket")]
-)
-def test_what_is_no_regular_file_is_refused_at_once(tmp_path, make, kind):
-    path = tmp_path / "my-board.toml"
-    make(path)
-    begin = time.monotonic()
-    with pytest.raises(InputError) as error:
-        Board.from_toml(path)
-    assert str(error.value) == f"{path}: wanted a regular file, got {kind}"
-    assert time.monotonic() - begin < 1
+def link_to_zero(path: Path) -> None:
+    path.symlink_to("/dev/zero")
 
 
-@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="needs /dev/zero")
-def test_a_device_is_refused():
-    with refused("/dev/zero: wanted a regular file, got a device"):
-        Board.from_toml("/dev/zero")
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs FIFOs, sockets and devices in the file system")
+def test_what_is_no_regular_file_is_refused_at_once(tmp_path):
+    kinds = [(Path.mkdir, "a directory"), (os.mkfifo, "a FIFO"), (make_socket, "a socket"), (link_to_zero, "a device")]
+    for number, (make, kind) in enumerate(kinds):
+        path = tmp_path / f"{number}.toml"
+        make(path)
+        begin = time.monotonic()
+        with pytest.raises(InputError) as error:
+            Board.from_toml(path)
+        assert str(error.value) == f"{path}: wanted a regular file, got {kind}"
+        assert time.monotonic() - begin < 1, kind
 
 
-def test_an_unreadable_file(board_file, monkeypatch):
+def test_a_file_that_cannot_be_read(path, monkeypatch):
     def denied(*_: object, **__: object) -> int:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("bayesplate.board.toml.os.open", denied)  # a file mode would not stop a test run by root
-    with refused("my-board.toml: wanted a readable file, got permission denied"):
-        Board.from_toml(board_file)
-
-
-def test_an_impossible_path():
     for name in ["a\0b.toml", "./" + "a" * 5000 + ".toml"]:
         with refused(".toml: wanted a readable file, got"):
             Board.from_toml(name)
-
-
-def test_a_large_file(write):
-    for make in [lambda n: b"#" * n, lambda n: b"a = '" + b"x" * n]:
-        with refused("wanted a file of at most 1,000,000 bytes, got a larger one"):
-            Board.from_toml(write(make(1_000_001)))
+    monkeypatch.setattr("bayesplate.board.toml.os.open", denied)  # a file mode would not stop a test run by root
+    with refused("my-board.toml: wanted a readable file, got permission denied"):
+        Board.from_toml(path)
 
 
 @pytest.mark.parametrize("load", [Board.from_toml, load_prior, load_coefficients])
-def test_no_more_of_a_large_file_is_read_than_a_card_may_hold(write, load):
+def test_no_more_of_a_large_file_is_read_than_a_card_may_hold(path, load):
     """Half a gigabyte of nothing costs as much memory as the largest card, a few times over at most."""
-    path = write(b"")
-    os.truncate(path, 500_000_000)
-    tracemalloc.start()
-    try:
-        with refused("got a larger one"):
-            load(path)
-        _, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-
-    assert peak < 5_000_000
+    for n_bytes in (1_000_001, 500_000_000):
+        os.truncate(path, n_bytes)
+        tracemalloc.start()
+        try:
+            with refused("wanted a file of at most 1,000,000 bytes, got a larger one"):
+                load(path)
+            _, peak = tracemalloc.get_traced_memory()
+        finally:
+            tracemalloc.stop()
+        assert peak < 5_000_000
 
 
 NO_CARDS = [
@@ -204,53 +169,57 @@ NO_CARDS = [
     (b"a = " + b"[" * 100_000, "my-board.toml: wanted tables and lists nested at most 20 deep"),
     (b"x = 1\n" + b".".join([b"a"] * 400_000) + b" = 1", "my-board.toml line 2: wanted a key of at most 20 parts"),
     (b"[" + b".".join([b'"a b"'] * 100_000) + b"]", "my-board.toml line 1: wanted a key of at most 20 parts"),
+    # what the guard against long keys is quick about
+    (b'"' * 900_000, "my-board.toml"),
+    (b"'\"" * 450_000, "my-board.toml"),
+    (b"a" * 900_000, "my-board.toml"),
+    (b"a." * 10 + b" " * 900_000, "my-board.toml"),
 ]  # fmt: skip
 
 
-def test_what_is_no_card(write):
+def test_what_is_no_card_is_refused_soon(path):
     for content, message in NO_CARDS:
+        path.write_bytes(content)
         begin = time.monotonic()
         with refused(message):
-            Board.from_toml(write(content))
-        assert time.monotonic() - begin < 5
+            Board.from_toml(path)
+        assert time.monotonic() - begin < 5, message
 
 
-def test_the_guard_against_long_keys_is_quick(write):
-    for content in [b'"' * 900_000, b"'\"" * 450_000, b"a" * 900_000, b"a." * 10 + b" " * 900_000]:
-        begin = time.monotonic()
-        with refused("my-board.toml"):
-            Board.from_toml(write(content))
-        assert time.monotonic() - begin < 5
+SAME = [
+    CARD.replace("\n", "\r\n"),
+    "\ufeff" + CARD,
+    "\ufeff" + CARD.replace("\n", "\r\n"),
+    CARD.replace("\n", "  \n") + "\n\n",
+    changed('"(1,0)" = 52\n', '" ( 1 , 0 ) " = 52\n'),
+    CARD.replace("[setup]", "[[setup]]"),
+    changed("[setup.fluid]", "[setup.air]"),
+]
 
 
-def test_line_ends_and_byte_order_mark_change_nothing(write, board_text):
-    plain = Board.from_text(board_text, "my-board")
-    for content in (board_text.replace("\n", "\r\n"), "\ufeff" + board_text, board_text.replace("\n", "  \n") + "\n\n"):
-        other = Board.from_toml(write(content))
-        assert other == plain
-        assert other.sha256 != plain.sha256
+def test_how_a_card_is_written_changes_its_hash_alone(path):
+    """The hash is that of the file's bytes, and the text that the board keeps is what it is of."""
+    plain = read()
+    for text in SAME:
+        path.write_text(text, encoding="utf-8", newline="")
+        card = Board.from_toml(path)
+        data = path.read_bytes()
+        path.unlink()
+
+        assert card == plain
+        assert card.text.encode("utf-8") == data
+        assert card.sha256 == hashlib.sha256(data).hexdigest() == read(card.text).sha256 != plain.sha256
 
 
-def test_nothing_in_a_card_is_executed(write, tmp_path, board_text):
+def test_texts_of_a_card_are_texts(tmp_path):
+    """Kept as they are, and nothing in them is executed."""
     canary = tmp_path / "canary"
-    code = f"__import__('pathlib').Path({str(canary)!r}).touch()"
-    card = Board.from_toml(write(board_text.replace("A test board", f"!!python/object/apply:eval [{code}] {{{code}}}")))
+    code = f"!!python/object/apply:eval [__import__('pathlib').Path({str(canary)!r}).touch()]"
+    title = f"<script>alert(1)</script> $\\frac{{1}}{{2}}$ 🪵 \u202eabc {code} {{{code}}}"
+    text = changed("A test board", title.replace("\\", "\\\\"), 'source = "invented"', 'notes = "Küche, 21 °C, Tür zu"')
+    card = read(changed('name = "cantilever"', 'name = "cantilever"\nnotes = "früh"', text=text))
 
-    assert code in card.title
-    assert not canary.exists()
-
-
-def test_notes_are_free_text(write, board_text):
-    text = board_text.replace("title =", 'notes = "Küche, 21 °C, Tür zu"\ntitle =')
-    text = text.replace('name = "cantilever"', 'name = "cantilever"\nnotes = "früh"')
-    card = Board.from_toml(write(text))
-
+    assert card.title == title
     assert card.card is not None
     assert (card.card.table["notes"], card.card.table["setup"]["notes"]) == ("Küche, 21 °C, Tür zu", "früh")
-
-
-def test_strange_titles_are_kept_as_they_are(write, board_text):
-    title = "<script>alert(1)</script> $\\\\frac{1}{2}$ 🪵 \u202eabc"
-    card = Board.from_toml(write(board_text.replace("A test board", title)))
-
-    assert card.title == title.replace("\\\\", "\\")
+    assert not canary.exists()
