@@ -17,31 +17,27 @@ from bayesplate.results.budget import budget, input_remarks, input_shares, row_w
 FIELDS = ("thickness_profile.field_1", "thickness_profile.field_2")
 
 
-@pytest.fixture(scope="module")
-def read():
-    """A board read at places, and draws whose E_x is explained by two components of its field, 36 % and 25 %."""
+def orthogonal(n):
+    """Columns of 400 draws without a mean that are not correlated, and of one size."""
+    random = np.random.default_rng(2).standard_normal((400, n))
+    return np.linalg.qr(np.column_stack([np.ones(400), random]))[0].T[1:]
+
+
+def test_components_of_a_field_are_one_row_with_words():
+    """Of draws whose E_x is explained by two components of the thickness, 36 % and 25 %."""
     board = prepare("spruce-free-2R", ["thickness_profile"]).board
-    columns = np.linalg.qr(np.column_stack([np.ones(400), np.random.default_rng(2).standard_normal((400, 4))]))[0].T[1:]
+    columns = orthogonal(4)
     log_modulus = 0.6 * columns[0] + 0.5 * columns[1] + np.sqrt(0.39) * columns[2]
     inputs = dict(zip((*FIELDS, "mass"), (columns[0], columns[1] + 0.1 * columns[0], np.exp(columns[3])), strict=True))
-    return board, SimpleNamespace(moduli={"E_x": np.exp(log_modulus)}, inputs=inputs)
+    draws = SimpleNamespace(moduli={"E_x": np.exp(log_modulus)}, inputs=inputs)
+    rows, alone = budget(draws, board)["E_x"], input_shares(draws)["E_x"]
 
-
-def test_components_are_one_row(read):
-    board, draws = read
     assert {one.name for one in board.uncertain if one.is_component} == set(FIELDS)
-    rows = budget(draws, board)["E_x"]
     assert set(rows) == {"mass", "thickness_profile"}
     assert rows["thickness_profile"] == pytest.approx(0.61)
-    alone = input_shares(draws)["E_x"]
     assert sum(alone[name] for name in FIELDS) == pytest.approx(0.61)
     assert rows["mass"] == alone["mass"]
-
-
-def test_a_row_has_words(read):
-    board, draws = read
-    assert row_words("thickness_profile", board) == "thickness profile"
-    assert row_words("mass", board) == "mass"
+    assert [row_words(row, board) for row in ("thickness_profile", "mass")] == ["thickness profile", "mass"]
     (said,) = input_remarks(draws, board)
     assert said.startswith("61 % of the uncertainty (variance) of E_x comes from the thickness profile: measure it")
 
@@ -51,7 +47,7 @@ def test_discrepancies_of_sessions_are_one_row_and_no_reason_to_measure_better()
     days = [setup_of(ritz.CANTILEVER, hertz, name=name) for name in ("monday", "friday")]
     board = with_discrepancies(board_of(ritz.FINNISH, days, poisson_xy=Quantity.from_mean(0.4, 0.08, "normal")))
     of_modes = [one.name for one in board.uncertain if not one.is_listed]
-    columns = np.linalg.qr(np.column_stack([np.ones(400), np.random.default_rng(2).standard_normal((400, 7))]))[0].T[1:]
+    columns = orthogonal(7)
     log_modulus = 0.6 * columns[0] + 0.5 * columns[1] + 0.1 * columns[6]
     inputs = dict(zip((*of_modes, "poisson_xy"), columns, strict=True))
     draws = SimpleNamespace(moduli={"E_x": np.exp(log_modulus)}, inputs=inputs)
@@ -71,16 +67,16 @@ def drawn(correlation, n=40_000):
     return SimpleNamespace(moduli={"E_x": np.exp(log_modulus)}, inputs={"thickness": thickness, "support": support})
 
 
-@pytest.mark.parametrize("correlation", [0.0, 0.9])
-def test_shares_and_what_the_readings_leave_add_up_to_the_variance(correlation):
+def test_shares_and_what_the_readings_leave_add_up_to_the_variance():
     """The control is the squared correlation with each input itself: together more than there is, or less."""
-    draws = drawn(correlation)
-    shares, log_modulus = input_shares(draws)["E_x"], np.log(draws.moduli["E_x"])
-    left = 1e-4 / log_modulus.var()
-    error = 4.0 * np.sqrt(2.0 / log_modulus.size)
-    assert sum(shares.values()) + left == pytest.approx(1.0, abs=error)
-    alone = sum(np.corrcoef(log_modulus, column)[0, 1] ** 2 for column in draws.inputs.values())
-    assert (alone + left == pytest.approx(1.0, abs=error)) == (correlation == 0.0)
+    for correlation in [0.0, 0.9]:
+        draws = drawn(correlation)
+        shares, log_modulus = input_shares(draws)["E_x"], np.log(draws.moduli["E_x"])
+        left = 1e-4 / log_modulus.var()
+        error = 4.0 * np.sqrt(2.0 / log_modulus.size)
+        assert sum(shares.values()) + left == pytest.approx(1.0, abs=error)
+        alone = sum(np.corrcoef(log_modulus, column)[0, 1] ** 2 for column in draws.inputs.values())
+        assert (alone + left == pytest.approx(1.0, abs=error)) == (correlation == 0.0)
 
 
 def test_an_input_that_were_known_would_take_its_share_off():

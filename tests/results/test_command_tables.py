@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import pytest
-
 from bayesplate.campaign.summary import CampaignCheck
 from bayesplate.commands.shown import show_campaign_check, show_check, show_modes
 from bayesplate.results.checking import CheckedEffect, CheckedMode, CheckedSetup, CheckReport
@@ -74,45 +72,39 @@ def test_check_shows_what_its_report_holds():
     assert doubted.endswith("Next: settle what is in doubt above; then bayesplate fit, with the same card")
 
 
-@pytest.mark.parametrize(
-    ("n_doubts", "told"), [(0, "Next: bayesplate fit"), (1, "Next: settle what is in doubt above")]
-)
-def test_of_a_campaign_one_board_in_doubt_is_enough(n_doubts, told):
-    boards = {"first": REPORT, "second": replace(REPORT, n_doubts=n_doubts)}
-    assert told in show_campaign_check(CampaignCheck("made", "", {}, None, boards)).closing
+def test_of_a_campaign_one_board_in_doubt_is_enough():
+    for n_doubts, told in [(0, "Next: bayesplate fit"), (1, "Next: settle what is in doubt above")]:
+        boards = {"first": REPORT, "second": replace(REPORT, n_doubts=n_doubts)}
+        assert told in show_campaign_check(CampaignCheck("made", "", {}, None, boards)).closing
 
 
 def test_methods_stand_beside_each_other():
+    """A reading above what a method predicts is above the fit that has not seen it, too."""
+    forward = forward_table(THIN)
+
     assert methods_table("made", THIN).texts == (
         ("paper", "12.72", "–", "12.72", "–"),
         ("percentile (42)", "13.05 ± 0.25", "13.05 ± 0.25", "13.05 ± 0.25", "20.5"),
     )
+    assert forward.columns == ("mode", "Hz", "paper", "percentile", "left out")
+    assert forward.texts == (("(1,0)", "52", "–", "+20.5", "+55.2"),)
 
 
-def test_the_forward_check_is_measured_over_predicted_as_every_error():
-    """A reading above what a method predicts is above the fit that has not seen it, too."""
-    table = forward_table(THIN)
+BETTER = [
+    (38.0 - 1.01 * SAME_CENTS, "shear-flexible", "lowers the error: 38.0 -> 37.5 cents"),
+    (38.0 - 0.99 * SAME_CENTS, None, "changes nothing"),
+    (38.0 + 0.99 * SAME_CENTS, None, "changes nothing"),
+    (38.0 + 1.01 * SAME_CENTS, "thin", "raises the error: 38.0 -> 38.5 cents"),
+    (None, None, "cannot be told apart"),
+]
 
-    assert table.columns == ("mode", "Hz", "paper", "percentile", "left out")
-    assert table.texts == (("(1,0)", "52", "–", "+20.5", "+55.2"),)
 
-
-@pytest.mark.parametrize(
-    ("left_out", "better", "words"),
-    [
-        (38.0 - 1.01 * SAME_CENTS, "shear-flexible", "lowers the error: 38.0 -> 37.5 cents"),
-        (38.0 - 0.99 * SAME_CENTS, None, "changes nothing"),
-        (38.0 + 0.99 * SAME_CENTS, None, "changes nothing"),
-        (38.0 + 1.01 * SAME_CENTS, "thin", "raises the error: 38.0 -> 38.5 cents"),
-        (None, None, "cannot be told apart"),
-    ],
-)
-def test_the_better_theory_is_better_by_half_a_cent(left_out, better, words):
+def test_the_better_theory_is_better_by_half_a_cent():
     assert SAME_CENTS == 0.5
-    found = better_theory(THIN, replace(THIN, error=LeastSquaresErrors(17.0, left_out)))
-
-    assert found.better == better
-    assert words in found.sentence
+    for left_out, better, words in BETTER:
+        found = better_theory(THIN, replace(THIN, error=LeastSquaresErrors(17.0, left_out)))
+        assert found.better == better, left_out
+        assert words in found.sentence
 
 
 def test_modes_are_shown_with_their_reading_or_their_range():

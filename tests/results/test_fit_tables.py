@@ -44,9 +44,7 @@ def test_an_isotropic_plate_has_no_grain():
     one = replace(SUMMARY, model=replace(SUMMARY.model, isotropic=True))
 
     for found in (fitted_constants(one), compared_constants(one, "made")):
-        assert [row[0] for row in found.texts] == [
-            "E_x, any direction", "E_y, any direction", "G_xy, shear",
-        ]  # fmt: skip
+        assert [row[0] for row in found.texts] == ["E_x, any direction", "E_y, any direction", "G_xy, shear"]
     assert "grain" in SUMMARY._repr_html_()
     assert "grain" not in one._repr_html_()
     assert is_isotropic({"E_x": 2.0, "E_y": 2.0})
@@ -99,23 +97,24 @@ def test_peaks_whose_label_is_not_sure():
     assert peaks_table(replace(SUMMARY, peaks=(bare,))).texts[0][1:3] == ("–", "(3,1) 75 %, (2,2) 12 %")
 
 
-@pytest.mark.parametrize(
-    ("origin", "mark", "told"), [("doubtful", " ?", "in doubt"), ("proposed", " *", "proposed here")]
-)
-def test_labels_that_are_not_sure_are_marked(origin, mark, told):
-    table = modes_table(replace(SUMMARY, modes=(replace(SUMMARY.modes[0], label_origin=origin), *SUMMARY.modes[1:])))
+def test_labels_that_are_not_sure_are_marked():
+    for origin, mark, told in [("doubtful", " ?", "in doubt"), ("proposed", " *", "proposed here")]:
+        first = replace(SUMMARY.modes[0], label_origin=origin)
+        table = modes_table(replace(SUMMARY, modes=(first, *SUMMARY.modes[1:])))
 
-    assert [cell.endswith(mark) for cell in column(table, "mode")] == [True, False, False]
-    assert told in table.title
-    assert told not in modes_table(SUMMARY).title
+        assert [cell.endswith(mark) for cell in column(table, "mode")] == [True, False, False]
+        assert told in table.title
+        assert told not in modes_table(SUMMARY).title
 
 
 def test_what_fit_prints():
     shown = show_fit(SUMMARY)
 
-    assert [table.title for table in shown.tables][1:] == [
-        "Modes, Hz; errors, cents (17 cents are about 1 %)", "Peaks and the modes that they may be",
-    ]  # fmt: skip
+    _, modes, peaks = (table.title for table in shown.tables)
+    assert (modes, peaks) == (
+        "Modes, Hz; errors, cents (17 cents are about 1 %)",
+        "Peaks and the modes that they may be",
+    )
     assert (shown.remarks, shown.warnings) == (SUMMARY.identifiability, SUMMARY.warnings)
     assert shown.closing == (
         "thin plate with attached mass, exact law. Error rms 7.5 cents in sample, 12.2 left out; noise 0.50 %; the "
@@ -161,35 +160,32 @@ def test_what_a_page_says():
     }
 
 
-@pytest.mark.parametrize(
-    ("mean", "sd", "printed"),
-    [
-        (13.0, 0.032, "13.000 ± 0.032"),
-        (0.899, 0.22, "0.90 ± 0.22"),
-        (5304.0, 123.0, "5\N{NARROW NO-BREAK SPACE}300 ± 120"),
-        (0.12, 0.0997, "0.12 ± 0.10"),
-        (-0.004, 0.5, "0.00 ± 0.50"),
-        (0.00012, 0.0000066, "0.0001200 ± 0.0000066"),
-        (399.0, 0.0, "399"),
-    ],
-)
-def test_one_rule_rounds_every_mean_and_its_sd(mean, sd, printed):
+ROUNDED = [
+    (13.0, 0.032, "13.000 ± 0.032"),
+    (0.899, 0.22, "0.90 ± 0.22"),
+    (5304.0, 123.0, "5\N{NARROW NO-BREAK SPACE}300 ± 120"),
+    (12345.6, 12.0, "12\N{NARROW NO-BREAK SPACE}346 ± 12"),
+    (0.12, 0.0997, "0.12 ± 0.10"),
+    (-0.004, 0.5, "0.00 ± 0.50"),
+    (0.00012, 0.0000066, "0.0001200 ± 0.0000066"),
+    (399.0, 0.0, "399"),
+    (2.5, 0.0, "2.5"),
+]
+
+
+def test_one_rule_rounds_every_mean_and_its_sd():
     """Two significant digits of the sd, the mean to the same decimal place: by hand."""
-    assert str(plus_minus(replace(spread(1.0, 0.1, "1"), mean=mean, sd=sd))) == printed
-    assert " ± ".join(text for text in rounded(mean, sd) if text) == printed
+    for mean, sd, printed in ROUNDED:
+        assert str(plus_minus(spread(mean, sd, "1"))) == printed
+        assert " ± ".join(text for text in rounded(mean, sd) if text) == printed
 
 
 def test_numbers_as_people_read_them():
+    signed = [number(value, 1, signed=True) for value in (1.25, -0.04, -0.06)]
     assert [decimals(sd) for sd in (0.0, 123.0, 9.96, 9.94, 0.0996, 0.0994, 1e-9)] == [0, 0, 0, 1, 2, 3, 8]
-    assert str(plus_minus(spread(12345.6, 12.0, "1"))) == "12\N{NARROW NO-BREAK SPACE}346 ± 12"
-    assert str(plus_minus(spread(2.5, 0.0, "1"))) == "2.5"
     assert str(interval(spread(10.0e9, 0.5e9, "Pa"), 1e-9)) == "9.00 to 11.00"
-    assert [str(one) for one in (number(None, 1), number(1.25, 1, signed=True), number(-2.0, 0, factor=-1.0))] == [
-        "–",
-        "+1.2",
-        "2",
-    ]
-    assert [str(one) for one in (number(-0.04, 1, signed=True), number(-0.06, 1, signed=True))] == ["0.0", "-0.1"]
+    assert [*map(str, signed)] == ["+1.2", "0.0", "-0.1"]
+    assert [str(number(None, 1)), str(number(-2.0, 0, factor=-1.0))] == ["–", "2"]
     assert [str(two_digits(value)) for value in (0.028, 3.0, 17.3, 0.0, None)] == ["0.028", "3.0", "17", "0", "–"]
     assert [str(one) for one in (percent(None), percent(0.125), percent(0.125, 1))] == ["–", "12 %", "12.5 %"]
 

@@ -1,15 +1,18 @@
-"""summary.json, key by key, and how a summary shows itself; from a summary made by hand."""
+"""summary.json, key by key, how a summary shows itself, and what it warns of; from one that was made by hand."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import FrozenInstanceError, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from made_summaries import SUMMARY
 
+from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.results.contract import Elastic, Spread, finite, json_text, rms
+from bayesplate.results.summarise import HIGH_EXACT_ERROR, doubts_of, law_means, warnings_of
 from bayesplate.results.summary import ModelHeader, SamplerHealth, Unconverged
 
 SPREAD = ["mean", "sd", "q05", "q25", "q50", "q75", "q95", "unit"]
@@ -106,13 +109,18 @@ def test_constants_are_reached_by_attribute_and_by_name_and_read_like_a_dict():
         elastic.E_x = None
 
 
-def test_a_spread_by_hand():
+def test_a_spread_by_hand_and_that_of_an_exact_value_is_none():
     """Of 0, 1, ..., 100: quantiles are their own percentages, the sample variance of n numbers is n (n + 1) / 12."""
     found = Spread.of(np.arange(101.0).reshape(1, 101), "m")
 
     assert (found.mean, found.q05, found.q25, found.q50, found.q75, found.q95) == (50, 5, 25, 50, 75, 95)
     assert found.sd == pytest.approx(np.sqrt(101 * 102 / 12))
     assert found.unit == "m"
+    # the mean of many 1.2 is 1.2 but for rounding, which no reader may take for an uncertainty of 2e-16
+    alike = np.full((1000, 32), 1.2)
+    exact = Spread.of(alike, "kg/m3")
+    assert (exact.mean, exact.sd, exact.q05, exact.q95) == (1.2, 0.0, 1.2, 1.2)
+    assert np.std(alike, ddof=1) > 0, "else the test shows nothing"
 
 
 def test_an_rms_is_of_the_numbers_that_there_are():
@@ -132,9 +140,47 @@ def test_it_shows_itself_in_a_line_and_in_a_notebook():
     assert html.count("<tr>") == 1 + len(Elastic.NAMES)
 
 
-def test_the_spread_of_an_exact_value_is_none():
-    """The mean of many 1.2 is 1.2 but for rounding, which no reader may take for an uncertainty of 2e-16."""
-    found = Spread.of(np.full((1000, 32), 1.2), "kg/m3")
+OF_DRAWS = dict.fromkeys(("E_x", "E_y", "G_xy", "D_x", "D_y", "D_s"), 1.5)
 
-    assert (found.mean, found.sd, found.q05, found.q95) == (1.2, 0.0, 1.2, 1.2)
-    assert np.std(np.full((1000, 32), 1.2), ddof=1) > 0, "else the test shows nothing"
+
+def warned(*, law="linear", settled=True, enough=True, exact_worst=0.0, doubts=()):
+    problem = SimpleNamespace(
+        doubts=(),
+        board=SimpleNamespace(notes=("noted",)),
+        estimate=SimpleNamespace(converged=settled),
+        posterior=SimpleNamespace(law=law),
+    )
+    return warnings_of(problem, SimpleNamespace(doubts=doubts, linear_is_enough=enough, exact_worst=exact_worst))
+
+
+WARNINGS = [
+    ({}, []),
+    ({"settled": False}, ["the least-squares steps did not settle"]),
+    ({"doubts": ("check its label",)}, ["check its label"]),
+    ({"enough": False}, ["the linear law is off by more than a quarter of the noise"]),
+    ({"law": "exact", "enough": False}, []),  # the exact law has no linear law to be warned of
+    ({"exact_worst": 0.99 * HIGH_EXACT_ERROR}, []),
+    ({"exact_worst": 1.01 * HIGH_EXACT_ERROR}, ["the exact law misses full solves by up to 0.51 cents"]),
+]
+
+
+def test_each_fault_is_told_once_after_what_the_board_notes():
+    assert HIGH_EXACT_ERROR == 0.5
+    for case, words in WARNINGS:
+        noted, *told = warned(**case)
+        assert (noted, len(told)) == ("noted", len(words)), case
+        assert all(passage in one for passage, one in zip(words, told, strict=True)), told
+
+
+def test_what_speaks_against_the_constants_is_a_doubt_and_a_label_that_is_left_open_is_none():
+    problem = SimpleNamespace(doubts=("misread?", "near this plate"), veerings=("near this plate",))
+
+    assert doubts_of(problem, SimpleNamespace(doubts=("check its label",))) == ("misread?", "check its label")
+
+
+def test_means_that_rest_on_too_few_draws_are_not_given():
+    assert FEWEST_WEIGHTED_DRAWS == 200
+    assert law_means(OF_DRAWS, 200.0).E_x == 1.5
+    few = law_means(OF_DRAWS, 199.0)
+    assert [value for _, value in few.items()] == [None] * 6
+    assert few.effective_draws == 199.0

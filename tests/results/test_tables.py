@@ -1,15 +1,21 @@
-"""Any table in any medium: one escape for every text, full precision for programs, LaTeX that needs no package."""
+"""Any table in any medium: one escape for every text, full precision for programs, nothing cut on a terminal."""
 
 from __future__ import annotations
 
 import csv
 import io
 import re
+from itertools import product
 
 import pytest
+from diagnoses import DIAGNOSES
+from made_summaries import SUMMARY
 from payloads import DIRECTION_MARKS, EVERY, PAYLOADS, shown
 from read_pages import Read, faults
 
+from bayesplate.commands.shown import show_diagnosis, show_fit
+from bayesplate.diagnosis.tables import candidates_table
+from bayesplate.results.layout import column_widths
 from bayesplate.results.tables import Table, escape, notebook, render, visible
 from bayesplate.results.words import Value, percent
 
@@ -123,3 +129,48 @@ def test_a_sentence_and_a_table_on_a_terminal():
 def test_shown_is_what_is_left_of_a_payload():
     """The two ways to say so agree where nothing but direction marks steers."""
     assert [visible(one) for one in PAYLOADS] == [shown(one) for one in PAYLOADS]
+
+
+TABLES = (
+    *show_fit(SUMMARY).tables,
+    *show_diagnosis(DIAGNOSES["named"]).tables,
+    candidates_table(DIAGNOSES["named"]),
+)
+
+
+def printed(table: Table, width: int) -> list[str]:
+    """The lines of a table on a terminal."""
+    return [line.rstrip() for line in render(table, "terminal", width=width).splitlines()]
+
+
+def test_no_number_is_cut_on_a_narrow_terminal():
+    for table, width in product(TABLES, (40, 80)):
+        lines = printed(table, width)
+        words = set(re.findall(r"[^\s│┃]+", "\n".join(lines)))
+
+        assert max(map(len, lines)) <= width
+        assert "…" not in "".join(lines)
+        for row in table.texts:
+            for cell in row:
+                assert {word for word in cell.split() if len(word) < width - 4} <= words, cell
+
+
+def test_a_table_that_fits_is_a_grid_and_one_that_does_not_is_stacked():
+    table = Table("Made", ("mode", "90 % interval", "a reason in words"), (("(1,0)", "-35.3 to +45.7", "not needed"),))
+
+    assert column_widths(table.columns, table.texts, 80) == [5, 14, 17]
+    assert column_widths(table.columns, table.texts, 40) == [5, 14, 11]  # by hand: 40 less 10 of rules leaves 30
+    assert column_widths(table.columns, table.texts, 30) is None
+    assert printed(table, 30) == [
+        "Made",
+        "mode (1,0)",
+        "  90 % interval: -35.3 to",
+        "  +45.7",
+        "  a reason in words: not",
+        "  needed",
+    ]
+
+
+def test_numbers_end_at_the_right_and_sentences_begin_at_the_left():
+    rows = (("a", "1.5", "a sentence of more characters than any number has"), ("b", "12", "short"))
+    assert "│ b     │    12 │ short " in "\n".join(printed(Table("t", ("board", "value", "doubt"), rows), 80))
