@@ -78,12 +78,17 @@ def test_the_same_draws_give_the_same_bytes(path, tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit for the size of a file")
-def test_a_disk_that_is_full_in_the_middle_of_it_ends_no_process(tmp_path):
-    """HDF5, writing to the disk itself, ended it with a segmentation fault after all had been said."""
+def test_a_cache_and_a_disk_that_cannot_be_written_end_no_process(tmp_path):
+    """Of ArviZ, which on its first day in 0.23 announces version 1 and writes into its cache that it did; and of HDF5.
+
+    HDF5, writing to the full disk itself, ended the process with a segmentation fault after all had been said.
+    """
     program = (
         "import resource, sys, pathlib, numpy as np\n"
         "from bayesplate.errors import UnwritableError\n"
+        "from bayesplate.libraries import load_arviz\n"
         "from bayesplate.results.archive import DRAWN, tree_of, write_tree\n"
+        "load_arviz().ess\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))\n"
         "values = np.random.default_rng(1).normal(size=(4, 30_000))\n"
         "tree = tree_of({'posterior': {'a': (DRAWN, values)}}, {}, {})\n"
@@ -92,16 +97,9 @@ def test_a_disk_that_is_full_in_the_middle_of_it_ends_no_process(tmp_path):
         "except UnwritableError:\n"
         "    sys.exit(3)\n"
     )
-    assert subprocess.run([sys.executable, "-c", program, str(tmp_path / "a.nc")], check=False).returncode == 3
-    assert list(tmp_path.iterdir()) == []
+    cache = tmp_path / "a-file"
+    cache.touch()
+    run = [sys.executable, "-W", "error::FutureWarning", "-c", program, str(tmp_path / "a.nc")]
 
-
-def test_arviz_is_loaded_quietly_where_its_cache_cannot_be_written(tmp_path):
-    """On its first day 0.23 announces version 1, as a warning, and writes into the cache that it did."""
-    (tmp_path / "a-file").touch()
-    program = "from bayesplate.libraries import load_arviz\nload_arviz().ess"
-    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "a-file")}
-    run = [sys.executable, "-W", "error::FutureWarning", "-c", program]
-
-    assert subprocess.run(run, check=False, env=environment).returncode == 0
-    assert (tmp_path / "a-file").read_bytes() == b""
+    assert subprocess.run(run, check=False, env={**os.environ, "XDG_CACHE_HOME": str(cache)}).returncode == 3
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("a-file", b"")]
