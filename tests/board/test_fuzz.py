@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -81,9 +81,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> None:
     (BENCH["folder"] / "template.toml").write_text(TEMPLATE, encoding="utf-8")
 
 
-def spliced(text: str) -> st.SearchStrategy[str]:
+def spliced(text: str, pieces: Sequence[str] = PIECES) -> st.SearchStrategy[str]:
     """A text with some of it taken out and pieces put in."""
-    part = st.tuples(st.integers(0, len(text)), st.integers(0, 30), st.lists(st.sampled_from(PIECES), max_size=3))
+    part = st.tuples(st.integers(0, len(text)), st.integers(0, 30), st.lists(st.sampled_from(pieces), max_size=3))
 
     def put(parts: list[tuple[int, int, list[str]]]) -> str:
         found = text
@@ -173,17 +173,6 @@ NAMED = st.dictionaries(KEYS, TREES, max_size=4)
 CARDS = [BYTES, spliced(CARD), NAMED.map(toml_text), spliced(CARD.replace("length_x_mm = 253", "length_x_mm = 1"))]
 
 
-@st.composite
-def rows(draw: st.DrawFn) -> str:
-    """A table with cells taken out and put in."""
-    text = ROWS
-    for _ in range(draw(st.integers(1, 3))):
-        at = draw(st.integers(0, len(text)))
-        put = "".join(draw(st.lists(st.sampled_from(CELLS), max_size=3)))
-        text = text[:at] + put + text[at + draw(st.integers(0, 12)) :]
-    return text
-
-
 FRAGMENTS = [BYTES, spliced(FRAGMENT), NAMED.map(lambda tree: toml_text({"setup": tree}))]
 read_fragment = reading("fragment.toml", lambda path: Board.from_card(CardFile(SOUND, f"{BOARD}.toml"), setup=path))
 read_boards = reading("boards.csv", lambda path: each_of(path, BENCH["folder"] / "template.toml"))
@@ -193,7 +182,7 @@ read_campaign = reading("together.toml", load_campaign)
 test_cards, test_cards_at_length = fuzzed(read_card, 300, card=st.one_of(spliced(CARD), mutated_cards()))
 test_fragments, test_fragments_at_length = fuzzed(read_fragment, 100, content=st.one_of(*FRAGMENTS))
 test_campaigns, test_campaigns_at_length = fuzzed(read_campaign, 80, content=st.one_of(BYTES, spliced(CAMPAIGN)))
-test_tables, test_tables_at_length = fuzzed(read_boards, 60, content=st.one_of(BYTES, rows()))
+test_tables, test_tables_at_length = fuzzed(read_boards, 60, content=st.one_of(BYTES, spliced(ROWS, CELLS)))
 test_folders, test_folders_at_length = fuzzed(read_folder, 60, content=st.one_of(*CARDS))
 test_toml, test_toml_at_length = fuzzed(written_and_read, 80, tree=NAMED)
 

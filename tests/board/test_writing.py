@@ -6,6 +6,7 @@ import errno
 import os
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from stated import PRIOR, assert_said
 
@@ -131,7 +132,7 @@ def whole():
             AttachedItem("accelerometer", ((0.2, 0.02),), Quantity.from_mean(0.6e-3, 0.1e-3)),
             AttachedItem("weight", ((0.1, 0.02), (0.2, 0.1))),
             AttachedItem("exciter", mass=0.048, coil=1.6e-3, suspension=Quantity.from_mean(2700, 300), magnet="held"),
-            AttachedItem("exciter", ((0.1, 0.05),), resonance=[28.3, 28.5]),
+            AttachedItem("exciter", ((0.1, 0.05),), resonance=np.array([28.3, 28.5])),
         ],
         hammer=(0.06, 0.02),
         fluid=DeclaredFluid(1.2, "none"),
@@ -175,6 +176,9 @@ def test_a_card_and_the_same_numbers_in_python_are_one_board():
 
     assert board.to_toml() == WHOLE
     assert again(board, WHOLE) == board
+    as_read = WHOLE.replace("{ readings = [52.0, 53.0], resolution = 0.5 }", "[52, 53]")
+    as_read = as_read.replace("{ readings = [594.0, 595.0], resolution = 0.5 }", "[594, 595]")
+    assert again(board, as_read) == board  # rounded as their setup says
     assert board.setup("held").readings[0].beams == (0, 0)
     assert board.warp["cup"].lower == 0.0
     alone = again(board, WHOLE.replace("twist = 0.0", "twist = { mean = 1.0, sd = 1.0 }")).warp["twist"]
