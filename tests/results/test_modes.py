@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -22,7 +21,6 @@ from bayesplate.report.content import summary_sentences
 from bayesplate.results.contract import json_text
 from bayesplate.results.modes import mode_rows
 
-CARDS = Path(__file__).parents[2] / "models" / "boards"
 HERTZ = {(0, 0): 57.0, (0, 1): Quantity.from_mean(100.0, 0.5)}
 SETUP = setup_of(ritz.ALL_CLAMPED, HERTZ, name="bench", resolution=1.0)
 
@@ -55,53 +53,51 @@ def test_residuals_are_those_of_the_prediction_beside_them(rows):
         assert np.mean((residuals >= low) & (residuals <= high)) == pytest.approx(0.9, abs=2 / 2000)
 
 
-def test_rounding_by_hand(rows):
+def test_the_rest_of_a_row_by_hand(rows):
     """57 Hz read to 1 Hz: between 56.5 and 57.5 Hz, 15.26 cents below, 15.12 above; 100 ± 0.5 Hz is not rounded."""
-    rounded, uncertain = rows[0]
-
-    assert rounded.rounding_cents == pytest.approx((1200 * np.log2(56.5 / 57), 1200 * np.log2(57.5 / 57)))
-    assert rounded.rounding_cents == pytest.approx((-15.26, 15.12), abs=0.01)
-    assert uncertain.rounding_cents is None
-
-
-def test_the_rest_of_a_row(rows):
     first, second = rows[0]
 
+    assert first.rounding_cents == pytest.approx((1200 * np.log2(56.5 / 57), 1200 * np.log2(57.5 / 57)))
+    assert first.rounding_cents == pytest.approx((-15.26, 15.12), abs=0.01)
+    assert second.rounding_cents is None
     assert (first.setup, first.label, first.measured_hz) == ("bench", "(0,0)", 57.0)
     assert first.left_out_cents == pytest.approx(1200 * np.log2(1.01))
     assert second.left_out_cents is None
     assert [(row.leverage, row.label_correlation) for row in (first, second)] == [(0.25, 0.99), (0.75, 0.9)]
 
 
-def test_a_peak_of_a_sure_label_is_predicted_as_its_mode_is(tmp_path, monkeypatch):
-    """The same draws stand behind both tables, also where the probabilities of labels are taken from some."""
-    monkeypatch.setattr("bayesplate.results.modes.MOST_DRAWS_OF_LABELS", 10)
-    card = tmp_path / "doubtful.toml"
-    text = (CARDS / "finnish-spruce-cantilever.toml").read_text(encoding="utf-8")
-    text = text.replace('name = "finnish-spruce-cantilever"', 'name = "doubtful"')
+@pytest.fixture(scope="module")
+def doubtful(tmp_path_factory):
+    """A fit of the board of which one mode alone carries a constant, with labels that are nearly sure."""
+    card = five_modes(tmp_path_factory.mktemp("five"))
+    text = card.read_text(encoding="utf-8")
     card.write_text(text.replace("[setup]\n", "[setup]\nlabel_confidence = 0.95\n", 1), encoding="utf-8")
-    summary = fitted(str(card)).summary
-    by_label = {mode.label: mode.predicted_hz for mode in summary.modes}
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("bayesplate.results.modes.MOST_DRAWS_OF_LABELS", 10)
+        return fitted(str(card)).summary
 
-    assert len(summary.peaks) == len(by_label) == 6
-    for peak in summary.peaks:
+
+def test_a_peak_of_a_sure_label_is_predicted_as_its_mode_is(doubtful):
+    """The same draws stand behind both tables, also where the probabilities of labels are taken from some."""
+    by_label = {mode.label: mode.predicted_hz for mode in doubtful.modes}
+
+    assert len(doubtful.peaks) == len(by_label) == 5
+    for peak in doubtful.peaks:
         assert peak.predicted_hz.mean == pytest.approx(by_label[peak.assignments[0].label].mean, rel=1e-12)
 
 
-def test_a_mode_that_alone_carries_a_constant_is_named_and_left_out_of_the_left_out_error(tmp_path):
-    summary = fitted(str(five_modes(tmp_path))).summary
-
-    (one,) = summary.carrying_modes
+def test_a_mode_that_alone_carries_a_constant_is_named_and_left_out_of_the_left_out_error(doubtful):
+    (one,) = doubtful.carrying_modes
     assert (one.label, one.carries) == (LABEL, CARRIES)
-    assert one.leverage > 0.9 > max(row.leverage for row in summary.modes if row.label != LABEL)
-    others = [row.left_out_cents for row in summary.modes if row.label != LABEL]
-    assert summary.error.leave_one_out_rms_cents == pytest.approx(np.sqrt(np.mean(np.square(others))))
-    (own,) = (row.left_out_cents for row in summary.modes if row.label == LABEL)
-    assert abs(own) > 3.0 * summary.error.leave_one_out_rms_cents  # it would show
+    assert one.leverage > 0.9 > max(row.leverage for row in doubtful.modes if row.label != LABEL)
+    others = [row.left_out_cents for row in doubtful.modes if row.label != LABEL]
+    assert doubtful.error.leave_one_out_rms_cents == pytest.approx(np.sqrt(np.mean(np.square(others))))
+    (own,) = (row.left_out_cents for row in doubtful.modes if row.label == LABEL)
+    assert abs(own) > 3.0 * doubtful.error.leave_one_out_rms_cents  # it would show
     sentence = f"mode {LABEL} alone carries {CARRIES}: it does not count in the left-out error"
-    assert sentence in summary.identifiability
-    assert sentence in show_fit(summary).remarks
-    assert json.loads(json_text(summary))["carrying_modes"][0]["carries"] == CARRIES
+    assert sentence in doubtful.identifiability
+    assert sentence in show_fit(doubtful).remarks
+    assert json.loads(json_text(doubtful))["carrying_modes"][0]["carries"] == CARRIES
 
 
 def test_where_every_mode_carries_something_alone_it_is_said_that_there_is_no_left_out_error():
