@@ -20,6 +20,7 @@ from bayesplate.labels import Label
 
 LENGTH = "[plate] length_x_mm"
 THICKNESS = "{ mean = 3.0, sd = 0.03 }"
+MASS = "mass_g = 41.0"
 SIDES = "length_x_mm = 253\nlength_y_mm = 114"
 EDGES = '{ x0 = "clamped", x1 = "free", y0 = "free", y1 = "free" }'
 ITEM = 'kind = "accelerometer"\nmass_g = { mean = 0.6, sd = 0.1 }\nat_mm = [200, 20]'
@@ -33,17 +34,17 @@ CORNER = "(from the corner of x0 and y0 of the whole board)"
 CHANCE = "wanted a number from 1e-09 to 0.999999999"
 PERCENT = "(a probability: 98 % is 0.98)"
 TOO_MANY = "".join(f'"({m},{n})" = {100 + 41 * m + n}\n' for m in range(3, 10) for n in range(41))
-OTHER = 'my-board", the name of the file, got'
+OTHER = 'name: wanted "my-board", the name of the file, got'
 
 FAULTS = [
     ("format = 1", "format = 2", "format: wanted 1, got 2 (this version reads card format 1)"),
     ("format = 1", "format = true", "format: wanted 1, got true (this…"),
     ("format = 1\n", "", "format: wanted 1, got nothing"),
-    ("my-board", "../../x", f'name: wanted "{OTHER} "../../x"', f'name: wanted {NAME}, got "../../x"'),
-    ("my-board", "nul.txt", f'name: wanted "{OTHER} "nul.txt"',
+    ("my-board", "../../x", f'{OTHER} "../../x"', f'name: wanted {NAME}, got "../../x"'),
+    ("my-board", "nul.txt", f'{OTHER} "nul.txt"',
      'name: wanted a name that no operating system reserves for a device, got "nul.txt"'),
-    ("my-board", "a" * 300, f'name: wanted "{OTHER} "{"a" * 60}..."', f'name: wanted {NAME}, got "{"a" * 60}..."'),
-    ("my-board", "other", f'name: wanted "{OTHER} "other"'),
+    ("my-board", "a" * 300, f'{OTHER} "{"a" * 60}..."', f'name: wanted {NAME}, got "{"a" * 60}..."'),
+    ("my-board", "other", f'{OTHER} "other"'),
     ('"A test board"', "3", "title: wanted a text in quotes, got 3"),
     ("A test board", "\\u001b[2J", 'title: wanted a text without control characters, got "\\x1b[2J"'),
     ("transverse_shear", "transverse_sheer", 'effects 1: wanted "transverse_shear", "fluid_loading", …, '
@@ -75,10 +76,10 @@ FAULTS = [
      f"{LENGTH}.at_x_mm: wanted one of readings, resolution, at_y_mm, place_sd_mm, got an unknown key (did you mean…)"),
     # the plate and its material
     (LENGTH[8:] + " = 253\n", "", f"{LENGTH}: wanted the length along the grain in mm, got nothing"),
-    ("mass_g = 41.0", "desnity = 473", "[plate]: wanted exactly one of mass_g and density_kg_m3, got neither",
+    (MASS, "desnity = 473", "[plate]: wanted exactly one of mass_g and density_kg_m3, got neither",
      "[plate] desnity: wanted one of length_x_mm, …, got an unknown key (did you mean density_kg_m3?)"),
-    ("mass_g = 41.0", "mass_g = 41.0\ndensity_kg_m3 = 473", "[plate]: wanted exactly one of…, got both, 41.0 and 473"),
-    ("mass_g = 41.0", "density_kg_m3 = 0.47",
+    (MASS, MASS + "\ndensity_kg_m3 = 473", "[plate]: wanted exactly one of…, got both, 41.0 and 473"),
+    (MASS, "density_kg_m3 = 0.47",
      "[plate] density_kg_m3: wanted a number from 1 to 30000 kg/m3, got 0.47 (in kg/m3: 1 g/cm3 is 1000 kg/m3)"),
     (THICKNESS, "{ readings = [3], at_x_mm = [0] }",
      "[plate] thickness_mm: wanted at_x_mm and at_y_mm together, got only at_x_mm"),
@@ -86,20 +87,19 @@ FAULTS = [
      "[plate] thickness_mm.place_sd_mm: wanted at_x_mm and at_y_mm beside it, got no places"),
     (THICKNESS, "{ readings = [3], at_x_mm = [0], at_y_mm = [0], place_sd_mm = -1 }",
      "[plate] thickness_mm.place_sd_mm: wanted a number from 0 to 1000 mm, got -1"),
-    ("mass_g = 41.0", "mass_g = 41.0\nwarp_mm = 1",
-     "[plate] warp_mm: wanted a table of cup, bow and twist, { cup = 0.8 }, got 1"),
-    ("mass_g = 41.0", "mass_g = 41.0\nwarp_mm = { cup = -0.8 }",
+    (MASS, MASS + "\nwarp_mm = 1", "[plate] warp_mm: wanted a table of cup, bow and twist, { cup = 0.8 }, got 1"),
+    (MASS, MASS + "\nwarp_mm = { cup = -0.8 }",
      "[plate] warp_mm.cup: wanted a number from 0 to 1000 mm, got -0.8 (seen from below every warp has the other sign, "
      "and turning the board over changes nothing)"),
-    ("mass_g = 41.0", "mass_g = 41.0\nwarp_mm = { twist = { mean = -1, sd = 1 } }",
+    (MASS, MASS + "\nwarp_mm = { twist = { mean = -1, sd = 1 } }",
      "[plate] warp_mm.twist.mean: wanted a number from 0 to 1000 mm, got -1 (seen from below…)"),
-    ("mass_g = 41.0", "mass_g = 41.0\nwarp_mm = { cup = 12, bow = 26, twist = 26 }",
+    (MASS, MASS + "\nwarp_mm = { cup = 12, bow = 26, twist = 26 }",
      "[plate] warp_mm.cup: wanted at most a tenth of the side, 11.4 mm, got 12 mm (in mm; a board is nearly flat)",
      "[plate] warp_mm.bow: wanted at most a tenth of the side, 25.3 mm, got 26 mm (…)",
      "[plate] warp_mm.twist: wanted at most a tenth of the side, 25.3 mm, got 26 mm (…)"),
-    ("mass_g = 41.0", "mass_g = 41.0\nwarp_mm = { cupp = 1 }",
+    (MASS, MASS + "\nwarp_mm = { cupp = 1 }",
      "[plate] warp_mm.cupp: wanted one of cup, bow, twist, got an unknown key (did you mean cup?)"),
-    ("mass_g = 41.0", 'mass_g = 41.0\nnotes = "x"',
+    (MASS, MASS + '\nnotes = "x"',
      "[plate] notes: wanted one of length_x_mm, …, got an unknown key (it belongs above the first table)"),
     ("poisson_xy = 0.51", "poisson_xy = 1.7", "[material] poisson_xy: wanted a number from -1.5 to 1.5, got 1.7"),
     ("poisson_xy = 0.51", 'prior = "a b"', f'[material] prior: wanted {NAME}, got "a b"'),
@@ -212,11 +212,11 @@ FAULTS = [
     (FLUID, f"[setup.support]\nbounce_hz = 52\n{FLUID}",
      "[setup] support.bounce_hz: wanted less than the lowest mode, 52 Hz, got 52 Hz (the peak of a board that moves…)"),
     # what no board is like
-    ("mass_g = 41.0", "mass_g = 0.041",
+    (MASS, "mass_g = 0.041",
      "[plate] mass_g: wanted a density from 20 to 25000 kg/m3, got 0.474 kg/m3 (0.041 kg is 41 g)",
      "[setup] attached 1 mass_g: wanted less than the board's own 0.041 g, got 0.6 g"),
-    ("mass_g = 41.0", "mass_g = 1.45", "[plate] mass_g: wanted a density…, got 16.8 kg/m3 (1.45 oz is 41.11 g)"),
-    ("mass_g = 41.0", "density_kg_m3 = 4.7", "[plate] density_kg_m3: wanted a density from 20 to 25000 kg/m3, got "
+    (MASS, "mass_g = 1.45", "[plate] mass_g: wanted a density…, got 16.8 kg/m3 (1.45 oz is 41.11 g)"),
+    (MASS, "density_kg_m3 = 4.7", "[plate] density_kg_m3: wanted a density from 20 to 25000 kg/m3, got "
      "4.7 kg/m3 (mass in g, density in kg/m3, lengths in mm)", "[setup] attached 1 mass_g: …"),
     (THICKNESS, "60", "[plate] thickness_mm: wanted at most half the shorter side, 57 mm, got 60 mm (no plate is so "
      "thick; 60 thousandths of an inch would be 1.52 mm)"),
@@ -290,10 +290,10 @@ FAULTS_OF_WHOLE_CARDS = [
      f"[setup] peaks 4: wanted a peak of its own, got peak 1 again {AGAIN}"),
     # all faults at once, of the writing in the order of the card and of the meaning
     (changed("253", "-3", "first_label = [1, 0]", "first_label = 3", '"(1,0)" = "+"', '"(9,9)" = "+"',
-             "mass_g = 41.0", "", "baffle", "bafle", "amplitude = 0.4", "amplitude = -1", text=CARD + PEAKS),
+             MASS, "", "baffle", "bafle", "amplitude = 0.4", "amplitude = -1", text=CARD + PEAKS),
      "[plate]: wanted exactly one of…", "[plate] length_x_mm: wanted a positive number, got -3",
      "[setup] first_label: …", "[setup] peaks 1 amplitude: …", '[setup] signs."(9,9)": …', "[setup] fluid.bafle: …"),
-    (changed("[200, 20]", "[260, 20]", "mass_g = 41.0", "mass_g = 0.041", "[1, 0]", "[2, 0]"),
+    (changed("[200, 20]", "[260, 20]", MASS, "mass_g = 0.041", "[1, 0]", "[2, 0]"),
      "[plate] mass_g: …", '[setup] frequencies_hz."(1,0)": …', '[setup] frequencies_hz."(1,1)": …',
      "[setup] attached 1 at_mm: …", "[setup] attached 1 mass_g: …"),
 ]  # fmt: skip
@@ -454,15 +454,15 @@ NOISE = "{ median = 0.5, factor = 2 }"
 MODE = "{ mean = 310, sd = 2 }"
 CALIPER = "write thickness_mm = { mean = 2.8, sd = 0.05 }, or its readings"
 THICK = "more than a tenth: transverse shear matters"
-WARP = "mass_g = 41.0\nwarp_mm = { cup = [0.8, 0.8], bow = [1.0, 1.1] }"
+WARP = MASS + "\nwarp_mm = { cup = [0.8, 0.8], bow = [1.0, 1.1] }"
 REMARKS = [
     (THICKNESS, "2.8", ("transverse_shear",), [CALIPER]),
     (THICKNESS, "{ readings = [2.8], resolution = 0 }", ("transverse_shear",), [CALIPER]),
     (THICKNESS, "[2.8]", (), ["were taken as rounded, thickness to 0.05 mm;"]),
     (THICKNESS, "{ readings = [2.8, 2.8] }", (), ["were taken as rounded, thickness to 0.05 mm;"]),
     (THICKNESS, "[2.8, 2.9]", (), []),
-    ("mass_g = 41.0", "mass_g = [41, 41]", (), ["were taken as rounded, mass to 1 g;"]),
-    ("mass_g = 41.0", WARP, (), ["were taken as rounded, cup to 0.1 mm;"]),
+    (MASS, "mass_g = [41, 41]", (), ["were taken as rounded, mass to 1 g;"]),
+    (MASS, WARP, (), ["were taken as rounded, cup to 0.1 mm;"]),
     (THICKNESS, "{ mean = 11.5, sd = 0.1 }", (), ["the thickness is 1/9.9 of the shorter side", THICK]),
     (THICKNESS, "{ mean = 11.5, sd = 0.1 }", ("transverse_shear",), []),
     (THICKNESS, "{ mean = 11.3, sd = 0.1 }", (), []),
