@@ -229,7 +229,6 @@ SECURITY = (
         tests=(
             "report/test_texts_stay_texts.py::",
             "report/test_page.py::test_a_text_stays",
-            "report/test_page.py::test_an_unescaped",
             "report/test_grading_page.py::test_names_and_messages",
             "campaign/test_page.py::test_a_text_stays",
         ),
