@@ -108,9 +108,15 @@ def test_what_is_claimed_is_said_and_what_is_not_is_said_too(diagnosis):
 
 
 def test_what_the_terminal_shows(fitted_campaign, diagnosis):
-    titles = [table.title for table in show_campaign_fit(fitted_campaign.summary).tables]
+    tables = show_campaign_fit(fitted_campaign.summary).tables
+    titles = [table.title for table in tables]
+    mass = fitted_campaign.summary.shared[SENSOR].all_boards
+    ((name, mean_and_sd, ends),) = tables[0].texts
 
     assert titles[0] == "Shared by all boards"
+    assert name == "attached mass, g"
+    in_grams = [float(text) for text in (*mean_and_sd.split(" ± "), *ends.split(" to "))]
+    assert in_grams == pytest.approx([1e3 * one for one in (mass.mean, mass.sd, mass.q05, mass.q95)], rel=0.05)
     assert any("each board alone" in title for title in titles)
     assert any(title.startswith("Population") for title in titles)
     assert show_campaign_diagnosis(diagnosis).closing == claim_sentence(diagnosis)

@@ -9,6 +9,7 @@ import pytest
 from effect_plates import MADE, setup_of, shifts, values_of
 from generator.known_boards import BEAMS, DRIVEN
 
+import bayesplate
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Reading
 from bayesplate.effects.drives import Drive, Spot
@@ -93,3 +94,16 @@ def test_the_usual_place_is_the_middle_of_where_it_may_be():
     """Not one standard deviation above it, which is the middle of the board, where a drive does most of all."""
     places = [one for one in exciter(drive()).parameters() if one.key.startswith("place")]
     assert [one.nominal for one in places] == [0.25, 0.25]
+
+
+def test_an_exciter_whose_place_nobody_knows_is_computed_at_gausss_points_of_where_it_may_be():
+    setup = bayesplate.Setup.from_frequencies(
+        {(1, 1): 134.0, (2, 0): 241.0, (0, 2): 312.0},
+        edges={"x0": "clamped", "x1": "free", "y0": "free", "y1": "free"},
+        attached=[bayesplate.AttachedItem("exciter", (), 0.048)],
+    )
+    board = bayesplate.Board.from_numbers("a", length_x=0.5, length_y=0.2, thickness=3e-3, mass=0.12, setups=setup)
+    (found,) = Exciter.at_known_size(board, board.setups[0]).drives
+    whole, half = (end * (1.0 + np.array([-1.0, 1.0]) / np.sqrt(3.0)) for end in (0.5, 0.25))
+
+    assert np.array(found.places) == pytest.approx(np.array([[x, y] for x in whole for y in half]))

@@ -14,6 +14,7 @@ from scipy import stats
 from bayesplate.board.board import Board
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
+from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.unusual import unusual
 from bayesplate.posterior import slips
 from bayesplate.posterior.posing import PosedProblem, pose
@@ -171,6 +172,18 @@ def test_a_noise_far_above_its_prior_is_told_and_one_that_is_allowed_is_not():
     sure = with_noise(board, Quantity.from_median(0.003, 1.01))
     assert noise_remarks(sure, np.log(0.99 * LARGE_NOISE)) == ()
     assert noise_remarks(sure, np.log(1.01 * LARGE_NOISE)) != ()
+
+
+def test_the_noise_of_the_residuals_is_the_root_of_their_mean_square_over_its_median():
+    """The prior counts as one reading that scatters as it expects; three constants are fitted."""
+    problem = with_an_octave()
+    posterior = problem.under("exact").posterior
+    ((predicted,),) = posterior.log_frequencies(problem.centre[None, :])
+    z = (log_measured(problem.board) - predicted) / problem.board.setups[0].noise.median
+    expected = 0.5 * np.log((z @ z + 1.0) / (z.size - 3 + 1))
+
+    assert Readings(posterior, problem.centre).log_widening == pytest.approx(expected, abs=1e-6)
+    assert expected > 2.0  # an octave apart is far beyond the noise
 
 
 def test_constants_are_judged_at_the_centre_and_not_where_least_squares_begin():
