@@ -91,3 +91,14 @@ def test_every_page_of_results_has_a_day_and_a_tree():
         "trial-short"
     }
     assert all(re.fullmatch(r"\d{4}-\d\d-\d\d", one["date"]) and one["tree"] for one in measured.values())
+
+
+def test_every_page_of_results_is_listed_with_its_command():
+    library = ast.parse((ROOT / "docs" / "_ext" / "computations" / "library.py").read_text(encoding="utf-8"))
+    assigned = {node.targets[0].id: node.value for node in library.body if isinstance(node, ast.Assign)}
+    listed = {stem: command for stem, command, _ in ast.literal_eval(assigned["CHECKS"])}
+    targets = (ROOT / "Makefile").read_text(encoding="utf-8")
+
+    assert set(listed) == {page.stem for page in (ROOT / "docs" / "validation").glob("*.md")}
+    for command in listed.values():
+        assert not command.startswith("make ") or f"\n{command.removeprefix('make ')}: " in targets, command

@@ -39,9 +39,10 @@ from computations.runs import SOURCE
 RESULTS = SOURCE / "validation"
 CHECKS = (
     (
-        "bars",
-        "make bars",
-        "Every bar of computation, convergence, long runs and security, with the worst that a test measured.",
+        "limits",
+        "make limits",
+        "Every acceptance limit of computation, convergence, long runs and security, with the worst that a test "
+        "measured.",
     ),
     (
         "benchmarks",
@@ -161,6 +162,7 @@ CHECKS = (
         "the library does not know, judged blindly and counted.",
     ),
     ("trial-short", "make trial", "The same in a paragraph."),
+    ("trial-again", "make trial-again", "The first boards of each of its cells, judged again: question by question."),
 )
 """Long checks: the stem of their page or printed output, the command that makes it, and what it shows."""
 TITLES = {"trial-short": "The trial in short"}

@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 
 import pytest
+from validation.trial.again import told
 from validation.trial.cells import Cell
 from validation.trial.counts import is_best
 from validation.trial.made_records import made
@@ -120,3 +121,18 @@ def test_the_readme_says_in_short_what_the_trial_found():
     shown = (root / "README.md").read_text(encoding="utf-8")
     inside = shown.partition("<!-- trial -->")[2].partition("<!-- /trial -->")[0]
     assert inside.strip() == (root / "docs" / "validation" / "trial-short.md").read_text(encoding="utf-8").strip()
+
+
+def test_boards_judged_again_are_worse_where_more_of_the_changed_ones_are_than_chance_makes():
+    """Seven of seven changed for the worse have a chance of 1/128; with one for the better it is 9/256."""
+    right = [made(ONE, i, ["air"], "named", ["air"], ["air"]) for i in range(8)]
+    wrong = [made(ONE, i, ["air"], "named", ["mass"], ["mass"]) for i in range(8)]
+    before = [*right[:7], wrong[7]]
+
+    assert told(right, right)[1]
+    lines, is_well = told(before, [*wrong[:7], wrong[7]])
+    assert not is_well
+    assert any(line.startswith("one      wrong name              8      1      8  WORSE") for line in lines)
+    assert told(before, [*wrong[:7], right[7]])[1]
+    assert "7 of 8 boards have another verdict" in "\n".join(lines)
+    assert "one cantilever-6 5c 2x, board 0: named (air) -> named (mass)" in "\n".join(lines)
