@@ -10,8 +10,6 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
-from validation import measured
-
 Record = dict[str, Any]
 
 
@@ -70,25 +68,3 @@ def add_to(
             pool.shutdown(cancel_futures=True)  # or all that are left would be simulated, and no record written
             raise
     return records
-
-
-def publish(folder: Path, name: str, title: str, command: str, lines: Sequence[str], about: str = "") -> None:
-    """Write what a command found to a page of the documentation.
-
-    Parameters
-    ----------
-    folder : Path
-        Made if it is not there.
-    name : str
-        Of the page, without its ending.
-    title, command : str
-    lines : sequence of str
-        As they were printed.
-    about : str
-        What the lines have to be read with.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    head = [f"# {title}", "", f"Written by `{command}`; do not edit.", "", *([about, ""] if about else [])]
-    text = [*head, "```text", *lines, "```", ""]
-    (folder / f"{name}.md").write_text("\n".join(text), encoding="utf-8")
-    measured.note(folder, name)

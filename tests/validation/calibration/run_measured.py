@@ -28,18 +28,23 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np
 from scipy.optimize import least_squares
-from validation.calibration.records import publish
+from validation.calibration.study import Page
 
 import bayesplate
 from bayesplate.recordings.contract import PickedRow
 from bayesplate.results.words import chances, percent
 
 WITHIN, MOST_FURTHER, HIGHEST, RATHER = 3e-3, 2, 1000.0, 0.5
-TITLE = "Peaks picked from measured recordings, against those that another method read off"
 ABOUT = (
     "Hits and frequency responses of two free half-tops of spruce, 2R and 1R, by D. Badiane and others, from the "
     "repository `David-Badiane/Data-driven-characterization-of-spruce-tonewood-plates` on GitHub (companion paper: doi "
     "10.1121/10.0020559). The repository states no licence: the recordings are no part of this project."
+)
+PAGE = Page(
+    "measured-recordings",
+    "Peaks picked from measured recordings, against those that another method read off",
+    ABOUT,
+    target="measured",
 )
 AT = {"hammer": [(0.020, 0.020)], "sensor": [(0.560, 0.197)]}
 """Where the listing says that hammer and sensor were, m."""
@@ -152,7 +157,7 @@ def main() -> int:
         print("\n".join(lines), flush=True)
         is_right, told = is_right and agrees, [*told, *lines, ""]
     if options.publish is not None:
-        publish(options.publish, "measured-recordings", TITLE, "make measured", told[:-1], ABOUT)
+        PAGE.write(options.publish, told[:-1])
     return 0 if is_right else 1
 
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from validation.calibration.records import Record, add_to, publish, read_done
+from validation import measured
+from validation.calibration.records import Record, add_to, read_done
 
 
 @dataclass(frozen=True)
@@ -53,15 +54,30 @@ def numbered(*before: Any, n: int) -> list[tuple[Record, tuple[Any, ...]]]:
 
 @dataclass(frozen=True)
 class Page:
-    """A page of the documentation: its name, which is that of the make command too, its title and its introduction."""
+    """A page of the documentation.
+
+    Attributes
+    ----------
+    name, title : str
+    about : str
+        What its lines have to be read with.
+    target : str
+        Of the Makefile; by default the name of the page.
+    """
 
     name: str
     title: str
     about: str = ""
+    target: str = ""
 
     def write(self, folder: Path, lines: Sequence[str]) -> None:
-        """Write the lines of a study to the page."""
-        publish(folder, self.name, self.title, f"make {self.name}", lines, self.about)
+        """Write lines as they were printed, in a folder that is made if it is not there."""
+        folder.mkdir(parents=True, exist_ok=True)
+        command = f"make {self.target or self.name}"
+        head = [f"# {self.title}", "", f"Written by `{command}`; do not edit.", ""]
+        text = [*head, *([self.about, ""] if self.about else []), "```text", *lines, "```", ""]
+        (folder / f"{self.name}.md").write_text("\n".join(text), encoding="utf-8")
+        measured.note(folder, self.name)
 
 
 def arguments(description: str | None, n: int, of_what: str, words: str = "") -> argparse.ArgumentParser:
@@ -97,7 +113,7 @@ def carry_out(
         The exit code: 0 if all is well and every job was done, 1 otherwise.
     """
     records = study.run(options.out, options.workers) if options.workers else study.done(options.out)
-    lines, well = study.judge(records)
+    lines, well = study.judge(records) if records else ([], False)
     if len(records) < len(study.jobs):
         lines, well = [*lines, f"not whole: {len(records)} of {len(study.jobs)} were run"], False
     print("\n".join(lines))
