@@ -12,7 +12,7 @@ export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
 .PHONY: fit test slow docs lock audit calibration spectra campaigns plans recordings roving sand measured limits coverage two-setups \
-	trial trial-again benchmarks peers batch
+	trial trial-again trial-warp-exciter benchmarks peers batch
 
 fit: $(VENV)/installed
 	$(BIN)/bayesplate fit finnish-spruce-cantilever --force
@@ -71,6 +71,9 @@ trial: $(VENV)/tested-with
 
 trial-again: $(VENV)/tested-with
 	$(BIN)/python tests/validation/trial/again.py --boards 16 --workers 2 --out results/trial-again.jsonl --publish docs/validation
+
+trial-warp-exciter: $(VENV)/tested-with
+	$(BIN)/python tests/validation/trial/warped_or_driven.py --workers 2 --out results/trial-warp-exciter.jsonl --publish docs/validation
 
 coverage: $(VENV)/tested-with
 	$(BIN)/python tests/validation/calibration/coverage.py --boards 40 --workers 2 --out results/coverage.jsonl --publish docs/validation

@@ -29,8 +29,8 @@ LIGHT = 0.001
 """Share of the board that roves at nominal size: the mean over its places is right to first order, see AttachedMass."""
 SENSOR = 0.01
 """Share of the board of a sensor that turns; of a larger one the base is no point, as it is in the generator."""
-ALL = tuple(name for name in DESIGNS if name != "cantilever-6")  # the same board as cantilever-9
 CLAMPS = ("cantilever-9", "clamped-9", "cantilever-6-free-6")
+ALL = ("free-12", *CLAMPS)
 FREE_SIDES = ("cantilever-9", "free-12", "cantilever-6-free-6")
 
 

@@ -57,7 +57,7 @@ class PlantedBoard:
     n_draws : int
         How many boards were drawn until every label was beyond doubt.
     sensor : (float, float) or None, m
-        Place of a sensor that the card mentions, without its mass, whether or not it weighs anything.
+        Place of a sensor or exciter that the card mentions, without its mass, whether or not it weighs anything.
     noise_factor : float
         Of the noise prior that the card states.
     resolution : float, Hz
@@ -82,7 +82,8 @@ class PlantedBoard:
         places, driven = (
             self.truth.effects.get(effect, {}).get("places", ()) for effect in ("attached_mass", "exciter")
         )
-        places = places if self.sensor is None else (self.sensor,)
+        if self.sensor is not None:
+            places, driven = (self.sensor,), ()
         return card_text(
             self.name,
             self.design,
@@ -124,18 +125,19 @@ def plant(
 ) -> PlantedBoard:
     """Simulate a board of a design with effects, drawn again until every label is beyond doubt.
 
-    size multiplies the design's nominal sizes, of air and shear too if scale_known; an attached mass or an exciter
+    size multiplies the design's nominal sizes, those of `KNOWN_SIZE` too if scale_known; an attached mass or an exciter
     roves over n_places; fixed: effect -> parameters that are not drawn, SI units; sensor: a place on the whole board,
-    m, that the card mentions in any case, where a planted mass sits; noise_factor: of the noise prior on the card,
-    whose median is noise_cents, and from which the true noise of each setup comes if noise_is_drawn; constants: E_x,
-    E_y, G_xy, Pa, if they are not to be drawn; resolution, Hz, to which readings are rounded, and no two of one setup
-    the same. ValueError if an effect is unknown or acts in no setup of the design.
+    m, that the card mentions in any case, where a planted mass or exciter sits; noise_factor: of the noise prior on the
+    card, whose median is noise_cents, and from which the true noise of each setup comes if noise_is_drawn; constants:
+    E_x, E_y, G_xy, Pa, if they are not to be drawn; resolution, Hz, to which readings are rounded, and no two of one
+    setup the same. ValueError if an effect is unknown or acts in no setup of the design.
     """
     design = DESIGNS[design] if isinstance(design, str) else design
     _refuse_wrong(effects, design)
     settled = {effect: dict(values) for effect, values in (fixed or {}).items()}
     if sensor is not None:
-        settled.setdefault("attached_mass", {})["places"] = (sensor,)
+        for effect in ("attached_mass", "exciter"):
+            settled.setdefault(effect, {})["places"] = (sensor,)
     for n_draws in range(1, MOST_DRAWS + 1):
         true = _draw_constants(rng) if constants is None else {"nu_xy": POISSON, **constants}
         sizes = {effect: size if scale_known or effect not in KNOWN_SIZE else 1.0 for effect in effects}

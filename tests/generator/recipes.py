@@ -178,5 +178,5 @@ OUTSIDE: dict[str, Recipe] = {
 """The effects that it does not know."""
 
 RECIPES = LIBRARY | OUTSIDE
-KNOWN_SIZE = ("transverse_shear", "fluid_loading")
-"""Effects whose size nature sets: they are left alone when a size is asked for, unless that is asked for too."""
+KNOWN_SIZE = ("transverse_shear", "fluid_loading", "exciter", "warp")
+"""Effects whose size nature or a maker sets: they keep it when another is asked for, unless that is asked for too."""

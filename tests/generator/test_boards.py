@@ -129,14 +129,19 @@ def test_card_says_what_a_laboratory_would_know(rng: np.random.Generator) -> Non
     assert free["frequencies_hz"]["(1,1)"] == pytest.approx(board.readings["free"][1, 1], rel=1e-8)
 
 
-def test_air_and_shear_keep_their_physical_size_unless_told(rng: np.random.Generator) -> None:
+def test_air_and_an_exciter_keep_their_physical_size_unless_told(rng: np.random.Generator) -> None:
     physical, doubled = (
         plant(rng, "free-12", ["fluid_loading"], 2.0, scale_known=scale).truth.effects["fluid_loading"]["density"]
+        for scale in (False, True)
+    )
+    small, large = (
+        plant(rng, "clamped-9-driven", ["exciter"], 2.0, scale_known=scale).truth.effects["exciter"]["mass"]
         for scale in (False, True)
     )
 
     assert physical == pytest.approx(1.2, rel=0.04)
     assert doubled == pytest.approx(2.4, rel=0.04)
+    assert (small, large) == pytest.approx((48e-3, 96e-3))
 
 
 @pytest.mark.parametrize(
@@ -161,10 +166,10 @@ def test_nothing_comes_from_the_package() -> None:
 
 
 def test_every_recipe_has_a_design() -> None:
-    """All but three are drawn; an outline is measured, and the trial is not yet drawn with warp and exciter."""
+    """All but two are drawn; an outline is measured, and warp planted by name."""
     drawn = {effect for design in DESIGNS.values() for effect in (*design.drawn, *design.drawn_outside)}
 
-    assert set(RECIPES) - drawn == {"outline_profile", "warp", "exciter"}
+    assert set(RECIPES) - drawn == {"outline_profile", "warp"}
 
 
 def test_card_states_what_scales_and_a_straightedge_say(rng: np.random.Generator) -> None:

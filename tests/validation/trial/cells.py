@@ -34,11 +34,12 @@ SENSORS = {
     "free-12": (0.580 - 0.020, 0.217 - 0.020),
     "clamped-9": (0.3 * 0.600, 0.35 * 0.412),
     "cantilever-6-free-6": (0.030 + 0.9 * 0.223, 0.75 * 0.114),
+    "clamped-9-driven": (0.3 * 0.600, 0.35 * 0.412),
 }
 """Where every board of a design carries a sensor of unstated mass, m: cards do not tell whether it weighs anything."""
 
-KINDS = dict.fromkeys(SENSORS, "accelerometer") | {"clamped-9": "shaker"}
-"""What the card calls it: a guitar top of 300 g is driven by a shaker, of some 10 g."""
+KINDS = dict.fromkeys(SENSORS, "accelerometer") | {"clamped-9": "shaker", "clamped-9-driven": "exciter"}
+"""What the card calls it: a guitar top of 300 g is driven by a shaker, of some 10 g, or by an exciter."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,8 @@ class Cell:
     noise : str
         "median": true noise at the median of the prior on the card; "drawn": drawn from that prior, for each setup;
         "known": at the median of a narrow prior; "rounded": at the median, and readings rounded to `ROUNDED_TO`.
+    planted : tuple of str
+        What every board has; empty: drawn anew for each, of the design's classes.
     """
 
     kind: Kind
@@ -92,6 +95,7 @@ class Cell:
     noise_cents: float = 5.0
     size: float = 1.0
     noise: Noise = "median"
+    planted: tuple[str, ...] = ()
 
     @property
     def setting(self) -> Setting:
@@ -101,10 +105,11 @@ class Cell:
 
     @property
     def name(self) -> str:
-        """Kind, design, noise, size."""
+        """Kind, design, noise, size, and what every board has."""
         size = "" if self.kind == "null" else f" {self.size:g}x"
         noise = "" if self.noise == "median" else f" {self.noise}"
-        return f"{self.kind} {self.design} {self.noise_cents:g}c{size}{noise}"
+        planted = f" {' + '.join(self.planted)}" if self.planted else ""
+        return f"{self.kind} {self.design} {self.noise_cents:g}c{size}{noise}{planted}"
 
     @property
     def of(self) -> Design:
@@ -112,7 +117,9 @@ class Cell:
         return DESIGNS[self.design]
 
     def draw_effects(self, rng: np.random.Generator) -> tuple[str, ...]:
-        """Names of what is planted, each class equally often."""
+        """Names of what is planted, each class equally often if they are drawn."""
+        if self.planted:
+            return self.planted
         if self.kind == "outside":
             return (str(rng.choice(self.of.drawn_outside)),)
         n = {"null": 0, "one": 1, "two": 2}[self.kind]
@@ -123,7 +130,7 @@ class Cell:
         return np.random.default_rng(np.random.SeedSequence([base_seed, zlib.crc32(self.name.encode()), index]))
 
 
-_SIX, _NINE, _FREE, _CLAMPED, _BOTH = DESIGNS
+_SIX, _NINE, _FREE, _CLAMPED, _BOTH, _DRIVEN = DESIGNS
 _OTHER_NOISES: tuple[Noise, ...] = ("drawn", "known", "rounded")
 
 CELLS: tuple[Cell, ...] = (
@@ -142,6 +149,17 @@ CELLS: tuple[Cell, ...] = (
     Cell("two", _BOTH, 600, size=2.0),
     *(Cell("outside", design, 600, size=2.0) for design in (_SIX, _BOTH)),
 )
+
+WARPED_OR_DRIVEN: tuple[Cell, ...] = (
+    *(Cell("null", design, 150, noise="drawn") for design in (_FREE, _BOTH, _DRIVEN)),
+    *(Cell("one", design, 150, planted=("warp",)) for design in (_FREE, _BOTH)),
+    Cell("one", _DRIVEN, 150, planted=("exciter",)),
+    Cell("one", _DRIVEN, 150, size=2.0),
+    Cell("two", _FREE, 100, planted=("support_stiffness", "warp")),
+    Cell("two", _DRIVEN, 100, planted=("exciter", "fluid_loading")),
+    *(Cell("outside", design, 100, size=2.0) for design in (_FREE, _BOTH)),
+)
+"""Boards that are not flat, or driven by an exciter; and those without such causes, where these might be named."""
 
 
 _DECIDING = ("bayesplate/diagnosis", "bayesplate/effects", "tests/generator")
@@ -184,7 +202,9 @@ def identity(cells: Sequence[Cell], base_seed: int) -> dict[str, Any]:
     return {
         "format": 2,
         "base_seed": base_seed,
-        "cells": {cell.name: {**asdict(replace(cell, n=0)), "n": None} for cell in cells},
+        "cells": {
+            cell.name: {**asdict(replace(cell, n=0)), "n": None, "planted": list(cell.planted)} for cell in cells
+        },
         "code": fingerprint(),
         "kinds": {cell.design: KINDS[cell.design] for cell in cells},
         "sensors": {cell.design: list(SENSORS[cell.design]) for cell in cells},

@@ -137,6 +137,15 @@ def page(summary: Mapping[str, Any]) -> list[str]:
         *(f"- no answer: {one['cell']}, board {one['index']}: {one['error']}" for one in summary["failures"]),
         *_records(summary),
         "",
+        *tables(summary),
+        "",
+        *CHANGED,
+    ]
+
+
+def tables(summary: Mapping[str, Any]) -> list[str]:
+    """What the boards of a summary add up to, from the acceptance limits on."""
+    return [
         "## Acceptance limits",
         "",
         *_table(("quantity", "acceptance limit", "found", "", "note"), map(_limit_row, summary["limits"])),
@@ -145,8 +154,6 @@ def page(summary: Mapping[str, Any]) -> list[str]:
         *_constants(summary),
         *_amplitudes(summary),
         *_claims(summary),
-        "",
-        *CHANGED,
     ]
 
 

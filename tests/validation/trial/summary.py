@@ -37,7 +37,7 @@ COLUMNS = ("named right", "named wrong", "group with it", "group without it", "n
            "unexplained")  # fmt: skip
 CONDITIONS: tuple[str, ...] = get_args(ConditionName)
 """Of a claim, by the names that the package gives them."""
-MATRICES = ("one cantilever-6 5c 2x", "one cantilever-6-free-6 5c 2x")
+MATRICES = ("one cantilever-6 5c 2x", "one cantilever-6-free-6 5c 2x", "one clamped-9-driven 5c 2x")
 """Cells whose classes are shown one by one in full."""
 
 

@@ -59,13 +59,14 @@ def test_an_interrupted_run_has_part_of_every_cell():
 
 @pytest.mark.parametrize("design", SENSORS)
 def test_a_card_does_not_tell_what_is_planted(design):
-    """With and without a planted mass the cards differ in the readings alone; the planted mass sits at the sensor."""
+    """With and without a planted mass or exciter cards differ in the readings alone; it sits where the card says."""
     stated = {"kind": f'"{KINDS[design]}"'}
+    attached = "exciter" if KINDS[design] == "exciter" else "attached_mass"
     cards, places = [], []
-    for effects in ((), ("attached_mass",)):
+    for effects in ((), (attached,)):
         board = plant(np.random.default_rng(3), design, effects, sensor=SENSORS[design])
         cards.append([line for line in board.card_text(stated).splitlines() if not line.startswith('"(')])
-        places.append(board.truth.effects.get("attached_mass", {}).get("places"))
+        places.append(board.truth.effects.get(attached, {}).get("places"))
     assert cards[0] == cards[1]
     assert places == [None, (SENSORS[design],)]
     assert f"kind = {stated['kind']}" in cards[0]
