@@ -18,7 +18,7 @@ from bayesplate.diagnosis.forms import Form
 from bayesplate.diagnosis.hypotheses import RELABELLING, Hypothesis, Swap
 from bayesplate.diagnosis.laws import FormLaw
 from bayesplate.diagnosis.null_control import NullControl
-from bayesplate.diagnosis.search import Candidate, Found, Ground
+from bayesplate.diagnosis.search import Candidate, Ground, SearchResult
 from bayesplate.diagnosis.shifts import Cells, nothing, together
 from bayesplate.diagnosis.signatures import signature
 from bayesplate.diagnosis.terms import NoiseGrid, noise_grid
@@ -142,10 +142,10 @@ def found_among(
     hypotheses: Sequence[Hypothesis],
     probability: Sequence[float],
     residual: np.ndarray,
-) -> Found:
+) -> SearchResult:
     """A search that found given probabilities of its hypotheses."""
     shares = np.asarray(probability)
-    return Found(ground_of(base, *hypotheses, candidates=effects), residual, np.log(shares + 1e-300), shares)
+    return SearchResult(ground_of(base, *hypotheses, candidates=effects), residual, np.log(shares + 1e-300), shares)
 
 
 def left_out(ground: Ground, index: int, residual: np.ndarray) -> np.ndarray:
@@ -187,7 +187,7 @@ def found_with(
     size: float = 0.05,
     prior: Quantity = HALF_NORMAL,
     residual: np.ndarray | None = None,
-) -> Found:
+) -> SearchResult:
     """A search of three effects, of an exchange of two labels, and of the first two effects together, in this order.
 
     It found given probabilities by members. By default the readings are those of the first effect at its nominal size.
@@ -254,6 +254,8 @@ CERTAIN = NullControl(against=np.full(100, 50.0), ratio=np.full(100, 0.9))
 """A null control that leaves so much to chance that only certainty calls for an effect, as a probability below 0.1."""
 
 
-def decided(found: Found, control: NullControl = CERTAIN, others: Sequence[tuple[str, Found]] = ()) -> Verdict:
+def decided(
+    found: SearchResult, control: NullControl = CERTAIN, others: Sequence[tuple[str, SearchResult]] = ()
+) -> Verdict:
     """The verdict by the given probabilities alone, which need not be those of the readings."""
     return decide(found, control, others)

@@ -32,7 +32,7 @@ from bayesplate.diagnosis.known import known_fits
 from bayesplate.diagnosis.null_control import BY_CHANCE, FALSE_ALARMS, N_SETS, made_to_choose, null_control
 from bayesplate.diagnosis.readings import wrong_reading
 from bayesplate.diagnosis.result import Diagnosis, diagnosis_json
-from bayesplate.diagnosis.search import Found
+from bayesplate.diagnosis.search import SearchResult
 from bayesplate.diagnosis.sizes import refit_board
 from bayesplate.diagnosis.stated import stated_claims
 from bayesplate.diagnosis.verdict import Answer, Verdict, answer_words, decide
@@ -240,7 +240,7 @@ def _diagnosed(problem: Problem, before: FitResult, run: Run, n_null: int) -> tu
 
 
 def _fitted_again(
-    problem: Problem, run: Run, found: Found, finals: Sequence[Answer]
+    problem: Problem, run: Run, found: SearchResult, finals: Sequence[Answer]
 ) -> tuple[dict[int, FitResult], list[str]]:
     """The fits with the finalists among the answers, by index, and a sentence for each that failed."""
     fits, failures = {}, []
@@ -259,7 +259,7 @@ def _measured(one: FitResult) -> NDArray[np.float64]:
     return np.concatenate([setup.measured for setup in one.inference.problem.board.setups])
 
 
-def advice(found: Found, verdict: Verdict, prior: PriorCard, seed: int) -> str:
+def advice(found: SearchResult, verdict: Verdict, prior: PriorCard, seed: int) -> str:
     """What to do next: read a wrong reading again, or the first line of the plan; empty if nothing would help."""
     if verdict.word == "unexplained":
         return wrong_reading(found)

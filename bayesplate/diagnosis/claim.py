@@ -11,7 +11,7 @@ import numpy as np
 from bayesplate.arrays import Floats
 from bayesplate.diagnosis.folds import Nested, carrying, log_score_gains, nested
 from bayesplate.diagnosis.null_control import NullControl
-from bayesplate.diagnosis.search import PASSES, Found
+from bayesplate.diagnosis.search import PASSES, SearchResult
 from bayesplate.diagnosis.sensitivity import WIDTHS, variants, varied
 from bayesplate.diagnosis.sizes import at_limit
 from bayesplate.diagnosis.verdict import Verdict, answers, stands_out, turned
@@ -61,7 +61,7 @@ class Claim:
         return bool(self.conditions) and all(one.is_met for one in self.conditions)
 
 
-def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Nested | None) -> Claim:
+def judge_claim(found: SearchResult, verdict: Verdict, control: NullControl, folded: Nested | None) -> Claim:
     """Judge the five conditions; `folded` and the control do not count readings whose modes alone carry something."""
     if not verdict.index:
         return Claim()
@@ -80,7 +80,10 @@ def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Ne
 
 
 def named_in_part(
-    found: Found, verdict: Verdict, folded: Nested | None, others: Iterable[tuple[str, Found]] | None = None
+    found: SearchResult,
+    verdict: Verdict,
+    folded: Nested | None,
+    others: Iterable[tuple[str, SearchResult]] | None = None,
 ) -> tuple[str, ...]:
     """Effects that explain readings in part though something else remains; none where that cannot be said.
 
@@ -100,7 +103,7 @@ def named_in_part(
     return nearest.members
 
 
-def nested_of(found: Found, control: NullControl, index: int = 0) -> Nested | None:
+def nested_of(found: SearchResult, control: NullControl, index: int = 0) -> Nested | None:
     """The board's own readings left out one by one, an effect added where a fold calls for one.
 
     Not counted are those whose modes alone carry a constant or a size, without any effect or under a hypothesis.
@@ -123,7 +126,7 @@ def _beyond_chance(folded: Nested | None, control: NullControl) -> Condition:
     return Condition("chance selection", ratio, limit, ratio < limit)
 
 
-def _better_score(found: Found, folded: Nested | None) -> Condition:
+def _better_score(found: SearchResult, folded: Nested | None) -> Condition:
     if folded is None:
         return Condition("log score", None, None, False)
     gains = log_score_gains(found.ground, found.residual, folded.chosen[0], folded.carried)

@@ -11,7 +11,7 @@ from bayesplate.arrays import Floats
 from bayesplate.diagnosis.baseline import Baseline, Rows
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.laws import FormLaw
-from bayesplate.diagnosis.search import Found
+from bayesplate.diagnosis.search import SearchResult
 from bayesplate.diagnosis.terms import normalised
 
 OfForms = Iterator[tuple[int, FormLaw, Rows, Floats]]
@@ -40,7 +40,7 @@ class TermDraws:
         return TermDraws(*(getattr(self, one.name)[picked] for one in fields(self)))
 
 
-def draw_terms(found: Found, index: int, rng: np.random.Generator, n_draws: int) -> TermDraws:
+def draw_terms(found: SearchResult, index: int, rng: np.random.Generator, n_draws: int) -> TermDraws:
     """Draw from the posterior under one hypothesis of a search, sorted by noise and cell."""
     return draw_hypothesis(found.ground.baseline, found.ground.hypotheses[index], found.residual, rng, n_draws)
 
@@ -96,7 +96,7 @@ def _regressed(columns: Floats, variance: Floats, target: Floats, rng: np.random
     return np.asarray((mean + np.linalg.solve(np.swapaxes(factor, 1, 2), normal))[:, :, 0])
 
 
-def standard_sizes_of(found: Found, index: int, drawn: TermDraws, which: int) -> OfForms:
+def standard_sizes_of(found: SearchResult, index: int, drawn: TermDraws, which: int) -> OfForms:
     """Sizes of one effect of a hypothesis at each draw, in standard coordinates: (n, n_parameters) arrays.
 
     A cell that ends at a bound reaches beyond it.
@@ -112,7 +112,7 @@ def standard_sizes_of(found: Found, index: int, drawn: TermDraws, which: int) ->
 
 
 def sizes_of(
-    found: Found, index: int, drawn: TermDraws, which: int
+    found: SearchResult, index: int, drawn: TermDraws, which: int
 ) -> Iterator[tuple[int, FormLaw, Rows, dict[str, Floats]]]:
     """Sizes of one effect at each draw in SI units, by parameter, within the bounds of their priors."""
     for i, law, rows, z in standard_sizes_of(found, index, drawn, which):
@@ -122,7 +122,9 @@ def sizes_of(
         yield i, law, rows, values
 
 
-def joint_sizes_of(found: Found, index: int, drawn: TermDraws) -> Iterator[tuple[FormLaw, Rows, dict[str, Floats]]]:
+def joint_sizes_of(
+    found: SearchResult, index: int, drawn: TermDraws
+) -> Iterator[tuple[FormLaw, Rows, dict[str, Floats]]]:
     """Sizes of both effects of a pair at once, at those draws for which there is a law of both."""
     laws = found.ground.hypotheses[index].joint
     if not laws:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bayesplate.diagnosis.result import Amplitude, EffectEntry, ExchangeEntry, Fate
-from bayesplate.diagnosis.search import PASSES, Candidate, Found
+from bayesplate.diagnosis.search import PASSES, Candidate, SearchResult
 from bayesplate.diagnosis.signatures import look_alikes
 from bayesplate.diagnosis.sizes import likely_form, size_posterior
 from bayesplate.diagnosis.verdict import Answer, Verdict, answer_words, p_words
@@ -23,7 +23,7 @@ _LIKELY = 0.1
 
 
 def effect_entry(
-    found: Found, verdict: Verdict, ranked: Sequence[Answer], one: Candidate, doubled: float
+    found: SearchResult, verdict: Verdict, ranked: Sequence[Answer], one: Candidate, doubled: float
 ) -> EffectEntry:
     """All of a candidate effect; `doubled` is its inclusion probability with every prior twice as wide."""
     ground = found.ground
@@ -53,7 +53,7 @@ def effect_entry(
     )
 
 
-def exchange_entries(found: Found, verdict: Verdict, ranked: Sequence[Answer]) -> tuple[ExchangeEntry, ...]:
+def exchange_entries(found: SearchResult, verdict: Verdict, ranked: Sequence[Answer]) -> tuple[ExchangeEntry, ...]:
     """Exchanged labels, as one candidate each."""
     ground = found.ground
     taken = {one.index for one in verdict.stands_for}
@@ -77,7 +77,7 @@ def exchange_entries(found: Found, verdict: Verdict, ranked: Sequence[Answer]) -
     return tuple(entries)
 
 
-def p_value_of(found: Found, index: int) -> float | None:
+def p_value_of(found: SearchResult, index: int) -> float | None:
     """The prior predictive p-value of a hypothesis; None where constants meet every reading and nothing is left."""
     return found.p_value(index) if found.ground.n_directions else None
 
@@ -90,7 +90,7 @@ def _where(one: Candidate) -> str:
     return ", ".join(there)
 
 
-def _best_fit(found: Found, index: int) -> float:
+def _best_fit(found: SearchResult, index: int) -> float:
     """Log density at the best size, noise averaged: what the evidence would be without the width of the prior."""
     hypothesis = found.ground.hypotheses[index]
     weights, by_cell = hypothesis.table.weights, hypothesis.log_by_cell(found.ground.baseline, found.residual)
@@ -98,7 +98,7 @@ def _best_fit(found: Found, index: int) -> float:
     return best - hypothesis.own.half_log_det + hypothesis.log_labels
 
 
-def _amplitude(found: Found, index: int, one: Candidate) -> Amplitude | None:
+def _amplitude(found: SearchResult, index: int, one: Candidate) -> Amplitude | None:
     """Quantiles of the first free parameter of the most probable form, given that the effect is there.
 
     Of an effect whose size the card fixes: the first of its parameters, without spread.
@@ -115,7 +115,7 @@ def _amplitude(found: Found, index: int, one: Candidate) -> Amplitude | None:
     return Amplitude(parameter=free.key, form=one.laws[best].form.detail, q05=low, q50=middle, q95=high, unit=free.unit)
 
 
-def _learnt(found: Found, index: int, one: Candidate) -> dict[str, float]:
+def _learnt(found: SearchResult, index: int, one: Candidate) -> dict[str, float]:
     """How far the posterior of each size left its prior, given that the effect is there: bits, by parameter.
 
     Of the most probable form. A size of which nothing is learnt says nothing against its null value either.
@@ -144,7 +144,7 @@ def _fixed(one: Candidate) -> Amplitude | None:
     return None
 
 
-def fate_of(found: Found, verdict: Verdict, ranked: Sequence[Answer], name: str, index: int) -> Told:
+def fate_of(found: SearchResult, verdict: Verdict, ranked: Sequence[Answer], name: str, index: int) -> Told:
     """What became of a candidate effect; `index` is that of the hypothesis that it acts alone."""
     if name in verdict.effects:
         return "in the verdict", None
@@ -163,7 +163,7 @@ def fate_of(found: Found, verdict: Verdict, ranked: Sequence[Answer], name: str,
 
 
 def fate_of_exchange(
-    found: Found, verdict: Verdict, ranked: Sequence[Answer], index: int, *, is_accepted: bool
+    found: SearchResult, verdict: Verdict, ranked: Sequence[Answer], index: int, *, is_accepted: bool
 ) -> Told:
     """What became of two labels that may have been exchanged, with the likelihood ratio of the exchange."""
     if is_accepted:
@@ -172,14 +172,14 @@ def fate_of_exchange(
     return fate, f"{because}; {ratio_words(found, index)}"
 
 
-def _without_need(found: Found, verdict: Verdict) -> Told | None:
+def _without_need(found: SearchResult, verdict: Verdict) -> Told | None:
     if verdict.is_needed:
         return None
     fate: Fate = "not established" if verdict.word == "unexplained" else "not needed"
     return fate, f"{fate}: nothing lacking has a probability of {found.none:.2f}"
 
 
-def _misfit(found: Found, index: int) -> Told | None:
+def _misfit(found: SearchResult, index: int) -> Told | None:
     """ "does not fit" where the misfit is too large with the candidate alone."""
     p_value = found.p_value(index)
     if p_value >= PASSES:
@@ -187,7 +187,7 @@ def _misfit(found: Found, index: int) -> Told | None:
     return "does not fit", f"with it alone the misfit is still too large ({p_words(p_value)})"
 
 
-def _less_probable(found: Found, ranked: Sequence[Answer], name: str | None, index: int) -> Told:
+def _less_probable(found: SearchResult, ranked: Sequence[Answer], name: str | None, index: int) -> Told:
     """ "less probable", with the support of its best answer beside that of the best of all."""
     best = ranked[0]
     own = max((one.support for one in ranked if one.index == index or name in one.members), default=0.0)
@@ -196,7 +196,7 @@ def _less_probable(found: Found, ranked: Sequence[Answer], name: str | None, ind
     return "less probable", f"{word} ({mine}) than {answer_words(found, best)} ({others})"
 
 
-def ratio_words(found: Found, index: int) -> str:
+def ratio_words(found: SearchResult, index: int) -> str:
     """How much likelier the readings are under a hypothesis that exchanges two labels than as they are called."""
     gained = float(found.log_evidence[index] - found.log_evidence[0])
     likelier = "likelier" if gained > 0 else "less likely"

@@ -26,7 +26,7 @@ from bayesplate.diagnosis.result import (
     NullControlSummary,
     PValues,
 )
-from bayesplate.diagnosis.search import PASSES, Found
+from bayesplate.diagnosis.search import PASSES, SearchResult
 from bayesplate.diagnosis.sensitivity import WIDTHS, draw_constants, varied
 from bayesplate.diagnosis.stated import StatedClaim
 from bayesplate.diagnosis.verdict import Answer, Verdict, alternatives_words, answer_words, answers, p_words
@@ -58,7 +58,7 @@ class Side:
 class Case:
     """Everything that the report of a diagnosis is made of."""
 
-    found: Found
+    found: SearchResult
     verdict: Verdict
     control: NullControl
     folded: Nested | None
@@ -186,7 +186,7 @@ def _null_control(case: Case) -> NullControlSummary:
     )
 
 
-def _log_odds(found: Found) -> float | None:
+def _log_odds(found: SearchResult) -> float | None:
     """ln of the odds that something is lacking; None where nothing is left to judge by, or nothing could be lacking."""
     return finite(found.against_none) if found.ground.n_directions else None
 

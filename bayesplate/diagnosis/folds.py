@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bayesplate.arrays import Floats
 from bayesplate.diagnosis.baseline import Rows
 from bayesplate.diagnosis.hypotheses import Hypothesis, odds_against_none, probabilities
-from bayesplate.diagnosis.search import Found, Ground
+from bayesplate.diagnosis.search import Ground, SearchResult
 from bayesplate.estimates.leave_one_out import CarryingMode, carrying_modes, leverages_of, united
 
 NEEDED = 0.1
@@ -118,12 +118,12 @@ def _log_scores(ground: Ground, index: int, residual: Floats) -> Floats:
     return np.array(alone) + one.terms.log_evidence(seen)[0] - one.terms.left_out(seen)[0][:, 0]
 
 
-def carrying(found: Found, index: int) -> tuple[CarryingMode, ...]:
+def carrying(found: SearchResult, index: int) -> tuple[CarryingMode, ...]:
     """Modes that alone carry something without any effect or under a hypothesis: both are judged without them."""
     return united(*(_under(found, one) for one in dict.fromkeys((0, index))))
 
 
-def _under(found: Found, index: int) -> tuple[CarryingMode, ...]:
+def _under(found: SearchResult, index: int) -> tuple[CarryingMode, ...]:
     """Carrying modes under one hypothesis, at its most probable sizes: each prior counts as one more observation."""
     terms, whole = found.ground.hypotheses[index].terms, found.ground.hypotheses[index].table
     baseline, board = terms.baseline, terms.baseline.board

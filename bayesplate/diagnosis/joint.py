@@ -21,7 +21,7 @@ from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.hypotheses import are_stated
 from bayesplate.diagnosis.laws import FormLaw
 from bayesplate.diagnosis.peaks import with_own_labels
-from bayesplate.diagnosis.search import PASSES, Found, Ground, prepare_search, search
+from bayesplate.diagnosis.search import PASSES, Ground, SearchResult, prepare_search, search
 from bayesplate.diagnosis.shifts import JointLaws, joint_law, joint_table
 
 PLAUSIBLE = 0.05
@@ -34,7 +34,7 @@ _WORTH = 0.05
 
 def full_search(
     baseline: Baseline, tried: Sequence[str] | None = None, tell: Callable[[float], None] | None = None
-) -> tuple[Ground, Found]:
+) -> tuple[Ground, SearchResult]:
     """The search of a diagnosis, and its ground with the labels of the board: every candidate, each hypothesis with its
     own labels, plausible pairs solved together."""
     ground = prepare_search(baseline, tried=tried, tell=tell)
@@ -43,7 +43,7 @@ def full_search(
     return (ground, found) if together is ground else (together, search(with_own_labels(together)))
 
 
-def with_joint_pairs(found: Found, ground: Ground) -> Ground:
+def with_joint_pairs(found: SearchResult, ground: Ground) -> Ground:
     """A ground on which the pairs that a search on it finds plausible are solved together; the same where none is."""
     pairs = [i for i in _plausible(found) if not ground.hypotheses[i].joint]
     if not pairs:
@@ -60,7 +60,7 @@ def with_joint_pairs(found: Found, ground: Ground) -> Ground:
     return replace(ground, hypotheses=tuple(every))
 
 
-def _plausible(found: Found) -> list[int]:
+def _plausible(found: SearchResult) -> list[int]:
     """Indices of the most probable pairs whose effects have laws and leave the plate thin."""
     log_probability = found.log_evidence + np.log([one.prior for one in found.ground.hypotheses])
     is_explained = found.p_value(int(np.argmax(found.probability))) >= PASSES
@@ -81,7 +81,7 @@ def _is_cheap(law: FormLaw) -> bool:
     return all(model.system.theory == "thin" for model in law.models)
 
 
-def _forms_worth(found: Found, index: int) -> list[tuple[int, int]]:
+def _forms_worth(found: SearchResult, index: int) -> list[tuple[int, int]]:
     """Pairs of forms that have a share in the probability of a pair of effects."""
     table = found.ground.hypotheses[index].table
     forms = np.stack([one.form[cells] for one, cells in (table.member(0), table.member(1))])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.diagnosis.folds import FEWEST
-from bayesplate.diagnosis.search import PASSES, Found, predictive_p_value
+from bayesplate.diagnosis.search import PASSES, SearchResult, predictive_p_value
 from bayesplate.diagnosis.verdict import CLEARLY, p_words
 from bayesplate.frequencies.laws import cents
 
@@ -22,7 +22,7 @@ class Suspect:
     log_weight: float  # how little the others expect it: minus the log density of the reading, given them
 
 
-def suspects(found: Found) -> tuple[Suspect, ...]:
+def suspects(found: SearchResult) -> tuple[Suspect, ...]:
     """Readings without any one of which the others agree with the model, the least expected first."""
     ground = found.ground
     if ground.baseline.n_modes < FEWEST or found.p_value(0) >= PASSES:
@@ -43,7 +43,7 @@ def suspects(found: Found) -> tuple[Suspect, ...]:
     return tuple(sorted(told, key=lambda one: -one.log_weight))
 
 
-def wrong_reading(found: Found) -> str:
+def wrong_reading(found: SearchResult) -> str:
     """Which reading to take again, if it alone spoils the fit; empty if none does, or more than one may."""
     told = suspects(found)
     if not told or (len(told) > 1 and told[0].log_weight - told[1].log_weight < np.log(CLEARLY)):

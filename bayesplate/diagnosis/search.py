@@ -71,7 +71,7 @@ class Ground:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class SearchResult:
     """What the search finds in one set of readings."""
 
     ground: Ground
@@ -137,11 +137,11 @@ def prepare_search(
     return ground.with_hypotheses(ground.paired)
 
 
-def search(ground: Ground, residual: Floats | None = None) -> Found:
+def search(ground: Ground, residual: Floats | None = None) -> SearchResult:
     """Judge one set of readings: those of the board, or others given by their residual."""
     residual = ground.baseline.residual if residual is None else residual
     evidence = log_evidences(ground.hypotheses, ground.baseline, residual[None, :])
-    return Found(ground, residual, evidence[:, 0], probabilities(ground.hypotheses, evidence)[:, 0])
+    return SearchResult(ground, residual, evidence[:, 0], probabilities(ground.hypotheses, evidence)[:, 0])
 
 
 def _candidate(baseline: Baseline, name: str, laws: tuple[FormLaw, ...]) -> Candidate:

@@ -24,7 +24,7 @@ from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.draws import TermDraws, draw_terms, joint_sizes_of, sizes_of
 from bayesplate.diagnosis.hypotheses import Hypothesis, probabilities
 from bayesplate.diagnosis.peaks import log_mean, log_of_terms, log_summed
-from bayesplate.diagnosis.search import Found, search
+from bayesplate.diagnosis.search import SearchResult, search
 from bayesplate.diagnosis.shifts import Cells
 from bayesplate.diagnosis.terms import normalised
 
@@ -39,7 +39,7 @@ _OVERSAMPLED = 2
 """Draws for each that is kept by its weight."""
 
 
-def variants(found: Found) -> Iterator[tuple[str, Found]]:
+def variants(found: SearchResult) -> Iterator[tuple[str, SearchResult]]:
     """The searches that a name has to survive, each made when it is asked for, and which it is in words.
 
     With the width of the sizes' priors halved and doubled, the noise prior moved by 1.5 either way, and under the exact
@@ -55,7 +55,7 @@ def variants(found: Found) -> Iterator[tuple[str, Found]]:
 
 
 @lru_cache(maxsize=8)  # the verdict, the claim and the result ask for the same
-def varied(found: Found, *, width: float = 1.0, noise: float = 1.0) -> Found:
+def varied(found: SearchResult, *, width: float = 1.0, noise: float = 1.0) -> SearchResult:
     """The same search, the standard deviation of every size's prior and every noise prior multiplied by a factor.
 
     The cells reach three of the old standard deviations; what a wider prior puts beyond them counts as unable to
@@ -66,7 +66,7 @@ def varied(found: Found, *, width: float = 1.0, noise: float = 1.0) -> Found:
     return search(changed, found.residual)
 
 
-def _changed(found: Found, index: int, width: float, noise: float) -> Hypothesis:
+def _changed(found: SearchResult, index: int, width: float, noise: float) -> Hypothesis:
     one = found.ground.hypotheses[index]
     weights = one.table.weights.copy()
     for which, candidate in enumerate(found.ground.members(index)):
@@ -96,7 +96,7 @@ def _inside(prior: Quantity, factor: float) -> float:
 
 
 @lru_cache(maxsize=2)  # the verdict and the averages ask for the same
-def under_exact_law(found: Found) -> Found | None:
+def under_exact_law(found: SearchResult) -> SearchResult | None:
     """The same search, every evidence corrected to the exact law; None where no draw is a plate by it."""
     rng = np.random.default_rng(0)
     corrections = np.full(found.probability.size, _correction(found, 0, rng))
@@ -109,7 +109,7 @@ def under_exact_law(found: Found) -> Found | None:
     return replace(found, log_evidence=evidence, probability=probabilities(found.ground.hypotheses, evidence))
 
 
-def draw_exact(found: Found, index: int, rng: np.random.Generator, n_draws: int) -> TermDraws:
+def draw_exact(found: SearchResult, index: int, rng: np.random.Generator, n_draws: int) -> TermDraws:
     """Draw under one hypothesis and the exact law."""
     drawn = draw_terms(found, index, rng, _OVERSAMPLED * n_draws)
     log_weights = log_weights_of(found, index, drawn)
@@ -118,7 +118,7 @@ def draw_exact(found: Found, index: int, rng: np.random.Generator, n_draws: int)
     return drawn.at(rng.choice(drawn.n_draws, size=n_draws, p=normalised(log_weights)))
 
 
-def log_weights_of(found: Found, index: int, drawn: TermDraws) -> Floats:
+def log_weights_of(found: SearchResult, index: int, drawn: TermDraws) -> Floats:
     """ln of the likelihood under the exact law over that of the linear terms: (n_draws,) array.
 
     Where readings may be other modes than their labels say, the former is summed over all ways to take them.
@@ -131,7 +131,7 @@ def log_weights_of(found: Found, index: int, drawn: TermDraws) -> Floats:
     return np.nan_to_num(-0.5 * squares.sum(axis=1), nan=-np.inf, neginf=-np.inf)
 
 
-def exact_log_frequencies(found: Found, index: int, drawn: TermDraws) -> Floats:
+def exact_log_frequencies(found: SearchResult, index: int, drawn: TermDraws) -> Floats:
     """ln f (Hz) of all modes that readings may be, at each draw: (n_draws, n_every) array."""
     baseline = found.ground.baseline
     n_members = len(found.ground.members(index))
@@ -146,7 +146,7 @@ def exact_log_frequencies(found: Found, index: int, drawn: TermDraws) -> Floats:
     return np.asarray(total + (drawn.inputs - baseline.every.inputs) @ baseline.every.input_slopes.T)
 
 
-def _correction(found: Found, index: int, rng: np.random.Generator) -> float:
+def _correction(found: SearchResult, index: int, rng: np.random.Generator) -> float:
     drawn = draw_terms(found, index, rng, _N_DRAWS)
     log_weights = log_weights_of(found, index, drawn)
     if not np.isfinite(log_weights.max()):
@@ -164,7 +164,7 @@ Constants = Mapping[str, Floats]
 
 
 def draw_constants(
-    found: Found,
+    found: SearchResult,
     rng: np.random.Generator,
     n_draws: int,
     among: Sequence[int] | None = None,
@@ -189,7 +189,7 @@ def draw_constants(
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def _drawn(found: Found, index: int, rng: np.random.Generator, n_draws: int) -> Constants:
+def _drawn(found: SearchResult, index: int, rng: np.random.Generator, n_draws: int) -> Constants:
     """The same under one hypothesis, whose effects may replace thickness (m) and nu_xy by their own."""
     drawn, symmetry = draw_exact(found, index, rng, n_draws), found.ground.baseline.board.symmetry
     inputs = {name: _input(found.ground.baseline, name, drawn.inputs) for name in ("thickness", "poisson_xy")}

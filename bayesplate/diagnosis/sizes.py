@@ -10,14 +10,14 @@ from bayesplate.board.parameter import unit_of_people
 from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.draws import draw_terms, standard_sizes_of
 from bayesplate.diagnosis.forms import with_forms, with_labels_exchanged
-from bayesplate.diagnosis.search import Found
+from bayesplate.diagnosis.search import SearchResult
 
 AT_LIMIT = 0.005
 """Prior probability between the posterior median of a size and a bound below which the size is at its limit."""
 _N_DRAWS = 2000
 
 
-def size_posterior(found: Found, index: int, member: int, form: int, parameter: int) -> tuple[Floats, Floats]:
+def size_posterior(found: SearchResult, index: int, member: int, form: int, parameter: int) -> tuple[Floats, Floats]:
     """Probability and standard coordinate of each cell of a member's form, under one hypothesis."""
     table, cells = found.ground.hypotheses[index].table.member(member)
     by_cell = np.bincount(cells, weights=found.cells(index), minlength=table.n_cells)
@@ -25,14 +25,14 @@ def size_posterior(found: Found, index: int, member: int, form: int, parameter: 
     return by_cell[of_form], table.z[of_form, parameter]
 
 
-def likely_form(found: Found, index: int, member: int) -> int:
+def likely_form(found: SearchResult, index: int, member: int) -> int:
     """Which form of one effect of a hypothesis is most probable."""
     table, cells = found.ground.hypotheses[index].table.member(member)
     laws = found.ground.members(index)[member].laws
     return int(np.argmax(np.bincount(table.form[cells], weights=found.cells(index), minlength=len(laws))))
 
 
-def refit_board(found: Found, index: int) -> Board:
+def refit_board(found: SearchResult, index: int) -> Board:
     """The board under a hypothesis: with its effects declared in their most probable forms, or two labels exchanged."""
     hypothesis, board = found.ground.hypotheses[index], found.ground.baseline.board
     if hypothesis.swap is not None:
@@ -41,7 +41,7 @@ def refit_board(found: Found, index: int) -> Board:
     return with_forms(board, [one.laws[likely_form(found, index, which)].form for which, one in members])
 
 
-def at_limit(found: Found, index: int) -> str:
+def at_limit(found: SearchResult, index: int) -> str:
     """Which size of a hypothesis sits at the limit of its range; empty if none does.
 
     A size that may be zero is not at a limit there: zero is no effect. The size is looked at by draws, for a cell of a

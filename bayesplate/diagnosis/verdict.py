@@ -8,7 +8,7 @@ from typing import Literal
 
 from bayesplate.diagnosis.hypotheses import RELABELLING, are_stated
 from bayesplate.diagnosis.null_control import NullControl
-from bayesplate.diagnosis.search import PASSES, Found
+from bayesplate.diagnosis.search import PASSES, SearchResult
 from bayesplate.diagnosis.sensitivity import variants
 from bayesplate.diagnosis.sizes import at_limit
 from bayesplate.effects.words import effect_name, effect_names, joined
@@ -64,7 +64,7 @@ class Verdict:
         return self.stands_for if self.nearest is None else (self.nearest,)
 
 
-def answers(found: Found) -> tuple[Answer, ...]:
+def answers(found: SearchResult) -> tuple[Answer, ...]:
     """Single effects and pairs by their support, best first.
 
     A pair stands for itself only if it is three times as probable as its better member alone, or if its members are
@@ -91,7 +91,9 @@ def answers(found: Found) -> tuple[Answer, ...]:
     return tuple(sorted(listed, key=lambda answer: -answer.support))
 
 
-def decide(found: Found, control: NullControl, others: Iterable[tuple[str, Found]] | None = None) -> Verdict:
+def decide(
+    found: SearchResult, control: NullControl, others: Iterable[tuple[str, SearchResult]] | None = None
+) -> Verdict:
     """The verdict on one set of readings, by what the search makes of boards without any effect.
 
     A name has to survive other searches, each with what is assumed there; by default those of `variants`, made only if
@@ -132,7 +134,9 @@ def stands_out(one: Answer, ranked: Sequence[Answer]) -> bool:
     return all(one.support >= CLEARLY * other.support for other in ranked if other.index != one.index)
 
 
-def turned(found: Found, best: Answer, others: Iterable[tuple[str, Found]]) -> tuple[str, tuple[Answer, ...]] | None:
+def turned(
+    found: SearchResult, best: Answer, others: Iterable[tuple[str, SearchResult]]
+) -> tuple[str, tuple[Answer, ...]] | None:
     """The first assumption under which a name no longer stands out, and what rivals it there; None if it always does.
 
     A rival is told with the probability that it has without the change.
@@ -148,7 +152,7 @@ def turned(found: Found, best: Answer, others: Iterable[tuple[str, Found]]) -> t
     return None
 
 
-def _without(found: Found, best: Answer | None) -> Verdict:
+def _without(found: SearchResult, best: Answer | None) -> Verdict:
     """No effect is probable enough: the bare model passes, cannot be questioned, or fails without a reason."""
     passed = found.p_value(0)
     if passed < PASSES:
@@ -160,7 +164,7 @@ def _without(found: Found, best: Answer | None) -> Verdict:
     return Verdict("none needed", (), 0, best, f"the misfit is what the noise would leave ({p_words(passed)})")
 
 
-def answer_words(found: Found, answer: Answer) -> str:
+def answer_words(found: SearchResult, answer: Answer) -> str:
     """An answer in words: its effects, or the labels that it exchanges."""
     swap = found.ground.hypotheses[answer.index].swap
     if swap is None:
@@ -168,7 +172,7 @@ def answer_words(found: Found, answer: Answer) -> str:
     return f"{effect_name(RELABELLING)} {swap.words(found.ground.baseline)}"
 
 
-def alternatives_words(found: Found, told: Sequence[Answer]) -> str:
+def alternatives_words(found: SearchResult, told: Sequence[Answer]) -> str:
     """Alternative answers in words; the two effects of a pair stay together."""
     words = [answer_words(found, one) for one in told]
     return ", or ".join(words) if any(len(one.members) > 1 for one in told) else joined(words, "or")
@@ -179,6 +183,6 @@ def p_words(p_value: float) -> str:
     return f"p = {p_value:.3f}" if p_value >= 0.001 else "p < 0.001"
 
 
-def alternatives(found: Found, ranked: Sequence[Answer]) -> tuple[Answer, ...]:
+def alternatives(found: SearchResult, ranked: Sequence[Answer]) -> tuple[Answer, ...]:
     """Answers within a factor ten of the best."""
     return tuple(one for one in ranked if one.support * WITHIN >= ranked[0].support)

@@ -21,7 +21,7 @@ from bayesplate.board.prior import PriorCard
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.forms import with_forms
 from bayesplate.diagnosis.readings import wrong_reading
-from bayesplate.diagnosis.search import PASSES, Found
+from bayesplate.diagnosis.search import PASSES, SearchResult
 from bayesplate.diagnosis.terms import normalised
 from bayesplate.diagnosis.verdict import WITHIN, Answer, answer_words, answers
 from bayesplate.planning.beliefs import (
@@ -49,7 +49,7 @@ MOST = 4
 
 
 def believed(
-    found: Found, prior: PriorCard | None, rng: np.random.Generator, among: Sequence[Answer] | None = None
+    found: SearchResult, prior: PriorCard | None, rng: np.random.Generator, among: Sequence[Answer] | None = None
 ) -> Beliefs:
     """What a search leaves to be believed of a board: of the explanations among those given, or of those that survive.
 
@@ -64,7 +64,7 @@ def believed(
     return Beliefs((known,), explanations, notes=base.board.notes)
 
 
-def is_unexplained(found: Found) -> bool:
+def is_unexplained(found: SearchResult) -> bool:
     """Whether the readings fail the gate without an effect and with the best that was found."""
     if not found.ground.n_directions or found.p_value(0) >= PASSES:
         return False
@@ -72,13 +72,13 @@ def is_unexplained(found: Found) -> bool:
     return not ranked or found.p_value(ranked[0].index) < PASSES
 
 
-def explanations_of(found: Found, left: Sequence[Answer], rng: np.random.Generator) -> tuple[Belief, ...]:
+def explanations_of(found: SearchResult, left: Sequence[Answer], rng: np.random.Generator) -> tuple[Belief, ...]:
     """Answers of a search, that of no effect with index 0, as explanations whose probabilities sum to one."""
     total = sum(one.support for one in left)
     return tuple(_explanation(found, one, one.support / total, rng) for one in left)
 
 
-def _explanation(found: Found, answer: Answer, probability: float, rng: np.random.Generator) -> Belief:
+def _explanation(found: SearchResult, answer: Answer, probability: float, rng: np.random.Generator) -> Belief:
     """An answer of a search as terms: cells and levels of noise drawn by what they weigh now."""
     base, hypothesis = found.ground.baseline, found.ground.hypotheses[answer.index]
     terms = hypothesis.terms
@@ -123,7 +123,9 @@ def _at_hand(own: Baseline, base: Baseline, shift: Floats, slopes: Floats) -> At
     return AtHand(expected, slopes, np.where(same.any(axis=1), same.argmax(axis=1), -1))
 
 
-def _sizes(found: Found, answer: Answer, cells: Rows, first: int) -> tuple[tuple[FormTerms, ...], Floats, Floats]:
+def _sizes(
+    found: SearchResult, answer: Answer, cells: Rows, first: int
+) -> tuple[tuple[FormTerms, ...], Floats, Floats]:
     """The forms of the effects in some cells of an answer's table; standard coordinates of their sizes, and steps.
 
     Coordinates and their changes over one standard deviation of the cell are (n_cells, n_tangents) arrays. Forms that
@@ -165,7 +167,7 @@ def _conditioned(design: Floats, variance: Floats, seen: Floats, used: Rows, n_c
     return np.einsum("tuv,tnv,tn->tu", covariance, weighted, seen), covariance
 
 
-def survivors(found: Found, rivals: Collection[tuple[str, ...]] = ()) -> tuple[Answer, ...]:
+def survivors(found: SearchResult, rivals: Collection[tuple[str, ...]] = ()) -> tuple[Answer, ...]:
     """No effect, and the answers of a search within a factor ten of the best of them, the most probable first.
 
     No effect is left out where it is ten times less probable than the best answer. Rivals survive in any case: a
@@ -175,7 +177,7 @@ def survivors(found: Found, rivals: Collection[tuple[str, ...]] = ()) -> tuple[A
 
 
 def surviving(
-    found: Found, support: Mapping[tuple[str, ...], float], none: float, rivals: Collection[tuple[str, ...]] = ()
+    found: SearchResult, support: Mapping[tuple[str, ...], float], none: float, rivals: Collection[tuple[str, ...]] = ()
 ) -> tuple[Answer, ...]:
     """The same by probabilities, of answers by their effects and of none, that are known from a finished diagnosis.
 
@@ -193,7 +195,7 @@ def surviving(
     return tuple(sorted(kept, key=lambda one: -one.support))
 
 
-def asked(found: Found, effects: Sequence[str]) -> tuple[Answer, ...]:
+def asked(found: SearchResult, effects: Sequence[str]) -> tuple[Answer, ...]:
     """What a user asks about: no effect, each effect alone, and likely pairs of them, by the search's probabilities.
 
     A pair that is ten times less probable than the best of all is left out.

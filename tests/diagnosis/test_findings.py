@@ -32,7 +32,7 @@ from bayesplate.diagnosis.folds import Nested, log_score, nested
 from bayesplate.diagnosis.hypotheses import RELABELLING, Swap, probabilities
 from bayesplate.diagnosis.null_control import NullControl, null_control
 from bayesplate.diagnosis.result import Diagnosis, EffectEntry, diagnosis_json
-from bayesplate.diagnosis.search import Found, search
+from bayesplate.diagnosis.search import SearchResult, search
 from bayesplate.diagnosis.terms import noise_grid
 from bayesplate.diagnosis.verdict import Answer, answers
 from bayesplate.diagnosis.words import verdict_sentence, verdict_sentences, warnings
@@ -57,12 +57,12 @@ MOVED = replace(
 )
 
 
-def made(probability, **changed) -> Found:
+def made(probability, **changed) -> SearchResult:
     """The search of the three effects; the readings are those of shear at its nominal size."""
     return found_with(probability, NAMES, **changed)
 
 
-def entries(found: Found) -> dict[str, EffectEntry]:
+def entries(found: SearchResult) -> dict[str, EffectEntry]:
     verdict, ranked = decided(found), answers(found)
     told = [effect_entry(found, verdict, ranked, one, 0.5) for one in found.ground.candidates.values()]
     return {one.name: one for one in told} | {RELABELLING: exchange_entries(found, verdict, ranked)[0]}
@@ -74,7 +74,7 @@ def draws_of(predictive: np.ndarray, E_x: float = 10e9) -> SimpleNamespace:
     return SimpleNamespace(predictive=predictive, **every)
 
 
-def case_of(found: Found, control: NullControl, folded: Nested | None, **changed) -> Case:
+def case_of(found: SearchResult, control: NullControl, folded: Nested | None, **changed) -> Case:
     verdict = decided(found)
     readings = np.concatenate([setup.measured for setup in found.ground.baseline.board.setups])
     draws = draws_of(readings * np.linspace(0.99, 1.01, 21)[None, :, None])
@@ -86,12 +86,12 @@ def case_of(found: Found, control: NullControl, folded: Nested | None, **changed
 NAMED = {(): 0.01, (SHEAR,): 0.79, (AIR,): 0.15, (GRAIN,): 0.05}
 
 
-def control_of(found: Found, to_beat: float) -> NullControl:
+def control_of(found: SearchResult, to_beat: float) -> NullControl:
     n = 101
     return NullControl(np.linspace(-5.0, 1.0, n), np.full(n, to_beat))
 
 
-def folds_of(found: Found, ratio: float) -> Nested:
+def folds_of(found: SearchResult, ratio: float) -> Nested:
     errors = 0.01 * np.ones((1, found.ground.baseline.n_modes))
     return Nested(errors, ratio * errors, np.ones(errors.shape, dtype=np.intp))
 
@@ -140,7 +140,7 @@ def test_only_the_exchange_that_the_verdict_stands_for_is_in_it():
     more = replace(ground.hypotheses[4], swap=Swap(3, 4))
     shares = np.array([*found.probability, 0.01])
     ground = replace(ground, hypotheses=(*ground.hypotheses, more))
-    found = Found(ground, found.residual, np.log(shares + 1e-300), shares)
+    found = SearchResult(ground, found.residual, np.log(shares + 1e-300), shares)
     verdict, ranked = decided(found), answers(found)
     assert verdict.effects == (SHEAR, RELABELLING)
     assert [one.fate for one in exchange_entries(found, verdict, ranked)] == ["in the verdict", "does not fit"]
@@ -297,7 +297,7 @@ def test_what_comes_nearest_is_told_though_it_is_not_enough(members):
         assert sentence.endswith(told if members == (AIR,) else " for a mode left out.")
 
 
-def judged(n_modes: int) -> tuple[Found, Diagnosis]:
+def judged(n_modes: int) -> tuple[SearchResult, Diagnosis]:
     """The whole road of a diagnosis without a refit, on readings that are nothing but noise."""
     found = made({}, n_modes=n_modes)
     rng = np.random.default_rng(4)
@@ -343,7 +343,7 @@ def test_a_misfit_beyond_all_doubt_has_odds():
     """Probabilities of none below the smallest number there is: the odds are those of the logarithms."""
     found = made(NAMED)
     evidence = np.array([-2000.0, -3.0, -9.0, -9.0, -9.0, -np.inf])
-    sure = Found(found.ground, found.residual, evidence, probabilities(found.ground.hypotheses, evidence))
+    sure = SearchResult(found.ground, found.residual, evidence, probabilities(found.ground.hypotheses, evidence))
     assert sure.none == 0.0
     wanted = 1997.0 + np.log(0.1 / 0.5) + np.log1p(3.0 * np.exp(-6.0))
     assert sure.against_none == pytest.approx(wanted)

@@ -12,14 +12,14 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis import claim
 from bayesplate.diagnosis.claim import named_in_part
 from bayesplate.diagnosis.folds import Nested
-from bayesplate.diagnosis.search import PASSES, Found
+from bayesplate.diagnosis.search import PASSES, SearchResult
 
 N_MODES = 8
 SIZE = Quantity.from_median(1.0, 1.5)
 BOUNDED = Quantity.from_mean(0.4, 0.15, "normal", lower=0.0, upper=0.9)
 
 
-def made(none=1e-6, rival=0.0, rest=0.1, prior=SIZE, planted=1.0) -> Found:
+def made(none=1e-6, rival=0.0, rest=0.1, prior=SIZE, planted=1.0) -> SearchResult:
     """An effect that is there, and a rest that it cannot explain; probabilities are set by hand."""
     base = baseline(np.random.default_rng(1), N_MODES)
     directions = 0.1 * np.linalg.qr(np.random.default_rng(2).standard_normal((N_MODES, N_MODES)))[0][:3]

@@ -7,11 +7,11 @@ import pytest
 from made_searches import NOISE, bare, baseline, ground_of, with_modes, with_residual
 
 from bayesplate.diagnosis.readings import suspects, wrong_reading
-from bayesplate.diagnosis.search import Found, search
+from bayesplate.diagnosis.search import SearchResult, search
 from bayesplate.diagnosis.terms import noise_grid
 
 
-def found_of(residual, n_modes=8, noise=(NOISE,)) -> Found:
+def found_of(residual, n_modes=8, noise=(NOISE,)) -> SearchResult:
     base = baseline(np.random.default_rng(1), n_modes, noise=noise)
     base = with_residual(base, residual)
     return search(ground_of(base, bare(base, noise_grid(base.board))))

@@ -13,7 +13,7 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.folds import ALWAYS, nested
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.null_control import FALSE_ALARMS, NullControl, _share, made_to_choose, null_control
-from bayesplate.diagnosis.search import Found, noise_of_board, search
+from bayesplate.diagnosis.search import SearchResult, noise_of_board, search
 from bayesplate.diagnosis.sensitivity import draw_constants, under_exact_law, variants, varied
 from bayesplate.diagnosis.terms import noise_grid
 
@@ -38,7 +38,7 @@ def test_constants_are_those_of_a_direct_regression():
     ground = ground_of(base, Hypothesis(("a",), 1.0, one.fine, one_level(base), base), candidates={"a": one})
     residual = 0.01 * rng.standard_normal(6)
     n = 40_000
-    drawn = draw_constants(Found(ground, residual, np.zeros(1), np.ones(1)), rng, n)
+    drawn = draw_constants(SearchResult(ground, residual, np.zeros(1), np.ones(1)), rng, n)
 
     weights = 1.0 / (one_level(base).sd[0, 0] ** 2 + base.own_variance)
     columns = np.hstack([base.slopes, one.fine.slopes[0], base.input_slopes])

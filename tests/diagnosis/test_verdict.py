@@ -22,7 +22,7 @@ from made_searches import (
 from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.hypotheses import RELABELLING, Hypothesis, Swap
 from bayesplate.diagnosis.null_control import NullControl
-from bayesplate.diagnosis.search import Found
+from bayesplate.diagnosis.search import SearchResult
 from bayesplate.diagnosis.sizes import at_limit, size_posterior
 from bayesplate.diagnosis.terms import noise_grid
 from bayesplate.diagnosis.verdict import answers
@@ -148,7 +148,7 @@ def test_a_form_that_is_not_the_likelier_one_may_be_at_its_limit(base, share):
         whole = replace(one, laws=(*one.laws, *other.laws), fine=changed)
         every = bare(base, levels), Hypothesis(("a",), 0.5, changed, levels, base)
         ground = ground_of(base, *every, candidates={"a": whole})
-        return Found(ground, 1.005 * visible_of(one), np.zeros(2), np.ones(2))
+        return SearchResult(ground, 1.005 * visible_of(one), np.zeros(2), np.ones(2))
 
     even = found_by(table.weights / 2.0)
     first, second = (size_posterior(even, 1, 0, form, 0)[0].sum() for form in (0, 1))
@@ -162,7 +162,7 @@ def test_a_form_that_is_not_the_likelier_one_may_be_at_its_limit(base, share):
 def test_without_candidates_there_is_nothing_to_name(base):
     ground = ground_of(base, bare(base, noise_grid(base.board)))
     for residual, word in [(QUIET, "none needed"), (BEYOND_NOISE, "unexplained")]:
-        verdict = decided(Found(ground, residual, np.zeros(1), np.ones(1)))
+        verdict = decided(SearchResult(ground, residual, np.zeros(1), np.ones(1)))
         assert (verdict.word, verdict.best) == (word, None)
 
 

@@ -247,7 +247,7 @@ BAD_FILES = [
     ("gadgets/bad.py", "", "stands in no known room: gadgets"),
     ("diagnosis/bad.py", "", "stands in no known part of diagnosis"),
     ("diagnosis/gadgets/bad.py", "", "stands in no known part of diagnosis"),
-    ("diagnosis/shifts.py", "from bayesplate.diagnosis.search import Found", "shifts imports diagnosis.search"),
+    ("diagnosis/shifts.py", "from bayesplate.diagnosis.search import SearchResult", "shifts imports diagnosis.search"),
     ("diagnosis/terms.py", "from bayesplate.diagnosis import verdict", "terms imports diagnosis.verdict"),
     ("diagnosis/claim.py", "import bayesplate.diagnosis.words", "claim imports diagnosis.words"),
     ("diagnosis/__init__.py", "from bayesplate.diagnosis.laws import form_law", "diagnosis imports diagnosis.laws"),

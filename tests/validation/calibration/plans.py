@@ -35,7 +35,7 @@ from bayesplate.board.prior import load_prior
 from bayesplate.board.sessions import shared_share
 from bayesplate.diagnosis.forms import forms
 from bayesplate.diagnosis.hypotheses import NONE, ONE, Hypothesis
-from bayesplate.diagnosis.search import Found, Ground, prepare_search, search
+from bayesplate.diagnosis.search import Ground, SearchResult, prepare_search, search
 from bayesplate.diagnosis.verdict import WITHIN
 from bayesplate.errors import BayesplateError
 from bayesplate.planning.beliefs import entropy
@@ -94,13 +94,13 @@ class Asked:
     Attributes
     ----------
     planted : PlantedBoard
-    found : Found
+    found : SearchResult
     true : tuple of str
         Effects that it has: one, or none.
     """
 
     planted: PlantedBoard
-    found: Found
+    found: SearchResult
     true: tuple[str, ...]
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bayesplate.board.material import rigidities
 from bayesplate.board.quantity import Quantity
-from bayesplate.diagnosis.search import Found
+from bayesplate.diagnosis.search import SearchResult
 from bayesplate.diagnosis.sizes import size_posterior
 from bayesplate.diagnosis.verdict import Verdict
 
@@ -39,7 +39,7 @@ Air is missing, for nothing of its size is fitted, and tension, which is planted
 """
 
 
-def recovered(found: Found, verdict: Verdict, planted: PlantedBoard) -> dict[str, dict[str, float]]:
+def recovered(found: SearchResult, verdict: Verdict, planted: PlantedBoard) -> dict[str, dict[str, float]]:
     """Posterior of the size of each named effect that is really there.
 
     Returns
@@ -61,7 +61,7 @@ def recovered(found: Found, verdict: Verdict, planted: PlantedBoard) -> dict[str
     return result
 
 
-def _sizes(found: Found, index: int, member: int, place: int, prior: Quantity) -> tuple[Floats, Floats]:
+def _sizes(found: SearchResult, index: int, member: int, place: int, prior: Quantity) -> tuple[Floats, Floats]:
     """Edges of the cells of a parameter and their probabilities, other parameters summed over."""
     shares, z = size_posterior(found, index, member, 0, place)
     middles, back = np.unique(np.round(z, 9), return_inverse=True)

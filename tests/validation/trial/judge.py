@@ -19,7 +19,7 @@ from validation.trial.shared import control_of, ground_of, shared_law
 from bayesplate.board.material import MODULI
 from bayesplate.diagnosis.claim import judge_claim, named_in_part, nested_of
 from bayesplate.diagnosis.null_control import NullControl
-from bayesplate.diagnosis.search import Found, search
+from bayesplate.diagnosis.search import SearchResult, search
 from bayesplate.diagnosis.sensitivity import Constants, draw_constants
 from bayesplate.diagnosis.verdict import Verdict, alternatives, answers, decide
 from bayesplate.errors import BayesplateError
@@ -94,12 +94,12 @@ def truth_of(planted: PlantedBoard) -> Record:
     return {key: _short(value) for key, value in told.items()}
 
 
-def findings(found: Found, planted: PlantedBoard, control: NullControl, rng: np.random.Generator) -> Record:
+def findings(found: SearchResult, planted: PlantedBoard, control: NullControl, rng: np.random.Generator) -> Record:
     """Verdict, claim, probabilities, gates, sizes and constants of a board.
 
     Parameters
     ----------
-    found : Found
+    found : SearchResult
     planted : PlantedBoard
     control : NullControl
         Of the board's setting.
@@ -138,7 +138,7 @@ def findings(found: Found, planted: PlantedBoard, control: NullControl, rng: np.
     }
 
 
-def traced(found: Found, verdict: Verdict) -> list[int]:
+def traced(found: SearchResult, verdict: Verdict) -> list[int]:
     """Hypotheses that the constants after tracing are averaged over: the named one, the group's, or none."""
     if verdict.word == "named":
         return [verdict.index]
@@ -148,7 +148,7 @@ def traced(found: Found, verdict: Verdict) -> list[int]:
 
 
 def _constants(
-    found: Found, verdict: Verdict, truth: Mapping[str, float], rng: np.random.Generator
+    found: SearchResult, verdict: Verdict, truth: Mapping[str, float], rng: np.random.Generator
 ) -> dict[str, dict[str, Any]]:
     """Intervals of 90 % and whether they hold the truth: without tracing, after it, averaged over all hypotheses."""
     among = traced(found, verdict)
