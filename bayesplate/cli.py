@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import bayesplate
-from bayesplate.asking import asked_answers
-from bayesplate.terminal import print_json, print_shown, progress_line, reporting, say
+from bayesplate.asking import ask_card_arguments
+from bayesplate.terminal import exit_on_error, print_json, print_tables, print_text, progress_line
 
 if TYPE_CHECKING:
-    from bayesplate.commands.options import Joined, Option
-    from bayesplate.commands.shown import Shown
+    from bayesplate.commands.options import Option, OptionGroup
+    from bayesplate.commands.shown import Printout
 
-_SHARED = ("out", "seed", "effects", "setup", "law", "robust", "report", "force", "resume")
+_SHARED_ARGUMENTS = ("out", "seed", "effects", "setup", "law", "robust", "report", "force", "resume")
 """Arguments that several commands take, in the order of the help: after those that a command has alone."""
 
 
@@ -36,8 +36,8 @@ class Commands(click.Group):
         try:
             return super().resolve_command(ctx, args)
         except click.UsageError as error:
-            near = get_close_matches(args[0], self.list_commands(ctx), n=1)
-            hint = f" Did you mean {near[0]!r}?" if near else ""
+            matches = get_close_matches(args[0], self.list_commands(ctx), n=1)
+            hint = f" Did you mean {matches[0]!r}?" if matches else ""
             raise click.UsageError(error.message + hint, ctx) from None
 
 
@@ -55,39 +55,39 @@ def main() -> None:
 
 
 @dataclass(frozen=True)
-class Answer:
-    """What a command found, and what it prints; an error of `then`, called at the end, is the command's."""
+class CommandOutput:
+    """Result of a command and what is printed of it; `then` is called last, and its error is that of the command."""
 
     content: Any  # what `--json` prints
-    shown: Callable[[], Shown] | None = None
+    shown: Callable[[], Printout] | None = None
     closing: str = ""  # where things were written, and what comes next
     then: Callable[[], None] | None = None
 
     def print(self, *, as_json: bool, quiet: bool) -> None:
-        """Print what was asked for."""
+        """Print JSON, or tables and the closing sentence, or nothing."""
         if as_json:
             print_json(self.content)
         elif not quiet:
             if self.shown is not None:
-                print_shown(self.shown())
+                print_tables(self.shown())
             if self.closing:
-                say(self.closing)
+                print_text(self.closing)
 
 
 class Command(click.Command):
-    """A public function as a command of its name: what it takes is what the signature says.
+    """A public function as a command of its name, with options that follow from its signature.
 
     The function, and with it the libraries, is loaded when the command is called or its help is read.
     """
 
-    def __init__(self, answer: Callable[..., Answer]) -> None:
+    def __init__(self, answer: Callable[..., CommandOutput]) -> None:
         super().__init__(answer.__name__, callback=self._run, help=inspect.getdoc(answer))
-        self._answer = answer
+        self._compute = answer
 
     @cached_property
     def _function(self) -> Callable[..., Any]:
-        found: Callable[..., Any] = getattr(bayesplate, self._answer.__name__)
-        return found
+        function: Callable[..., Any] = getattr(bayesplate, self._compute.__name__)
+        return function
 
     @cached_property
     def _arguments(self) -> Mapping[str, inspect.Parameter]:
@@ -95,48 +95,48 @@ class Command(click.Command):
         return inspect.signature(inspect.unwrap(self._function)).parameters
 
     @cached_property
-    def _options(self) -> dict[str, Option | Joined]:
+    def _options(self) -> dict[str, Option | OptionGroup]:
         from bayesplate.commands.options import options_of
 
-        found = options_of(self._function)
-        alone = [name for name in found if name not in _SHARED]
-        return {name: found[name] for name in (*alone, *_SHARED) if name in found}
+        options = options_of(self._function)
+        unshared = [name for name in options if name not in _SHARED_ARGUMENTS]
+        return {name: options[name] for name in (*unshared, *_SHARED_ARGUMENTS) if name in options}
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        """Parameters of the function, and those of the printing."""
+        """Options of the function, and those of the printing."""
         if not self.params:
-            for name, part in self._options.items():
-                self.params += part.parameters(name, self._arguments[name].default)
-            self.params += _printing()
+            for name, option in self._options.items():
+                self.params += option.parameters(name, self._arguments[name].default)
+            self.params += _printing_options()
         return super().get_params(ctx)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Load what is needed, which can be interrupted, and read the arguments."""
-        with reporting(as_json="--json" in args, debug="--debug" in args):
+        with exit_on_error(as_json="--json" in args, debug="--debug" in args):
             self.get_params(ctx)
         return super().parse_args(ctx, args)
 
-    def _run(self, as_json: bool, quiet: bool, debug: bool, **told: Any) -> None:
+    def _run(self, as_json: bool, quiet: bool, debug: bool, **values: Any) -> None:
         from bayesplate.commands.arguments import contradictions
 
         has_progress = "progress" in self._arguments
-        with reporting(as_json=as_json, debug=debug):
-            about = told[next(iter(self._options))]
-            given = {name: part.value(name, told, about) for name, part in self._options.items()}
-            for fault in contradictions(given):
+        with exit_on_error(as_json=as_json, debug=debug):
+            about = values[next(iter(self._options))]
+            arguments = {name: option.value(name, values, about) for name, option in self._options.items()}
+            for fault in contradictions(arguments):
                 raise click.UsageError(str(fault))
             with progress_line(shown=has_progress and not quiet and not as_json) as tell:
-                given |= {"progress": tell}
-                answer = self._answer(
-                    self._function, **{name: value for name, value in given.items() if value is not None}
+                arguments |= {"progress": tell}
+                output = self._compute(
+                    self._function, **{name: value for name, value in arguments.items() if value is not None}
                 )
-            answer.print(as_json=as_json, quiet=quiet)
-        if answer.then is not None:
-            with reporting(as_json=False, debug=debug):
-                answer.then()
+            output.print(as_json=as_json, quiet=quiet)
+        if output.then is not None:
+            with exit_on_error(as_json=False, debug=debug):
+                output.then()
 
 
-def _printing() -> list[click.Parameter]:
+def _printing_options() -> list[click.Parameter]:
     return [
         click.Option(["--json", "as_json"], is_flag=True, help="Print JSON instead of tables."),
         click.Option(["--quiet"], is_flag=True, help="Print nothing but errors."),
@@ -144,120 +144,120 @@ def _printing() -> list[click.Parameter]:
     ]
 
 
-def command(answer: Callable[..., Answer]) -> Command:
+def command(answer: Callable[..., CommandOutput]) -> Command:
     """A command of the public function that has the same name."""
-    made = Command(answer)
-    main.add_command(made)
-    return made
+    new_command = Command(answer)
+    main.add_command(new_command)
+    return new_command
 
 
 @command
-def check(run: Callable[..., Any], **asked: Any) -> Answer:
+def check(run: Callable[..., Any], **options: Any) -> CommandOutput:
     """Every fault of CARD, or what a fit of it can identify."""
-    report = run(**asked)
-    return Answer(report, report.shown)
+    report = run(**options)
+    return CommandOutput(report, report.shown)
 
 
 @command
-def fit(run: Callable[..., Any], **asked: Any) -> Answer:
+def fit(run: Callable[..., Any], **options: Any) -> CommandOutput:
     """Posterior of the elastic constants of CARD.
 
     Writes report.html, summary.json and posterior.nc.
     """
-    result = run(**asked)
-    return Answer(result.summary, result.shown, f"written to {result.folder}")
+    result = run(**options)
+    return CommandOutput(result.summary, result.shown, f"written to {result.folder}")
 
 
 @command
-def modes(run: Callable[..., Any], **asked: Any) -> Answer:
+def modes(run: Callable[..., Any], **options: Any) -> CommandOutput:
     """Lowest modes of CARD, and a sheet of their Chladni figures."""
-    result = run(**asked)
-    return Answer(result.summary, result.shown)
+    result = run(**options)
+    return CommandOutput(result.summary, result.shown)
 
 
 @command
-def compare(run: Callable[..., Any], **asked: Any) -> Answer:
+def compare(run: Callable[..., Any], **options: Any) -> CommandOutput:
     """Every method on CARD side by side.
 
     Each as a thin and as a shear-flexible plate.
     """
-    result = run(**asked)
-    return Answer(result, result.shown)
+    result = run(**options)
+    return CommandOutput(result, result.shown)
 
 
 @command
-def diagnose(run: Callable[..., Any], **asked: Any) -> Answer:
+def diagnose(run: Callable[..., Any], **options: Any) -> CommandOutput:
     """Trace what the plate model misses on CARD to a physical effect.
 
     Adds the effect, and reports the error before and after.
     """
-    result = run(**asked)
-    return Answer(result.to_json(), result.shown, f"written to {result.folder}")
+    result = run(**options)
+    return CommandOutput(result.to_json(), result.shown, f"written to {result.folder}")
 
 
 @command
-def plan(run: Callable[..., Any], **asked: Any) -> Answer:
+def plan(run: Callable[..., Any], **options: Any) -> CommandOutput:
     """What to measure next on CARD.
 
     Ranks measurements by what they are expected to give and what they cost.
     """
-    result = run(**asked)
-    closing = f"written to {asked['out']}: {', '.join(path.name for path in result.files)}"
-    return Answer(result.summary, result.shown, closing)
+    result = run(**options)
+    closing = f"written to {options['out']}: {', '.join(path.name for path in result.files)}"
+    return CommandOutput(result.summary, result.shown, closing)
 
 
 @command
-def new(run: Callable[..., Any], **asked: Any) -> Answer:
+def new(run: Callable[..., Any], **options: Any) -> CommandOutput:
     """Write a first card to PATH.
 
     It asks, or takes the options where there are any.
     """
-    path, given = asked.get("path"), {name: value for name, value in asked.items() if value and name != "path"}
+    path, stated = options.get("path"), {name: value for name, value in options.items() if value and name != "path"}
     printing = click.get_current_context().params
-    may_ask = not given and not printing["as_json"] and not printing["quiet"]
-    told = asked_answers(path) if may_ask else {"path": path or "my-board", **given}
-    card = run(**told)
-    shown = quote(str(card))
+    may_ask = not stated and not printing["as_json"] and not printing["quiet"]
+    card_arguments = ask_card_arguments(path) if may_ask else {"path": path or "my-board", **stated}
+    card = run(**card_arguments)
+    quoted = quote(str(card))
     following = (
-        f"check {shown}, which tells every fault, or what it can say"
-        if told.get("frequencies")
-        else f"modes {shown}, which shows the figures and where to listen; bayesplate plan {shown}, where to tap; "
-        f"with frequencies bayesplate check {shown}"
+        f"check {quoted}, which tells every fault, or what it can say"
+        if card_arguments.get("frequencies")
+        else f"modes {quoted}, which shows the figures and where to listen; bayesplate plan {quoted}, where to tap; "
+        f"with frequencies bayesplate check {quoted}"
     )
-    return Answer({"path": str(card)}, closing=f"written to {card}. Next: bayesplate {following}")
+    return CommandOutput({"path": str(card)}, closing=f"written to {card}. Next: bayesplate {following}")
 
 
 @command
-def pick(run: Callable[..., Any], **asked: Any) -> Answer:
+def pick(run: Callable[..., Any], **options: Any) -> CommandOutput:
     """Frequencies of the modes in recordings FILES.
 
     Writes the [setup] that a card takes, too.
     """
-    from bayesplate.commands.pick import FRAGMENT, PAGE
+    from bayesplate.commands.pick import FRAGMENT_FILE, PICK_PAGE_FILE
 
-    out = asked["out"]
-    result = run(**asked)
-    completes = f"{quote(asked.get('card') or 'CARD')} --setup {quote(f'{out}/{FRAGMENT}')}"
-    closing = f"written to {out}: {FRAGMENT}, {PAGE}. Next: bayesplate fit {completes}"
-    return Answer(result.summary, result.shown, closing)
+    out = options["out"]
+    result = run(**options)
+    fit_arguments = f"{quote(options.get('card') or 'CARD')} --setup {quote(f'{out}/{FRAGMENT_FILE}')}"
+    closing = f"written to {out}: {FRAGMENT_FILE}, {PICK_PAGE_FILE}. Next: bayesplate fit {fit_arguments}"
+    return CommandOutput(result.summary, result.shown, closing)
 
 
 @command
-def cite(run: Callable[..., Any], **asked: Any) -> Answer:
+def cite(run: Callable[..., Any], **options: Any) -> CommandOutput:
     """References of exactly what a fit of CARD uses."""
     from bayesplate.commands.cite import cite_text
 
-    sections = run(**asked)
+    sections = run(**options)
     content = {section.title.lower(): list(section.entries) for section in sections}
-    return Answer(content, closing=cite_text(sections).removesuffix("\n"))
+    return CommandOutput(content, closing=cite_text(sections).removesuffix("\n"))
 
 
 @command
-def batch(run: Callable[..., Any], **asked: Any) -> Answer:
+def batch(run: Callable[..., Any], **options: Any) -> CommandOutput:
     """Fit many boards: a folder of cards, or the rows of a table.
 
     One table of all, and a page that grades them. SOURCE is the folder or the table.
     """
-    result = run(**asked)
+    result = run(**options)
     closing = f"written to {result.folder}"
-    return Answer(result.summary, result.shown, closing, result.require_all)
+    return CommandOutput(result.summary, result.shown, closing, result.require_all)

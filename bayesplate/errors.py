@@ -17,7 +17,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 
-def plain(text: str) -> str:
+def printable(text: str) -> str:
     """A text whose unprintable characters are written as escapes, so that it cannot steer a terminal."""
     return "".join(
         character if character.isprintable() else character.encode("unicode_escape").decode() for character in text
@@ -26,7 +26,7 @@ def plain(text: str) -> str:
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing wrong with an input; what is unprintable in it, wherever it comes from, is written as an escape.
+    """A fault of an input; unprintable characters in it are written as escapes.
 
     Attributes
     ----------
@@ -46,9 +46,9 @@ class Fault:
     remedy: str = ""
 
     def __post_init__(self) -> None:
-        """Names of files and what libraries say of them may hold anything."""
+        """Escape unprintable characters, which names of files and messages of libraries may hold."""
         for name in ("place", "wanted", "got", "remedy"):
-            object.__setattr__(self, name, plain(getattr(self, name)))
+            object.__setattr__(self, name, printable(getattr(self, name)))
 
     def __str__(self) -> str:
         text = f"{self.place}: wanted {self.wanted}, got {self.got}"

@@ -13,7 +13,7 @@ from bayesplate.errors import Fault, InputError, UnwritableError
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[BinaryIO]:
-    """A stream that takes the place of a file when it is complete, even after a power cut; raises OSError."""
+    """A stream to a partial file, which replaces the file when complete, even after a power cut; raises OSError."""
     partial = path.with_name(path.name + ".partial")
     try:
         with partial.open("wb") as stream:
@@ -26,8 +26,8 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
 
 
 @contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Writing files at a place: an OSError becomes an UnwritableError that tells of it."""
+def catch_write_errors(path: Path) -> Iterator[None]:
+    """Write files at a path: an OSError becomes an UnwritableError that names it."""
     try:
         yield
     except OSError as error:
@@ -38,7 +38,7 @@ def writing(path: Path) -> Iterator[None]:
 
 def write_bytes(path: Path, data: bytes) -> None:
     """Write a file completely or not at all; raises UnwritableError."""
-    with writing(path), whole_file(path) as stream:
+    with catch_write_errors(path), whole_file(path) as stream:
         stream.write(data)
 
 
@@ -57,7 +57,7 @@ def make_folder(folder: Path) -> None:
 
 
 def names_in(folder: Path) -> list[str]:
-    """What a folder of outputs holds, nothing where there is none yet; raises InputError if it cannot be looked at."""
+    """Names in a folder of outputs, none where there is no folder yet; raises InputError if it cannot be listed."""
     try:
         return os.listdir(folder)
     except FileNotFoundError:
@@ -68,12 +68,12 @@ def names_in(folder: Path) -> list[str]:
         raise InputError(Fault(f"--out {folder}", "a folder", got, "choose another place")) from None
 
 
-def require_new(folder: Path, names: Iterable[str], *, force: bool) -> tuple[Path, ...]:
+def require_new_files(folder: Path, names: Iterable[str], *, force: bool) -> tuple[Path, ...]:
     """The files that a command will write, checked before any work; InputError if one is there and not `force`."""
-    found = set(names_in(folder))
+    present = set(names_in(folder))
     paths = tuple(folder / name for name in names)
-    there = [path.name for path in paths if path.name in found]
-    if there and not force:
+    conflicts = [path.name for path in paths if path.name in present]
+    if conflicts and not force:
         wanted, remedy = "new files", "--force replaces them, --out takes another place"
-        raise InputError(Fault(f"--out {folder}", wanted, f"{', '.join(there)} already there", remedy))
+        raise InputError(Fault(f"--out {folder}", wanted, f"{', '.join(conflicts)} already there", remedy))
     return paths

@@ -11,11 +11,11 @@ HIGHEST_ORDER = 9
 """Nodal lines one way that the production mesh resolves: within 6 cents where the plate bends alike both ways, within
 12 where the wavelengths along its sides differ by up to 1.4."""
 
-HIGHEST_FIRST = 2
+HIGHEST_FIRST_LABEL = 2
 """Largest number of a laboratory's first label: where two held edges are counted as nodal lines, labels begin there."""
 
-HIGHEST_INDEX = HIGHEST_ORDER + HIGHEST_FIRST
-_GRAMMAR = re.compile(r"[ \t]*\([ \t]*(0|[1-9][0-9]?)[ \t]*,[ \t]*(0|[1-9][0-9]?)[ \t]*\)[ \t]*")
+HIGHEST_INDEX = HIGHEST_ORDER + HIGHEST_FIRST_LABEL
+_LABEL_PATTERN = re.compile(r"[ \t]*\([ \t]*(0|[1-9][0-9]?)[ \t]*,[ \t]*(0|[1-9][0-9]?)[ \t]*\)[ \t]*")
 
 
 class Label(NamedTuple):
@@ -53,10 +53,10 @@ class Label(NamedTuple):
         InputError
             If the text is anything else: "10", "(1;0)", "(1.0,0)", "(-1,0)".
         """
-        match = _GRAMMAR.fullmatch(text)
+        match = _LABEL_PATTERN.fullmatch(text)
         label = cls(int(match[1]), int(match[2])) if match else None
         if label is None or max(label) > HIGHEST_INDEX:
             wanted = f'two whole numbers from 0 to {HIGHEST_INDEX}, written like "(1,0)"'
-            shown = ascii(text if len(text) <= 40 else text[:40] + "...")[1:-1]
-            raise InputError(Fault("mode label", wanted, f'"{shown}"'))
+            excerpt = ascii(text if len(text) <= 40 else text[:40] + "...")[1:-1]
+            raise InputError(Fault("mode label", wanted, f'"{excerpt}"'))
         return label

@@ -1,4 +1,4 @@
-"""ArviZ, which whoever needs it imports here."""
+"""ArviZ, which the package imports through this module alone."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 
 def load_arviz() -> Any:
-    """ArviZ. Once a day 0.23 announces version 1, and notes the day in a cache of the user, which may be read-only."""
+    """Import ArviZ; 0.23 announces version 1 once a day and notes the day in a cache folder, which may be read-only."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FutureWarning)
         try:

@@ -11,7 +11,7 @@ from typing import IO
 from bayesplate.errors import CheckpointError
 
 
-def take(folder: Path) -> IO[bytes]:
+def lock_folder(folder: Path) -> IO[bytes]:
     """Lock a folder, made if need be, for sole use until the stream is closed; CheckpointError if another run has it.
 
     The system frees the lock of a process that died, so none is ever stale.
@@ -32,7 +32,7 @@ def take(folder: Path) -> IO[bytes]:
                 f"{folder}: wanted sole use, got another run (process {owner}) that writes to it; "
                 "wait for it, or give another --out"
             )
-        # The run that held it may have removed the file in between: then this is the lock of nothing.
+        # The run that held the lock may have removed the file meanwhile: then this locks a deleted file.
         if path.exists() and os.path.samestat(os.fstat(stream.fileno()), path.stat()):
             break
         stream.close()

@@ -7,7 +7,7 @@ from zlib import crc32
 import numpy as np
 
 
-def stream(seed: int, *names: str | int) -> np.random.Generator:
+def random_stream(seed: int, *names: str | int) -> np.random.Generator:
     """The random stream of a name, which says what the numbers are for, as "walkers", 2."""
     key = tuple(crc32(name.encode()) if isinstance(name, str) else name for name in names)
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))

@@ -18,7 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import bayesplate
-from bayesplate.campaign.diagnosis import claim_sentence
+from bayesplate.campaign.diagnosis import campaign_claim_sentence
 from bayesplate.campaign.tables import boards_table, common_table, searched_tables, shared_table, taught_table
 from bayesplate.results.tables import Table
 
@@ -48,7 +48,7 @@ def page(found: bayesplate.CampaignDiagnoseResult) -> str:
     parts = [
         f"# {found.after.campaign.card.title or summary.name}",
         "Written by `examples/campaign.py`; do not edit.",
-        claim_sentence(diagnosis),
+        campaign_claim_sentence(diagnosis),
         f"Error of all labelled modes, each board's constants fitted: {errors}.",
         *(markdown(one) for one in tables),
     ]

@@ -30,10 +30,10 @@ from bayesplate.commands.prepare import prepare
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.paper import PaperSystem, paper_system
 from bayesplate.estimates.percentile import percentile_estimate
-from bayesplate.estimates.refit import design, refit
+from bayesplate.estimates.refit import design_matrix, refit
 from bayesplate.frequencies.columns import inverse_lambda
 from bayesplate.frequencies.system import system_of
-from bayesplate.plate.naming import find
+from bayesplate.plate.naming import find_named_modes
 from bayesplate.plate.shear import shear_flexible_plate
 from bayesplate.plate.thin import thin_plate
 from bayesplate.posterior.laplace import predictor
@@ -140,7 +140,7 @@ def _solved(effects: list[str], assemble: Any, n_elements: int) -> np.ndarray:
     constants = rigidities(TRUTH["E_x"], TRUTH["E_y"], TRUTH["G_xy"], h, nu_xy)
     weights = system_of(board, setup).weights(board.nominal() | constants._asdict()).at(0)
     beams = [reading.beams for reading in setup.readings]
-    found = find(assemble(setup.ends_x, setup.ends_y, n_elements, n_elements), weights, beams)
+    found = find_named_modes(assemble(setup.ends_x, setup.ends_y, n_elements, n_elements), weights, beams)
     return np.sqrt([found[b].eigenvalue for b in beams]) / (2 * np.pi)
 
 
@@ -171,7 +171,7 @@ def _posterior(problem: PosedProblem, read: np.ndarray, rng: np.random.Generator
     best = refit(predict, log_measured(board), scales, problem.centre[columns], parameters.fitted_bounds)
     misfit = np.sum(((log_measured(board) - predict(best[None, :])[0]) / scales) ** 2) / (read.size - 3)
     widening = np.sqrt(max(1.0, misfit))
-    weighted = design(predict, scales * widening, best)
+    weighted = design_matrix(predict, scales * widening, best)
     covariance = problem.covariance.copy()
     covariance[np.ix_(columns, columns)] = np.linalg.inv(weighted.T @ weighted)
     centre = parameters.theta(

@@ -12,29 +12,29 @@ from bayesplate.diagnosis.result import (
     Diagnosis,
     EffectEntry,
     ElasticShift,
-    Errors,
     ExchangeEntry,
-    Explanation,
+    ExplanationSummary,
     Finalist,
     Histogram,
+    ModelErrors,
     NullControlSummary,
     PValues,
 )
 from bayesplate.diagnosis.stated import StatedClaim
-from bayesplate.diagnosis.verdict import Word
+from bayesplate.diagnosis.verdict import VerdictWord
 from bayesplate.effects import EFFECTS
 from bayesplate.results.contract import Spread
 
 NULL_ODDS = Histogram(edges=(-6.0, -3.0, 0.0, 3.0, 6.0), counts=(200, 250, 40, 10))
 NULL_RATIOS = Histogram(edges=(0.5, 0.75, 1.0, 1.25), counts=(25, 300, 175))
-BEFORE = Errors(
+BEFORE = ModelErrors(
     in_sample_rms_cents=21.25,
     leave_one_out_rms_cents=46.5,
     nested_leave_one_out_rms_cents=46.5,
     log_score=-24.75,
     hits_90=0.5,
 )
-AFTER = Errors(
+AFTER = ModelErrors(
     in_sample_rms_cents=4.25,
     leave_one_out_rms_cents=9.5,
     nested_leave_one_out_rms_cents=12.5,
@@ -143,7 +143,9 @@ EXCHANGE = ExchangeEntry(
 )  # fmt: skip
 
 
-def diagnosis(word: Word, effects: tuple[str, ...] = (), claim: bool = False, after: Errors | None = None) -> Diagnosis:
+def diagnosis(
+    word: VerdictWord, effects: tuple[str, ...] = (), claim: bool = False, after: ModelErrors | None = None
+) -> Diagnosis:
     """A diagnosis with three candidate effects; with an `after`, the first of its effects was added."""
     still = {name: ElasticShift(before=one.before, after=one.before, shift_in_sd=0.0) for name, one in SHIFT.items()}
     refitted = effects[:1] if after else ()
@@ -192,9 +194,9 @@ def diagnosis(word: Word, effects: tuple[str, ...] = (), claim: bool = False, af
         elastic_averaged={name: spread(one.before) for name, one in SHIFT.items()},
         rigidity_averaged={name: spread(value, "N m") for name, value in (("D_x", 30.0), ("D_y", 2.5), ("D_s", 5.0))},
         answers=(
-            Explanation(effects=("membrane_tension",), probability=0.97, words="membrane tension"),
-            Explanation(effects=("fluid_loading",), probability=0.0075, words="fluid loading"),
-            Explanation(effects=("grain_angle",), probability=0.0025, words="grain angle"),
+            ExplanationSummary(effects=("membrane_tension",), probability=0.97, words="membrane tension"),
+            ExplanationSummary(effects=("fluid_loading",), probability=0.0075, words="fluid loading"),
+            ExplanationSummary(effects=("grain_angle",), probability=0.0025, words="grain angle"),
         ),
         candidates=() if word == "undetectable" else (TENSION, AIR, GRAIN),
         recommendation=NEXT,

@@ -14,7 +14,7 @@ from generator.plate import solve as solve_generator
 
 from bayesplate.board.attached import AttachedItem, DeclaredFluid
 from bayesplate.board.board import Board
-from bayesplate.board.parameter import Owner, shown_name
+from bayesplate.board.parameter import Owner, parameter_name
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.random_field import Surface
 from bayesplate.board.reading import Reading
@@ -25,7 +25,7 @@ from bayesplate.effects.field_components import FieldProfile
 from bayesplate.effects.transverse_shear import TransverseShear
 from bayesplate.frequencies.system import System
 from bayesplate.plate.membrane import Curvature
-from bayesplate.plate.naming import find
+from bayesplate.plate.naming import find_named_modes
 from bayesplate.plate.solve import Modes, solve
 from bayesplate.posterior.posing import PosedProblem, pose
 
@@ -69,7 +69,7 @@ def values_of(plate: Plate, parameters: Parameters) -> dict[str, np.ndarray]:
     """Constants and sizes of a plate, and parameters of effects; those of a setup without its name."""
     own = {"length_x": plate.L_x, "length_y": plate.L_y, "thickness": plate.h, "density": plate.rho}
     own |= {"D_x": plate.D_x, "D_y": plate.D_y, "D_s": plate.G_xy * plate.h**3 / 3.0, "poisson_xy": plate.nu_xy}
-    of_effects = {shown_name(n, MADE) if _is_of_setup(n) else n: v for n, v in parameters.items()}
+    of_effects = {parameter_name(n, MADE) if _is_of_setup(n) else n: v for n, v in parameters.items()}
     return {name: np.asarray(value) for name, value in (own | of_effects).items()}
 
 
@@ -123,7 +123,7 @@ def shifts(plate: Plate, effects: Sequence[Effect], parameters: Parameters, beam
     squared = []
     for present in ((), tuple(effects)):
         system, values = System(setup_of(plate), present), values_of(plate, parameters)
-        found = find(system.plate(values), system.weights(values).at(0), beams)
+        found = find_named_modes(system.plate(values), system.weights(values).at(0), beams)
         squared.append(np.array([found[b].eigenvalue for b in beams]))
     return 600.0 * np.log2(squared[1] / squared[0])
 

@@ -79,7 +79,7 @@ class Moments:
 
         def append(journal: Any, key: str, row: Any) -> None:
             if self.reached():
-                line = storage._line(key, row)
+                line = storage._journal_line(key, row)
                 journal._stream.write(line[: len(line) * self.last // 7 % len(line)])
                 end()
             whole(journal, key, row)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.campaign.pulls import Pull
-from bayesplate.campaign.shared import Shared
-from bayesplate.campaign.together import Together
+from bayesplate.campaign.pulls import NormalLikelihood
+from bayesplate.campaign.shared import SharedParameter
+from bayesplate.campaign.together import CombinedBoards
 
 
 @dataclass(frozen=True)
@@ -89,17 +89,17 @@ def log_evidence(boards):
 
 def standard_shared(n):
     """Shared numbers whose values are their standard coordinates."""
-    return tuple(Shared("effect", f"z{i}", Quantity(0.0, 1.0, "normal"), "1") for i in range(n))
+    return tuple(SharedParameter("effect", f"z{i}", Quantity(0.0, 1.0, "normal"), "1") for i in range(n))
 
 
 def pull_of(board):
     """The normal likelihood of a linear board, exactly."""
     inverse = np.linalg.inv(board.covariance)
-    return Pull(board.shared.T @ inverse @ board.shared, board.shared.T @ inverse @ board.readings)
+    return NormalLikelihood(board.shared.T @ inverse @ board.shared, board.shared.T @ inverse @ board.readings)
 
 
 def exactly_together(boards, shared=None):
     """Linear boards with their closed forms."""
     shared = standard_shared(boards[0].shared.shape[1]) if shared is None else shared
     names = [f"board {i}" for i in range(len(boards))]
-    return Together.of(shared, names, boards, [pull_of(one) for one in boards])
+    return CombinedBoards.of(shared, names, boards, [pull_of(one) for one in boards])

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import ritz
 
-from bayesplate.board.board import INPUTS, Board, made_board
+from bayesplate.board.board import INPUTS, Board, make_board
 from bayesplate.board.material import RIGIDITIES
-from bayesplate.board.parameter import BOARD
+from bayesplate.board.parameter import BOARD_OWNER
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Peak, Reading
 from bayesplate.board.setup import Setup
@@ -65,7 +65,7 @@ def board_of(plate: ritz.Plate, setups: Sequence[Setup], **inputs: Quantity) -> 
             lengths[f"length_{edge[0]}"] += length.mean
     exact = {**lengths, "thickness": plate.h, "density": plate.rho, "poisson_xy": plate.nu_xy}
     stated = {n: Quantity.exact(v) for n, v in exact.items() if n != "density" or "mass" not in inputs}
-    board = made_board("made", stated | {n: q for n, q in inputs.items() if n in INPUTS}, setups)
+    board = make_board("made", stated | {n: q for n, q in inputs.items() if n in INPUTS}, setups)
     return board.with_priors({n: q for n, q in inputs.items() if n not in INPUTS})
 
 
@@ -95,6 +95,6 @@ def swapped(board: Board) -> Board:
         )
         for setup in board.setups
     )
-    own = {one.name: one.prior for one in board.parameters if one.owner == BOARD}
+    own = {one.name: one.prior for one in board.parameters if one.owner == BOARD_OWNER}
     own["length_x"], own["length_y"] = own["length_y"], own["length_x"]
-    return made_board(board.name, own, setups, prior=board.prior, effects=board.effects)
+    return make_board(board.name, own, setups, prior=board.prior, effects=board.effects)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.io import wavfile
 
 from bayesplate.errors import InputError
-from bayesplate.recordings.picking import Picked
+from bayesplate.recordings.picking import PickedModes
 from bayesplate.recordings.reading import read_recordings
 
 Floats = NDArray[np.float64]
@@ -148,7 +148,7 @@ def refusal(call: Callable[..., Any], *arguments: Any, **options: Any) -> str:
     return ""
 
 
-def likely_below(found: Picked, hertz: float) -> Floats:
+def likely_below(found: PickedModes, hertz: float) -> Floats:
     """Frequencies of the likely modes below a limit, Hz."""
     return np.array([mode.hz for mode in found.likely if mode.hz < hertz])
 

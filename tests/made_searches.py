@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from made_boards import setup_of
 
-from bayesplate.board.board import made_board
-from bayesplate.board.parameter import BOARD, Parameter
+from bayesplate.board.board import make_board
+from bayesplate.board.parameter import BOARD_OWNER, Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Reading
 from bayesplate.board.setup import Setup
@@ -18,14 +18,14 @@ from bayesplate.diagnosis.forms import Form
 from bayesplate.diagnosis.hypotheses import RELABELLING, Hypothesis, Swap
 from bayesplate.diagnosis.laws import FormLaw
 from bayesplate.diagnosis.null_control import NullControl
-from bayesplate.diagnosis.search import Candidate, Ground, SearchResult
-from bayesplate.diagnosis.shifts import Cells, nothing, together
+from bayesplate.diagnosis.search import Candidate, SearchGround, SearchResult
+from bayesplate.diagnosis.shifts import Cells, combine_cells, no_effect_cells
 from bayesplate.diagnosis.signatures import signature
 from bayesplate.diagnosis.terms import NoiseGrid, noise_grid
-from bayesplate.diagnosis.verdict import Verdict, decide
+from bayesplate.diagnosis.verdict import Verdict, decide_verdict
 from bayesplate.frequencies.laws import cents
 from bayesplate.labels import Label
-from bayesplate.plate.naming import Place
+from bayesplate.plate.naming import ModePlace
 
 FREE = {"x0": "free", "x1": "free", "y0": "free", "y1": "free"}
 NOISE = 0.005
@@ -57,10 +57,10 @@ def baseline(
     )
     shares = rng.dirichlet(np.full(3, 0.7), size=n_modes)
     inputs = {"thickness": Quantity.exact(3e-3), "poisson_xy": Quantity.exact(0.4)}
-    places = tuple(Place(parity, 0, 1.0) for parity in parities or [(0, 0)] * n_modes)
+    places = tuple(ModePlace(parity, 0, 1.0) for parity in parities or [(0, 0)] * n_modes)
     log_frequency, slopes = np.log(hertz), 0.5 * shares
     return Baseline(
-        board=made_board("made", inputs, setups),
+        board=make_board("made", inputs, setups),
         values={name: np.asarray(v) for name, v in {"D_x": 30.0, "D_y": 2.0, "D_s": 5.0}.items()}
         | {name: np.asarray(q.mean) for name, q in inputs.items()},
         log_rigidities=LOG_RIGIDITIES,
@@ -118,14 +118,14 @@ def one_level(base: Baseline, noise: float = NOISE) -> NoiseGrid:
     return NoiseGrid(np.full((1, len(base.board.setups)), noise), np.ones(1))
 
 
-def ground_of(base: Baseline, *found: Hypothesis, candidates: Mapping[str, Candidate] | None = None) -> Ground:
+def ground_of(base: Baseline, *found: Hypothesis, candidates: Mapping[str, Candidate] | None = None) -> SearchGround:
     """A search ground of given hypotheses."""
-    return Ground(base, candidates or {}, found)
+    return SearchGround(base, candidates or {}, found)
 
 
 def bare(base: Baseline, noise: NoiseGrid, prior: float = 0.5) -> Hypothesis:
     """The hypothesis that nothing is lacking."""
-    return Hypothesis((), prior, nothing(base.n_modes), noise, base)
+    return Hypothesis((), prior, no_effect_cells(base.n_modes), noise, base)
 
 
 def singles(
@@ -148,7 +148,7 @@ def found_among(
     return SearchResult(ground_of(base, *hypotheses, candidates=effects), residual, np.log(shares + 1e-300), shares)
 
 
-def left_out(ground: Ground, index: int, residual: np.ndarray) -> np.ndarray:
+def left_out(ground: SearchGround, index: int, residual: np.ndarray) -> np.ndarray:
     """Errors of predicting each reading from the other modes under one hypothesis: (n_modes,) array, ln f."""
     one = ground.hypotheses[index]
     return one.terms.left_out(one.seen(ground.baseline, residual[None, :]))[1][:, 0]
@@ -171,7 +171,7 @@ def candidate(
     n_coarse: int = 9,
 ) -> Candidate:
     """An effect whose shift is a direction times its size, one parameter with a given prior."""
-    free = Parameter("size", BOARD, prior, "1", 0.0, effect=name)
+    free = Parameter("size", BOARD_OWNER, prior, "1", 0.0, effect=name)
     law = MadeLaw(Form(name, "", base.board, (free,)), (), direction=direction)
     fine, coarse = (_along(base, direction, prior, n) for n in (n_cells, n_coarse))
     shift = direction * float(prior.value(1.0))
@@ -197,8 +197,8 @@ def found_with(
     effects = {name: candidate(base, name, one, prior) for name, one in zip(names, directions, strict=True)}
     first, second, *_ = effects.values()
     every, swap = singles(base, effects), Swap(1, 2)
-    levels, both = every[0].noise, together(first.coarse, second.coarse)
-    every += [Hypothesis((RELABELLING,), 0.1, nothing(n_modes), levels, swap.applied(base), swap)]
+    levels, both = every[0].noise, combine_cells(first.coarse, second.coarse)
+    every += [Hypothesis((RELABELLING,), 0.1, no_effect_cells(n_modes), levels, swap.applied(base), swap)]
     every += [Hypothesis((first.name, second.name), 0.1, both, levels, base)]
     residual = visible_of(first) if residual is None else residual
     return found_among(base, effects, every, [probability.get(one.members, 0.0) for one in every], residual)
@@ -258,4 +258,4 @@ def decided(
     found: SearchResult, control: NullControl = CERTAIN, others: Sequence[tuple[str, SearchResult]] = ()
 ) -> Verdict:
     """The verdict by the given probabilities alone, which need not be those of the readings."""
-    return decide(found, control, others)
+    return decide_verdict(found, control, others)

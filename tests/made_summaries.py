@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from bayesplate.results.contract import JOINT, Elastic, Joint, Rigidity, Spread
-from bayesplate.results.modes import AssignedPeak, Assignment, ModeRow, PredictedMode, Prediction, Spectrum, over
+from bayesplate.results.contract import JOINT_NAMES, Elastic, JointMoments, Rigidity, Spread
+from bayesplate.results.modes import AssignedPeak, Assignment, ModeRow, PredictedMode, Prediction, Spectrum, ratio_cents
 from bayesplate.results.summary import (
     ErrorFigures,
     LawMeans,
@@ -32,9 +32,9 @@ def mode(label: str, measured: float, predicted: float, half_width: float, **cha
         label=label,
         measured_hz=measured,
         predicted_hz=Prediction(predicted, low, high),
-        residual_cents=over(measured, predicted),
-        residual_interval_cents=(over(measured, high), over(measured, low)),
-        rounding_cents=(over(measured - 0.5, measured), over(measured + 0.5, measured)),
+        residual_cents=ratio_cents(measured, predicted),
+        residual_interval_cents=(ratio_cents(measured, high), ratio_cents(measured, low)),
+        rounding_cents=(ratio_cents(measured - 0.5, measured), ratio_cents(measured + 0.5, measured)),
         left_out_cents=12.25,
         leverage=0.5,
         label_correlation=0.99,
@@ -66,7 +66,7 @@ SUMMARY = Summary(
     noise={"bench": spread(0.005, 0.001, "1")},
     inputs={"thickness": spread(3e-3, 5e-5, "m")},
     derived={name: spread(value, value / 50, "1") for name, value in DERIVED.items()},
-    joint=Joint(JOINT, (0.0,) * 7, ((0.0,) * 7,) * 7),
+    joint=JointMoments(JOINT_NAMES, (0.0,) * 7, ((0.0,) * 7,) * 7),
     least_squares=POINT,
     weighted_least_squares=WEIGHTED,
     percentile=Percentile(
@@ -87,7 +87,7 @@ SUMMARY = Summary(
             (Assignment("(3,1)", 0.75), Assignment("(2,2)", 0.125)),
             0.125,
             Prediction(850.0, 845.0, 855.0),
-            over(860.0, 850.0),
+            ratio_cents(860.0, 850.0),
         ),
     ),
     spectra=(

@@ -424,12 +424,12 @@ def test_a_reader_that_stops_early_is_no_error():
 WORK = """
 from bayesplate.errors import InputError
 from bayesplate.posterior.sampling import Progress
-from bayesplate.terminal import progress_line, reporting, say
-with reporting(as_json=False, debug=True):
+from bayesplate.terminal import exit_on_error, print_text, progress_line
+with exit_on_error(as_json=False, debug=True):
     with progress_line(shown=True) as tell:
         for stage in "first", "second":
             tell(Progress(0, 0, stage=stage, done=0.5))
-    say("done")
+    print_text("done")
     raise InputError("refused")
 """
 needs_a_full_device = pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")

@@ -11,7 +11,7 @@ import pytest
 from runs import files_in, sample_loosely
 
 from bayesplate.commands.shown import show_fit
-from bayesplate.terminal import print_shown
+from bayesplate.terminal import print_tables
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -48,7 +48,7 @@ def test_the_readme_runs_writes_nothing_and_prints_what_a_terminal_of_80_columns
 
     assert capsys.readouterr().out.split() == [str(summary.elastic.E_x.mean), str(summary.elastic.E_x.sd)]
     assert files_in(used) == USED
-    print_shown(show_fit(summary))
+    print_tables(show_fit(summary))
     assert [line.rstrip() for line in capsys.readouterr().out.splitlines()] == block.splitlines()
 
 

@@ -1,1 +1,1 @@
-"""What lies on the bench, in SI units: the board, its setups and readings, its prior, and the cards that state them."""
+"""Boards in SI units: the board, its setups and readings, its prior, and the cards that state them."""

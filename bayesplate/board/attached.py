@@ -1,4 +1,4 @@
-"""What stands on or around a board: a sensor, an exciter or a weight, and the air or the water."""
+"""Items attached to a board, a sensor, an exciter or a weight, and the fluid around it, air or water."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from pydantic import ConfigDict, Field, ValidationInfo, field_validator
 
 from bayesplate.board.measures import PLACES, Place, QuantityReader
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.repeated import FINE_SCALES, FURTHEST_FREQUENCIES, FURTHEST_SIZES
-from bayesplate.board.stated import is_place, quantity_of, wrong_types
+from bayesplate.board.repeated import FINE_SCALES, LARGEST_FREQUENCY_RATIO, LARGEST_SIZE_RATIO
+from bayesplate.board.stated import is_place, quantity_of, type_faults
 from bayesplate.board.values import Choice, Complaint, Key, Number, Refusal
-from bayesplate.board.words import ATTACHED_KINDS, BAFFLES, MAGNETS, quoted
+from bayesplate.board.words import ATTACHED_KINDS, BAFFLES, MAGNETS, quote_text
 from bayesplate.errors import InputError
 
-_MASS = QuantityReader(Number(1e-4, 1e6, "g"), furthest=FURTHEST_SIZES, resolution=FINE_SCALES).key
-_SUSPENSION = QuantityReader(Number(0.1, 1e8, "N/m", "1 N/mm is 1000 N/m"), furthest=FURTHEST_SIZES).key
-_RESONANCE = QuantityReader(Number(0.1, 10_000, "Hz"), furthest=FURTHEST_FREQUENCIES).key
+_MASS = QuantityReader(Number(1e-4, 1e6, "g"), furthest=LARGEST_SIZE_RATIO, resolution=FINE_SCALES).key
+_SUSPENSION = QuantityReader(Number(0.1, 1e8, "N/m", "1 N/mm is 1000 N/m"), furthest=LARGEST_SIZE_RATIO).key
+_RESONANCE = QuantityReader(Number(0.1, 10_000, "Hz"), furthest=LARGEST_FREQUENCY_RATIO).key
 _DENSITY = QuantityReader(Number(1e-6, 2000, "kg/m3", "air at the ground is 1.2 kg/m3, water is 997")).key
 
 
@@ -58,7 +58,7 @@ class AttachedItem:
 
     def __post_init__(self) -> None:
         if not isinstance(self.places, list | tuple) or not all(map(is_place, self.places)):
-            raise InputError(wrong_types(str(self.kind), [("places", self.places, False, "((x, y), ...) in m")]))
+            raise InputError(type_faults(str(self.kind), [("places", self.places, False, "((x, y), ...) in m")]))
         for name, unit in (("mass", "kg"), ("coil", "kg"), ("suspension", "N/m"), ("resonance", "Hz")):
             stated = getattr(self, name)
             if stated is not None:
@@ -70,7 +70,7 @@ class AttachedItem:
         kind = info.data.get("kind", "exciter")
         if kind != "exciter":
             remedy = 'leave it out, or kind = "exciter" if it drives the board by a coil'
-            raise Refusal(Complaint("it on an exciter only", f"a thing of kind {quoted(kind)}", remedy))
+            raise Refusal(Complaint("it on an exciter only", f"a thing of kind {quote_text(kind)}", remedy))
         return value
 
     @field_validator("resonance")

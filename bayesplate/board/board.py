@@ -14,16 +14,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from bayesplate.board.board_keys import BoardKeys, MaterialKeys, PlateKeys, read_board
 from bayesplate.board.coefficients import CoefficientCard
-from bayesplate.board.inputs import INPUTS, KINDS, parameters_of, unknown_name, usual_poisson, warps_of
+from bayesplate.board.inputs import (
+    DENSITY_KINDS,
+    INPUTS,
+    default_poisson,
+    input_parameters,
+    unknown_name_fault,
+    warp_quantities,
+)
 from bayesplate.board.material import ISOTROPIC, ORTHOTROPIC, Symmetry
-from bayesplate.board.parameter import BOARD, Parameter
+from bayesplate.board.parameter import BOARD_OWNER, Parameter
 from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.board.shelf import CardFile
-from bayesplate.board.stated import are, quantities_of, wrong_types
-from bayesplate.board.unstatable import unstatable
-from bayesplate.board.words import effect_named
+from bayesplate.board.stated import are_instances, quantities_of, type_faults
+from bayesplate.board.unstatable import unstatable_faults
+from bayesplate.board.words import canonical_effect
 from bayesplate.board.writing import toml_text, write_card
 from bayesplate.errors import InputError
 
@@ -52,13 +59,13 @@ class Board:
     effects : tuple of str
         Declared effects.
     implies : bool
-        Whether what is stated of the board (a sensor's mass, the fluid, a bounce) declares effects beside these; an
-        empty list of effects that somebody wrote down says that it does not.
+        Whether stated data of the board (a sensor's mass, the fluid, a bounce) declare effects beside these; an empty
+        list of effects on the card declares none.
     chosen : tuple
-        Effects (`bayesplate.effects.Effect`) in another form than the card itself would give them.
+        Effects (`bayesplate.effects.Effect`) in another form than that of the card.
     shear_xz, shear_yz : Quantity or None, Pa
     warp : dict of Quantity, m
-        What a straightedge tells of a board that is not flat, as far as it was stated: "cup", the rise across the
+        Straightedge readings of a board that is not flat, as far as stated: "cup", the rise across the
         width; "bow", that along the length, negative on a saddle; "twist", a corner's lift off a table that the other
         three touch.
     isotropic : bool
@@ -66,7 +73,7 @@ class Board:
     notes : tuple of str
         What was assumed because the card does not say it.
     card : CardFile or None
-        Where it was read, or the board that it was made of; None if it was made in Python.
+        The card it was read from, or that of the board it was made from; None if it was made in Python.
     """
 
     name: str
@@ -86,7 +93,7 @@ class Board:
     card: CardFile | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "effects", tuple(map(effect_named, self.effects)))
+        object.__setattr__(self, "effects", tuple(map(canonical_effect, self.effects)))
 
     @property
     def symmetry(self) -> Symmetry:
@@ -110,11 +117,11 @@ class Board:
 
     def parameter(self, name: str) -> Parameter:
         """The parameter of a name; raises InputError with the names that there are."""
-        return _named("parameter", name, self.parameters)
+        return _find_by_name("parameter", name, self.parameters)
 
     def setup(self, name: str) -> Setup:
         """The setup of a name; raises InputError with the names that there are."""
-        return _named("setup", name, self.setups)
+        return _find_by_name("setup", name, self.setups)
 
     def nominal(self) -> dict[str, NDArray[np.float64]]:
         """Mean of every parameter."""
@@ -128,31 +135,38 @@ class Board:
     def with_priors(self, priors: Mapping[str, Quantity | ArrayLike]) -> Board:
         """The board with other priors of some of its parameters, by their names; numbers as in `from_numbers`."""
         if not isinstance(priors, Mapping):
-            raise InputError(wrong_types(self.name, [("priors", priors, False, "a dict of quantities by name")]))
-        faults = [unknown_name("priors", name, self.inputs) for name in priors if name not in self.inputs]
-        stated, unread = quantities_of(priors, "priors", "SI", KINDS)
-        if faults or unread:
-            raise InputError([*faults, *unread])
+            raise InputError(type_faults(self.name, [("priors", priors, False, "a dict of quantities by name")]))
+        faults = [unknown_name_fault("priors", name, self.inputs) for name in priors if name not in self.inputs]
+        quantities, quantity_faults = quantities_of(priors, "priors", "SI", DENSITY_KINDS)
+        if faults or quantity_faults:
+            raise InputError([*faults, *quantity_faults])
         return replace(
             self,
             parameters=tuple(
-                replace(one, prior=stated[one.name], assumed=None) if one.name in stated else one
-                for one in self.parameters
+                replace(parameter, prior=quantities[parameter.name], assumed=None)
+                if parameter.name in quantities
+                else parameter
+                for parameter in self.parameters
             ),
             setups=tuple(
-                replace(one, clamped={e: stated.get(one.input_name(e), length) for e, length in one.clamped.items()})
-                for one in self.setups
+                replace(
+                    setup,
+                    clamped={
+                        edge: quantities.get(setup.input_name(edge), length) for edge, length in setup.clamped.items()
+                    },
+                )
+                for setup in self.setups
             ),
         )
 
     def without(self, effects: Collection[str]) -> Board:
         """The board without some of its declared effects, by their names."""
-        effects = {*map(effect_named, effects)}
+        effects = {*map(canonical_effect, effects)}
         return replace(
             self,
             effects=tuple(name for name in self.effects if name not in effects),
-            chosen=tuple(one for one in self.chosen if one.name not in effects),
-            parameters=tuple(one for one in self.parameters if one.effect not in effects),
+            chosen=tuple(effect for effect in self.chosen if effect.name not in effects),
+            parameters=tuple(parameter for parameter in self.parameters if parameter.effect not in effects),
         )
 
     @classmethod
@@ -178,7 +192,7 @@ class Board:
     ) -> Board:
         """A board from numbers, arrays and quantities in SI units: a number is exact, an array holds readings.
 
-        What is wrong with it is said with the place on a card, when the board is used: `bayesplate.check(board)`.
+        Further faults are reported with their place on a card when the board is used: `bayesplate.check(board)`.
 
         Parameters
         ----------
@@ -193,9 +207,9 @@ class Board:
             By default that of the prior that the board is used with, where it states one, else 0.4 ± 0.08, or
             0.3 ± 0.06 where the board is isotropic.
         prior : str, path or PriorCard
-            Name of a shipped prior card, a path, or the card itself; a card that is not on the shelf is given again to
-            what uses the board: `Problem.from_card(board, prior=prior)`. What is not stated of noise and Poisson ratio
-            is taken from the prior that is given there.
+            Name of a shipped prior card, a path, or the card itself; a card that is not on the shelf must be passed
+            again where the board is used: `Problem.from_card(board, prior=prior)`. Noise and Poisson ratio that are not
+            stated come from that prior.
         effects : sequence of str, optional
             Declared effects, beside those that are implied by what is stated; an empty list declares nothing at all.
         shear_xz, shear_yz : Quantity, number or array of readings, Pa
@@ -224,11 +238,11 @@ class Board:
         >>> board.inputs["thickness"].mean
         0.003
         """
-        faults = list(wrong_types(str(name), (
+        faults = list(type_faults(str(name), (
             ("name", name, isinstance(name, str), "a text"),
-            ("setups", setups, isinstance(setups, Setup) or are(setups, Setup), "a Setup or a list of them"),
+            ("setups", setups, isinstance(setups, Setup) or are_instances(setups, Setup), "a Setup or a list of them"),
             ("prior", prior, isinstance(prior, str | os.PathLike | PriorCard), "a name, a path or a PriorCard"),
-            ("effects", effects, effects is None or are(effects, str), "a list of names of effects"),
+            ("effects", effects, effects is None or are_instances(effects, str), "a list of names of effects"),
             ("isotropic", isotropic, isinstance(isotropic, bool), "True or False"),
             ("title", title, isinstance(title, str), "a text"),
             ("source", source, isinstance(source, str), "a text"),
@@ -239,19 +253,19 @@ class Board:
             "poisson_xy": poisson_xy, "shear_xz": shear_xz, "shear_yz": shear_yz,
         }  # fmt: skip
         needed = ("length_x", "length_y", "thickness")
-        values = {key: one for key, one in stated.items() if one is not None or key in needed}
-        quantities, unread = quantities_of(values, str(name), "SI", KINDS)
-        warps, faulty = warps_of(warp, str(name)) if isinstance(warp, Mapping) else ({}, [])
-        unread += faulty
-        if faults or unread:
-            raise InputError([*faults, *unread])
+        values = {key: value for key, value in stated.items() if value is not None or key in needed}
+        quantities, quantity_faults = quantities_of(values, str(name), "SI", DENSITY_KINDS)
+        warps, warp_faults = warp_quantities(warp, str(name)) if isinstance(warp, Mapping) else ({}, [])
+        quantity_faults += warp_faults
+        if faults or quantity_faults:
+            raise InputError([*faults, *quantity_faults])
         card = prior if isinstance(prior, PriorCard) else load_prior(prior)
         shear = {key: quantities.pop(key, None) for key in ("shear_xz", "shear_yz")}
-        return made_board(
+        return make_board(
             name,
             quantities,
             (setups,) if isinstance(setups, Setup) else tuple(setups),
-            assumed_poisson=None if "poisson_xy" in quantities else usual_poisson(isotropic),
+            assumed_poisson=None if "poisson_xy" in quantities else default_poisson(isotropic),
             prior=prior.name if isinstance(prior, PriorCard) else os.fspath(prior),
             effects=tuple(effects or ()),
             implies=effects is None or bool(effects),
@@ -306,11 +320,11 @@ class Board:
         keys, card = read_board(card, may_lack_frequencies, setup)
         plate, material = keys.plate, keys.material
         inputs = {**dict(plate), "poisson_xy": material.poisson_xy}
-        return made_board(
+        return make_board(
             keys.name,
             {key: inputs[key] for key in INPUTS if inputs[key] is not None},
-            [Setup.from_keys(one) for one in keys.setups],
-            assumed_poisson=usual_poisson(material.isotropic) if material.poisson_xy is None else None,
+            [Setup.from_keys(setup_keys) for setup_keys in keys.setups],
+            assumed_poisson=default_poisson(material.isotropic) if material.poisson_xy is None else None,
             title=keys.title,
             source=keys.source,
             prior=material.prior,
@@ -324,24 +338,29 @@ class Board:
         )
 
     def assuming(self, prior: PriorCard | None, tables: Mapping[str, CoefficientCard] | None = None) -> Board:
-        """The board with noise and Poisson ratio of a prior where nobody stated them, and coefficient tables."""
-        poisson = (prior and prior.poisson_xy) or usual_poisson(self.isotropic)
-        setups = [one.assuming_noise(prior) if one.is_noise_assumed else one for one in self.setups]
+        """The board with the noise and Poisson ratio of a prior where it states none, and coefficient tables."""
+        poisson = (prior and prior.poisson_xy) or default_poisson(self.isotropic)
+        setups = [setup.assuming_noise(prior) if setup.is_noise_assumed else setup for setup in self.setups]
         if tables is not None:
-            setups = [replace(one, published_coefficients=tables.get(one.name), table_name="") for one in setups]
+            setups = [replace(setup, published_coefficients=tables.get(setup.name), table_name="") for setup in setups]
         return replace(
             self,
             setups=tuple(setups),
             parameters=tuple(
-                replace(one, prior=poisson, assumed=poisson) if one.is_assumed else one for one in self.parameters
+                replace(parameter, prior=poisson, assumed=poisson) if parameter.is_assumed else parameter
+                for parameter in self.parameters
             ),
         )
 
     def table(self) -> dict[str, Any]:
         """The table of its card; raises InputError if a quantity has a density that no card can state."""
-        own = [one for one in self.parameters if one.owner == BOARD and not one.is_of_effect and not one.is_assumed]
-        inputs = {one.name: one.prior for one in own}
-        faults = [*unstatable(self)]
+        stated_parameters = [
+            parameter
+            for parameter in self.parameters
+            if parameter.owner == BOARD_OWNER and not parameter.is_of_effect and not parameter.is_assumed
+        ]
+        inputs = {parameter.name: parameter.prior for parameter in stated_parameters}
+        faults = [*unstatable_faults(self)]
         if faults:
             raise InputError(faults)
         poisson_xy = inputs.pop("poisson_xy", None)
@@ -355,7 +374,7 @@ class Board:
             plate=PlateKeys.model_construct(None, **inputs, warp=self.warp),
             material=MaterialKeys.model_construct(poisson_xy=poisson_xy, **material, prior=self.prior),
         )
-        setups = [one.table() for one in self.setups]
+        setups = [setup.table() for setup in self.setups]
         return {
             **keys.model_dump(by_alias=True, exclude_defaults=True, exclude={"setups"}),
             "setup": setups[0] if len(setups) == 1 else setups,
@@ -420,21 +439,21 @@ class Board:
 Named = TypeVar("Named", Parameter, Setup)
 
 
-def _named(place: str, name: str, among: Iterable[Named]) -> Named:
-    by_name = {one.name: one for one in among}
+def _find_by_name(place: str, name: str, items: Iterable[Named]) -> Named:
+    by_name = {item.name: item for item in items}
     if name not in by_name:
-        raise InputError(unknown_name(place, name, by_name))
+        raise InputError(unknown_name_fault(place, name, by_name))
     return by_name[name]
 
 
-def assumed_notes(board: Board) -> tuple[str, ...]:
+def poisson_notes(board: Board) -> tuple[str, ...]:
     """A sentence on the Poisson ratio if it was assumed."""
     nu = board.parameter("poisson_xy")
-    told = f"nu_xy = {nu.prior.mean:g} ± {nu.prior.sd:g} was assumed"
-    return (f"the card gives no Poisson ratio: {told}",) if nu.is_assumed else ()
+    value = f"nu_xy = {nu.prior.mean:g} ± {nu.prior.sd:g} was assumed"
+    return (f"the card gives no Poisson ratio: {value}",) if nu.is_assumed else ()
 
 
-def made_board(
+def make_board(
     name: str,
     inputs: Mapping[str, Quantity],
     setups: Sequence[Setup],
@@ -442,10 +461,10 @@ def made_board(
     **more: Any,
 ) -> Board:
     """A board from quantities in SI units, without a card; `more` are other attributes of `Board`."""
-    return Board(name, parameters_of(inputs, setups, assumed_poisson), tuple(setups), **more)
+    return Board(name, input_parameters(inputs, setups, assumed_poisson), tuple(setups), **more)
 
 
-def density(values: Values) -> NDArray[np.float64]:
+def board_density(values: Values) -> NDArray[np.float64]:
     """Density of the board from the values of its inputs, kg m^-3."""
     if "density" in values:
         return np.asarray(values["density"])
@@ -456,6 +475,6 @@ def vibrating_lengths(values: Values, setup: Setup) -> tuple[NDArray[np.float64]
     """Side lengths left free by the clamps of a setup, m."""
     sides = []
     for axis in ("x", "y"):
-        covered = sum(values[setup.input_name(e)] for e in setup.clamped if e.startswith(axis))
+        covered = sum(values[setup.input_name(edge)] for edge in setup.clamped if edge.startswith(axis))
         sides.append(np.asarray(values[f"length_{axis}"] - covered))
     return sides[0], sides[1]

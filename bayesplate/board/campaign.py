@@ -9,40 +9,40 @@ from typing import Annotated, Any, Literal, TypeGuard, get_args
 
 from pydantic import Field, PrivateAttr
 
-from bayesplate.board.schema import Card, Section, place, validated
+from bayesplate.board.schema import BaseCard, Section, fault_place, validate_card
 from bayesplate.board.shelf import CardFile, card_names
-from bayesplate.board.toml import read_file, read_table
+from bayesplate.board.toml import parse_toml, read_file
 from bayesplate.board.values import (
+    CardReference,
     Choice,
     Complaint,
     Key,
     Number,
-    Reference,
     Refusal,
     Text,
-    one_or_more,
-    read_each,
+    list_of_tables,
     read_effect,
     read_effects,
+    read_items,
     read_list,
     read_reference,
 )
-from bayesplate.board.words import effect_named, quoted
-from bayesplate.errors import Fault, plain
+from bayesplate.board.words import canonical_effect, quote_text
+from bayesplate.errors import Fault, printable
 
 FEWEST_BOARDS, MOST_BOARDS = 2, 200
 MOST_SHARED = 10
-Way = Literal["value", "ratio"]
+SharingKind = Literal["value", "ratio"]
 
 
 def _read_boards(value: object) -> tuple[str, ...]:
     """Names of board cards, or paths relative to this card."""
-    boards = read_each(enumerate(read_list(value, "boards", MOST_BOARDS)), read_reference)
+    boards = read_items(enumerate(read_list(value, "boards", MOST_BOARDS)), read_reference)
     if len(boards) < FEWEST_BOARDS:
         raise Refusal(Complaint("at least two boards", str(len(boards)), "bayesplate fit takes a single board's card"))
-    twice = [board for i, board in enumerate(boards) if board in boards[:i]]
-    if twice:
-        raise Refusal(Complaint("each board once", f"{quoted(twice[0])} again"))
+    repeated = [board for i, board in enumerate(boards) if board in boards[:i]]
+    if repeated:
+        raise Refusal(Complaint("each board once", f"{quote_text(repeated[0])} again"))
     return tuple(boards)
 
 
@@ -50,24 +50,24 @@ class SharedSection(Section):
     """An effect whose parameters all boards have in common: their values, or their ratios to the boards' moduli."""
 
     effect: Annotated[str, Key(read_effect)] = Field(description="the name of an effect")
-    way: Annotated[Way, Key(Choice(get_args(Way)))] = Field(default="value", alias="as")
-    scatter_percent: Annotated[float, Key(Number(0.1, 100, "%"))] = 0.0  # scale by which a board's own may differ
+    way: Annotated[SharingKind, Key(Choice(get_args(SharingKind)))] = Field(default="value", alias="as")
+    scatter_percent: Annotated[float, Key(Number(0.1, 100, "%"))] = 0.0  # scale of the differences between boards
 
 
 class PopulationSection(Section):
-    """That the boards' constants share a distribution, and what is believed of it before measuring."""
+    """The distribution that the boards' constants share: its prior."""
 
-    prior: Reference = Field(description="a card of models/priors")
+    prior: CardReference = Field(description="a card of models/priors")
 
 
-class CampaignCard(Card):
+class CampaignCard(BaseCard):
     """Boards and what they share. `load_campaign` makes one."""
 
     source: Text = ""
     notes: Text = ""
     boards: Annotated[tuple[str, ...], Key(_read_boards)] = Field(description="a list of board cards")
     effects: Annotated[tuple[str, ...], Key(read_effects)] = ()
-    shared: Annotated[tuple[SharedSection, ...], one_or_more("[[shared]] tables", MOST_SHARED)] = ()
+    shared: Annotated[tuple[SharedSection, ...], list_of_tables("[[shared]] tables", MOST_SHARED)] = ()
     population: PopulationSection | None = None
     _card: CardFile = PrivateAttr()
 
@@ -91,13 +91,13 @@ class CampaignCard(Card):
         return self._card.text
 
     def board_path(self, board: str) -> str | Path:
-        """What finds a board of the campaign: a shipped card's name, or a path from this card's folder."""
+        """Name or path of a board of the campaign: a shipped card's name, or a path from this card's folder."""
         return self.path.parent / board if board.endswith(".toml") else board
 
 
 def load_campaign(name_or_path: str | os.PathLike[str]) -> CampaignCard:
     """Read a campaign card, a shipped one by its name or a path; raises InputError with every fault at once."""
-    return validated(CampaignCard, CardFile.load("campaigns", name_or_path), _twice)
+    return validate_card(CampaignCard, CardFile.load("campaigns", name_or_path), _repeated_effect_faults)
 
 
 def is_campaign(name_or_path: object) -> TypeGuard[str | os.PathLike[str]]:
@@ -110,19 +110,19 @@ def is_campaign(name_or_path: object) -> TypeGuard[str | os.PathLike[str]]:
     if not (isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or any(mark in text for mark in "/\\")):
         return False
     try:
-        return "boards" in read_table(read_file(Path(text)), plain(Path(text).name))
+        return "boards" in parse_toml(read_file(Path(text)), printable(Path(text).name))
     except (ValueError, OSError):
         return False
 
 
-def _twice(table: Mapping[str, Any], file: str) -> list[Fault]:
-    """An effect is shared once, in one way."""
+def _repeated_effect_faults(table: Mapping[str, Any], file: str) -> list[Fault]:
+    """Faults of effects that are shared more than once."""
     shared = table.get("shared")
     entries = shared if isinstance(shared, list) else []
     effects = [entry.get("effect") if isinstance(entry, dict) else None for entry in entries]
-    names = [effect_named(name) if isinstance(name, str) else None for name in effects]
+    names = [canonical_effect(name) if isinstance(name, str) else None for name in effects]
     return [
-        Fault(place(file, table, ("shared", i, "effect")), "each effect once", f"{quoted(name)} again")
+        Fault(fault_place(file, table, ("shared", i, "effect")), "each effect once", f"{quote_text(name)} again")
         for i, name in enumerate(names)
         if name is not None and name in names[:i]
     ]

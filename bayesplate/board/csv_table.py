@@ -1,4 +1,4 @@
-"""A table of boards as CSV, comma between the cells; what other programs write instead is recognised and refused."""
+"""A table of boards as CSV with commas between the cells; other separators are recognised and refused."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import re
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from bayesplate.board.words import quoted
-from bayesplate.errors import Fault, InputError, plain
+from bayesplate.board.words import quote_text
+from bayesplate.errors import Fault, InputError, printable
 
 _SEPARATORS = {";": "semicolons", "\t": "tabs"}
-_FIRST_HALF, _SECOND_HALF = re.compile(r"\s*(?:\S+ )?\(\d{1,3}"), re.compile(r"\s*\d{1,3}\)(?: sd)?\s*")
+_LABEL_START, _LABEL_END = re.compile(r"\s*(?:\S+ )?\(\d{1,3}"), re.compile(r"\s*\d{1,3}\)(?: sd)?\s*")
 
 
-def csv_table(data: bytes, file: str) -> tuple[list[str], list[list[str]]]:
+def read_csv_table(data: bytes, file: str) -> tuple[list[str], list[list[str]]]:
     """Header and rows of a CSV file in UTF-8, empty rows included; raises InputError for anything else."""
-    rows = _rows(data, file)
+    rows = _read_rows(data, file)
     header = next((row for row in rows if any(map(str.strip, row))), None)
     if header is None:
         raise InputError(Fault(file, "a table with a header", "an empty file"))
@@ -26,7 +26,7 @@ def csv_table(data: bytes, file: str) -> tuple[list[str], list[list[str]]]:
     return [name.strip() for name in header], list(rows)
 
 
-def _rows(data: bytes, file: str) -> Iterator[list[str]]:
+def _read_rows(data: bytes, file: str) -> Iterator[list[str]]:
     try:
         stream = io.StringIO(data.decode("utf-8-sig"), newline="")
     except UnicodeDecodeError as error:
@@ -35,7 +35,7 @@ def _rows(data: bytes, file: str) -> Iterator[list[str]]:
     try:
         yield from csv.reader(stream, strict=True)
     except csv.Error as error:
-        raise InputError(Fault(file, "a CSV table, commas between its cells", plain(str(error)))) from None
+        raise InputError(Fault(file, "a CSV table, commas between its cells", printable(str(error)))) from None
 
 
 def _require_commas(header: Sequence[str], file: str) -> None:
@@ -48,8 +48,8 @@ def _require_commas(header: Sequence[str], file: str) -> None:
 
 def _require_whole_labels(header: Sequence[str], file: str) -> None:
     """The comma in a label without quotes divides it into two cells."""
-    divided = [f'"{one.strip()},{other.strip()}"' for one, other in pairwise(header)
-               if _FIRST_HALF.fullmatch(one) and _SECOND_HALF.fullmatch(other)]  # fmt: skip
-    if divided:
-        got, remedy = f"{len(divided)} without, each of them two cells", f"write {','.join(divided)}"
-        raise InputError(Fault(f"{file} header", f"labels in double quotes, {quoted('(1,1)')}", got, remedy))
+    labels = [f'"{cell.strip()},{next_cell.strip()}"' for cell, next_cell in pairwise(header)
+              if _LABEL_START.fullmatch(cell) and _LABEL_END.fullmatch(next_cell)]  # fmt: skip
+    if labels:
+        got, remedy = f"{len(labels)} without, each of them two cells", f"write {','.join(labels)}"
+        raise InputError(Fault(f"{file} header", f"labels in double quotes, {quote_text('(1,1)')}", got, remedy))

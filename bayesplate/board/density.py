@@ -12,18 +12,18 @@ from scipy.special import log_ndtr, ndtr, ndtri
 
 from bayesplate.arrays import Floats
 
-Kind = Literal["normal", "log-normal", "log-uniform"]
-_BETWEEN = math.nextafter(0.0, 1.0), math.nextafter(1.0, 0.0)
+DensityKind = Literal["normal", "log-normal", "log-uniform"]
+_OPEN_UNIT_INTERVAL = math.nextafter(0.0, 1.0), math.nextafter(1.0, 0.0)
 _LOG_ROOT_TWO_PI = 0.5 * math.log(2.0 * math.pi)
 
 
 @dataclass(frozen=True)
-class Density:
+class ProbabilityDensity:
     """A number and its uncertainty as a density; an exact one, sd = 0, has one value at every coordinate."""
 
     mean: float
     sd: float = 0.0
-    kind: Kind = "log-normal"
+    kind: DensityKind = "log-normal"
     lower: float = -math.inf
     upper: float = math.inf
 
@@ -98,9 +98,9 @@ class Density:
         if self.kind == "log-uniform":
             share = np.log(np.clip(number, self.lower, self.upper) / self.lower) / math.log(self.upper / self.lower)
             return np.asarray(ndtri(share))[()]
-        positive = number > 0
-        ratio = np.where(positive, number, self.median) / self.median
-        return np.where(positive, np.log(ratio) / self.log_sd, -np.inf)[()]
+        is_positive = number > 0
+        ratio = np.where(is_positive, number, self.median) / self.median
+        return np.where(is_positive, np.log(ratio) / self.log_sd, -np.inf)[()]
 
     def log_prior(self, z: ArrayLike) -> Floats:
         """Logarithm of the density of z, normalised over the part within the bounds.
@@ -119,8 +119,8 @@ class Density:
         if self.is_exact or (self.lower == -math.inf and self.upper == math.inf):
             return np.asarray(density)[()]
         low, high = self.standard_bounds
-        inside = (coordinate >= low) & (coordinate <= high)
-        return np.where(inside, density - _log_probability(low, high), -np.inf)[()]
+        is_inside = (coordinate >= low) & (coordinate <= high)
+        return np.where(is_inside, density - _log_interval_probability(low, high), -np.inf)[()]
 
     @property
     def standard_bounds(self) -> tuple[float, float]:
@@ -151,9 +151,9 @@ class Density:
         number = np.asarray(value, dtype=np.float64)
         if self.kind == "normal":
             return np.asarray(self.log_prior(self.standard(number)) - math.log(self.sd))[()]
-        possible = number > 0
-        logarithm = np.log(np.where(possible, number, self.median))
-        return np.where(possible, self.log_density_of_log(logarithm) - logarithm, -np.inf)[()]
+        is_positive = number > 0
+        logarithm = np.log(np.where(is_positive, number, self.median))
+        return np.where(is_positive, self.log_density_of_log(logarithm) - logarithm, -np.inf)[()]
 
     def log_density_of_log(self, logarithm: ArrayLike) -> Floats:
         """Logarithm of the normalised density of the logarithm of a positive quantity.
@@ -174,12 +174,12 @@ class Density:
         """
         if self.is_exact or self.kind == "normal":
             raise ValueError("log_density_of_log: wanted the quantity of a positive thing, got an exact or normal one")
-        at = np.asarray(logarithm, dtype=np.float64)
+        log_value = np.asarray(logarithm, dtype=np.float64)
         if self.kind == "log-uniform":
             low, high = math.log(self.lower), math.log(self.upper)
-            return np.where((at >= low) & (at <= high), -math.log(high - low), -np.inf)[()]
+            return np.where((log_value >= low) & (log_value <= high), -math.log(high - low), -np.inf)[()]
         log_sd = self.log_sd
-        return np.asarray(self.log_prior((at - math.log(self.median)) / log_sd) - math.log(log_sd))[()]
+        return np.asarray(self.log_prior((log_value - math.log(self.median)) / log_sd) - math.log(log_sd))[()]
 
     def standard_quantile(self, probability: ArrayLike) -> Floats:
         """The standard coordinate below which the quantity lies with a given probability.
@@ -195,11 +195,13 @@ class Density:
         """
         share = np.asarray(probability, dtype=np.float64)
         low, high = self.standard_bounds
-        if low > 0:  # probabilities next to 1 have lost their digits: the same from the other end
-            above, beyond = float(ndtr(-low)), float(ndtr(-high))
-            return np.asarray(-ndtri(np.clip(beyond + (above - beyond) * (1.0 - share), *_BETWEEN)))[()]
-        below, within = float(ndtr(low)), float(ndtr(high))
-        return np.asarray(ndtri(np.clip(below + (within - below) * share, *_BETWEEN)))[()]
+        if low > 0:  # probabilities close to 1 lose digits: the same from the upper tail
+            above_lower, above_upper = float(ndtr(-low)), float(ndtr(-high))
+            return np.asarray(
+                -ndtri(np.clip(above_upper + (above_lower - above_upper) * (1.0 - share), *_OPEN_UNIT_INTERVAL))
+            )[()]
+        below_lower, below_upper = float(ndtr(low)), float(ndtr(high))
+        return np.asarray(ndtri(np.clip(below_lower + (below_upper - below_lower) * share, *_OPEN_UNIT_INTERVAL)))[()]
 
     def quantile(self, probability: ArrayLike) -> Floats:
         """The value below which the quantity lies with a given probability.
@@ -219,7 +221,7 @@ class Density:
         return np.asarray(self.quantile(rng.uniform(size=n)))
 
 
-def _log_probability(low: float, high: float) -> float:
+def _log_interval_probability(low: float, high: float) -> float:
     """Logarithm of the standard normal probability between two bounds, stable in both tails."""
     if low > 0:
         low, high = -high, -low

@@ -1,4 +1,4 @@
-"""A fragment of a card, its [setup], and the card that the two make together."""
+"""A fragment, a [setup] in a file of its own, merged into the table of a card."""
 
 from __future__ import annotations
 
@@ -9,57 +9,66 @@ from typing import Any
 
 from bayesplate.board.schema import sections_of
 from bayesplate.board.setup_keys import DEFAULT_SETUP_NAME, SetupKeys
-from bayesplate.board.toml import read_file, read_table
-from bayesplate.board.words import did_you_mean, quoted, shown
-from bayesplate.errors import Fault, InputError, plain
+from bayesplate.board.toml import parse_toml, read_file
+from bayesplate.board.words import did_you_mean, quote_text, show_value
+from bayesplate.errors import Fault, InputError, printable
 
-_READINGS = ("frequencies_hz", "signs", "label_confidence", "unlabelled_hz", "peaks")
-"""What was measured together: a fragment that has any of them replaces all that the card says of them."""
+_READING_KEYS = ("frequencies_hz", "signs", "label_confidence", "unlabelled_hz", "peaks")
+"""Keys of one measurement: a fragment that has any of them replaces all of the card's."""
 
 
-def merged(table: Mapping[str, Any], file: str, fragment: str | os.PathLike[str]) -> tuple[dict[str, Any], str]:
-    """The table of a card with the [setup] of a fragment in it, and what to call it in messages; raises InputError.
+def merge_fragment(table: Mapping[str, Any], file: str, fragment: str | os.PathLike[str]) -> tuple[dict[str, Any], str]:
+    """The table of a card with the [setup] of a fragment in it, and its name in messages; raises InputError.
 
-    It replaces the setup of its name, or the only one, key by key; one with a new name and edges joins them.
+    The fragment replaces keys of the setup of its name, or of the only setup; one with a new name and edges is added.
     """
     path = Path(fragment)
-    named = plain(path.name)
-    read = read_table(read_file(path), named)
-    own = read.get("setup")
-    if not isinstance(own, dict):
-        got = "several [[setup]]" if isinstance(own, list) else "none" if own is None else shown(own)
-        raise InputError(Fault(named, "one table [setup]", got, "bayesplate pick writes one"))
-    known = list(sections_of(SetupKeys)[()])
-    faults = [Fault(f"{named} {key}", "nothing but [setup]", "another key") for key in read if key != "setup"]
+    name = printable(path.name)
+    content = parse_toml(read_file(path), name)
+    setup = content.get("setup")
+    if not isinstance(setup, dict):
+        got = "several [[setup]]" if isinstance(setup, list) else "none" if setup is None else show_value(setup)
+        raise InputError(Fault(name, "one table [setup]", got, "bayesplate pick writes one"))
+    keys = list(sections_of(SetupKeys)[()])
+    faults = [Fault(f"{name} {key}", "nothing but [setup]", "another key") for key in content if key != "setup"]
     faults += [
-        Fault(f"{named} [setup] {key}", f"one of {', '.join(known)}", "an unknown key", did_you_mean(key, known))
-        for key in own
-        if key not in known
+        Fault(
+            f"{name} [setup] {key}",
+            f"one of {', '.join(keys)}",
+            "an unknown key",
+            did_you_mean(key, keys),
+        )
+        for key in setup
+        if key not in keys
     ]
     if faults:
         raise InputError(faults)
-    stated = table.get("setup", {})
-    setups = [dict(one) for one in (stated if isinstance(stated, list) else [stated]) if isinstance(one, dict)]
-    at = _which(setups, own, named, file)
-    if at is None:
-        setups = [{"name": DEFAULT_SETUP_NAME, **one} for one in setups] + [dict(own)]
+    card_setups = table.get("setup", {})
+    setups = [
+        dict(entry)
+        for entry in (card_setups if isinstance(card_setups, list) else [card_setups])
+        if isinstance(entry, dict)
+    ]
+    index = _setup_index(setups, setup, name, file)
+    if index is None:
+        setups = [{"name": DEFAULT_SETUP_NAME, **entry} for entry in setups] + [dict(setup)]
     else:
-        dropped = _READINGS if any(key in own for key in _READINGS) else ()
-        kept = {key: value for key, value in setups[at].items() if key not in dropped}
-        setups[at] = kept | own
-    whole = {**table, "setup": setups[0] if len(setups) == 1 else setups}
-    return whole, f"{file} with {named}"
+        dropped_keys = _READING_KEYS if any(key in setup for key in _READING_KEYS) else ()
+        kept_entries = {key: value for key, value in setups[index].items() if key not in dropped_keys}
+        setups[index] = kept_entries | setup
+    merged_table = {**table, "setup": setups[0] if len(setups) == 1 else setups}
+    return merged_table, f"{file} with {name}"
 
 
-def _which(setups: list[dict[str, Any]], own: Mapping[str, Any], named: str, file: str) -> int | None:
-    """The setup that a fragment goes into; None if it is one more."""
-    names = [one.get("name", DEFAULT_SETUP_NAME) for one in setups]
-    if own.get("name") in names:
-        return names.index(own["name"])
-    if "name" not in own and len(setups) == 1:
+def _setup_index(setups: list[dict[str, Any]], setup: Mapping[str, Any], fragment: str, file: str) -> int | None:
+    """Index of the setup that a fragment changes; None if the fragment is a further setup."""
+    names = [entry.get("name", DEFAULT_SETUP_NAME) for entry in setups]
+    if setup.get("name") in names:
+        return names.index(setup["name"])
+    if "name" not in setup and len(setups) == 1:
         return 0
-    if "name" in own and "edges" in own:
+    if "name" in setup and "edges" in setup:
         return None
-    wanted = f"the name of a setup of {file}: {', '.join(quoted(str(name)) for name in names)}"
-    got = shown(own["name"]) if "name" in own else "no name"
-    raise InputError(Fault(f"{named} [setup] name", wanted, got, "a new setup needs a name and its edges"))
+    wanted = f"the name of a setup of {file}: {', '.join(quote_text(str(name)) for name in names)}"
+    got = show_value(setup["name"]) if "name" in setup else "no name"
+    raise InputError(Fault(f"{fragment} [setup] name", wanted, got, "a new setup needs a name and its edges"))

@@ -9,10 +9,10 @@ from dataclasses import replace
 from numpy.typing import ArrayLike
 
 from bayesplate.board.board_keys import WARPS
-from bayesplate.board.density import Kind
-from bayesplate.board.parameter import BOARD, Parameter
+from bayesplate.board.density import DensityKind
+from bayesplate.board.parameter import BOARD_OWNER, Parameter
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.random_field import PlacedReadings, conditioned, thickness_readings, width_readings
+from bayesplate.board.random_field import PlacedReadings, condition_field, thickness_readings, width_readings
 from bayesplate.board.setup import Setup
 from bayesplate.board.stated import quantities_of
 from bayesplate.board.words import did_you_mean
@@ -26,19 +26,19 @@ INPUTS = {
     "density": ("kg/m^3", "density"),
     "poisson_xy": ("1", "Poisson ratio nu_xy"),
 }
-"""What a card states of a board: unit, and what people call it."""
-KINDS: Mapping[str, Kind] = {"poisson_xy": "normal"}
+"""Inputs of a board on its card: unit, and name in words."""
+DENSITY_KINDS: Mapping[str, DensityKind] = {"poisson_xy": "normal"}
 DEFAULT_POISSON = Quantity.from_mean(0.4, 0.08, "normal")
 ISOTROPIC_POISSON = Quantity.from_mean(0.3, 0.06, "normal")
 """Of an isotropic board: foams and glass lie near 0.2, most metals near 0.3, acrylic near 0.37."""
 
 
-def usual_poisson(is_isotropic: bool) -> Quantity:
-    """The usual Poisson ratio, of wood or of an isotropic board: an object of its own, see `Parameter.is_assumed`."""
+def default_poisson(is_isotropic: bool) -> Quantity:
+    """The default Poisson ratio, of wood or of an isotropic board: a new object, see `Parameter.is_assumed`."""
     return replace(ISOTROPIC_POISSON if is_isotropic else DEFAULT_POISSON)
 
 
-def parameters_of(
+def input_parameters(
     inputs: Mapping[str, Quantity], setups: Sequence[Setup], assumed_poisson: Quantity | None
 ) -> tuple[Parameter, ...]:
     """Inputs and clamped lengths as parameters, with an assumed Poisson ratio where none is stated.
@@ -46,38 +46,42 @@ def parameters_of(
     A thickness or a width that was read at places becomes the mean over the board of the field of the readings.
     """
     assumed = {} if assumed_poisson is None else {"poisson_xy": assumed_poisson}
-    stated = {**inputs, **_means_of_fields(inputs), **assumed}
-    own = (
-        Parameter(key, BOARD, prior, INPUTS[key][0], words=INPUTS[key][1], assumed=assumed.get(key))
+    stated = {**inputs, **_field_means(inputs), **assumed}
+    board_parameters = (
+        Parameter(key, BOARD_OWNER, prior, INPUTS[key][0], words=INPUTS[key][1], assumed=assumed.get(key))
         for key, prior in stated.items()
     )
-    return (*own, *(parameter for setup in setups for parameter in setup.clamped_parameters))
+    return (*board_parameters, *(parameter for setup in setups for parameter in setup.clamped_parameters))
 
 
-def _means_of_fields(inputs: Mapping[str, Quantity]) -> dict[str, Quantity]:
-    """Sizes that were read at places, with the mean of their field over the board; an exact mean stays."""
-    read: dict[str, PlacedReadings | None] = {}
+def _field_means(inputs: Mapping[str, Quantity]) -> dict[str, Quantity]:
+    """Sizes that were read at places, with the mean of their field over the board; exact sizes are left out."""
+    readings: dict[str, PlacedReadings | None] = {}
     if "length_y" in inputs and inputs["length_y"].has_profile:
-        read["length_y"] = width_readings(inputs["length_y"], inputs["length_x"])
+        readings["length_y"] = width_readings(inputs["length_y"], inputs["length_x"])
     if "thickness" in inputs and inputs["thickness"].has_profile:
-        read["thickness"] = thickness_readings(inputs["thickness"], inputs["length_x"], inputs["length_y"])
-    found = {name: conditioned(one) for name, one in read.items() if one is not None and not inputs[name].is_exact}
-    return {name: replace(inputs[name], mean=field.mean, sd=field.sd) for name, field in found.items()}
+        readings["thickness"] = thickness_readings(inputs["thickness"], inputs["length_x"], inputs["length_y"])
+    fields = {
+        name: condition_field(placed)
+        for name, placed in readings.items()
+        if placed is not None and not inputs[name].is_exact
+    }
+    return {name: replace(inputs[name], mean=field.mean, sd=field.sd) for name, field in fields.items()}
 
 
-def warps_of(stated: Mapping[str, Quantity | ArrayLike], place: str) -> tuple[dict[str, Quantity], list[Fault]]:
+def warp_quantities(stated: Mapping[str, Quantity | ArrayLike], place: str) -> tuple[dict[str, Quantity], list[Fault]]:
     """Heights of a warp by name as quantities, cup and twist from zero on, and faults."""
-    unknown = [unknown_name(f"{place} warp", key, WARPS) for key in stated if key not in WARPS]
-    known = {key: stated[key] for key in WARPS if key in stated}
-    found, faults = quantities_of(known, f"{place} warp", "in m", dict.fromkeys(WARPS, "normal"))
-    for key, one in found.items():
-        if one.kind == "normal" and not one.is_exact and one.lower == -math.inf:
-            found[key] = replace(one, lower=WARPS[key])
-    return found, [*unknown, *faults]
+    unknown_faults = [unknown_name_fault(f"{place} warp", key, WARPS) for key in stated if key not in WARPS]
+    known_warps = {key: stated[key] for key in WARPS if key in stated}
+    warps, faults = quantities_of(known_warps, f"{place} warp", "in m", dict.fromkeys(WARPS, "normal"))
+    for key, warp in warps.items():
+        if warp.kind == "normal" and not warp.is_exact and warp.lower == -math.inf:
+            warps[key] = replace(warp, lower=WARPS[key])
+    return warps, [*unknown_faults, *faults]
 
 
-def unknown_name(place: str, name: object, known: Iterable[str]) -> Fault:
+def unknown_name_fault(place: str, name: object, known: Iterable[str]) -> Fault:
     """The fault of an unknown name."""
     names = tuple(known)
-    near = did_you_mean(name, names) if isinstance(name, str) else ""
-    return Fault(place, f"one of {', '.join(names)}", str(name), near)
+    remedy = did_you_mean(name, names) if isinstance(name, str) else ""
+    return Fault(place, f"one of {', '.join(names)}", str(name), remedy)

@@ -35,12 +35,12 @@ class Moduli(NamedTuple):
 class Symmetry:
     """Which rigidities of a material are free, and how the others follow them.
 
-    A fit moves the logarithms of the free rigidities. Those of D_x, D_y, D_s move along `along` of a unit step, from
-    places that depend on nu_xy alone, so that they follow an uncertain nu_xy draw by draw.
+    A fit moves the logarithms of the free rigidities. Those of D_x, D_y, D_s follow them at slopes of one or zero, with
+    offsets that depend on nu_xy alone, so that they follow an uncertain nu_xy draw by draw.
     """
 
     free: tuple[str, ...]
-    moduli: tuple[str, ...]  # that each free rigidity is told as
+    moduli: tuple[str, ...]  # by which each free rigidity is reported
     follows: tuple[int, ...]  # the free rigidity that each of D_x, D_y, D_s is proportional to
 
     @property
@@ -55,10 +55,10 @@ class Symmetry:
 
     def rigidities(self, free: Sequence[Floats] | Floats, nu_xy: Floats) -> dict[str, Floats]:
         """D_x, D_y, D_s by name from the free rigidities: n arrays, N m."""
-        found = {name: free[i] for name, i in zip(RIGIDITIES, self.follows, strict=True)}
+        by_name = {name: free[i] for name, i in zip(RIGIDITIES, self.follows, strict=True)}
         if self.is_isotropic:
-            found["D_s"] = np.asarray(2.0 * (1.0 - nu_xy) * found["D_s"])
-        return found
+            by_name["D_s"] = np.asarray(2.0 * (1.0 - nu_xy) * by_name["D_s"])
+        return by_name
 
     def free_of(self, values: Mapping[str, Floats]) -> Floats:
         """The free rigidities of one plate, N m: (n,) array from D_x, D_y, D_s by name."""
@@ -109,24 +109,24 @@ def isotropic_moduli(E: ArrayLike, nu: ArrayLike) -> Moduli:
     return Moduli(E, E, np.asarray(E / (2.0 * (1.0 + np.asarray(nu)))))
 
 
-class Derived(NamedTuple):
+class DerivedQuantity(NamedTuple):
     """A quantity that makers use, its values and its unit."""
 
     values: NDArray[np.float64]
     unit: str
 
 
-def derived_quantities(constants: Moduli, density: ArrayLike) -> dict[str, Derived]:
+def derived_quantities(constants: Moduli, density: ArrayLike) -> dict[str, DerivedQuantity]:
     """Wave speeds, radiation ratios, impedances, specific stiffnesses along x and y, and ratios; density in kg/m^3."""
     rho = np.asarray(density, dtype=float)
     result = {}
     for axis, modulus in (("x", constants.E_x), ("y", constants.E_y)):
         speed = np.sqrt(modulus / rho)
-        result[f"wave_speed_{axis}"] = Derived(speed, "m/s")
-        result[f"radiation_ratio_{axis}"] = Derived(speed / rho, "m^4/(kg s)")
-        result[f"impedance_{axis}"] = Derived(speed * rho, "kg/(m^2 s)")
-        result[f"specific_stiffness_{axis}"] = Derived(modulus / rho, "m^2/s^2")
-    result["anisotropy"] = Derived(constants.E_x / constants.E_y, "1")
-    result["E_x_over_G_xy"] = Derived(constants.E_x / constants.G_xy, "1")
-    result["density"] = Derived(rho + 0.0 * constants.E_x, "kg/m^3")
+        result[f"wave_speed_{axis}"] = DerivedQuantity(speed, "m/s")
+        result[f"radiation_ratio_{axis}"] = DerivedQuantity(speed / rho, "m^4/(kg s)")
+        result[f"impedance_{axis}"] = DerivedQuantity(speed * rho, "kg/(m^2 s)")
+        result[f"specific_stiffness_{axis}"] = DerivedQuantity(modulus / rho, "m^2/s^2")
+    result["anisotropy"] = DerivedQuantity(constants.E_x / constants.E_y, "1")
+    result["E_x_over_G_xy"] = DerivedQuantity(constants.E_x / constants.G_xy, "1")
+    result["density"] = DerivedQuantity(rho + 0.0 * constants.E_x, "kg/m^3")
     return result

@@ -18,50 +18,50 @@ Card = TypeVar("Card", PriorCard, CoefficientCard)
 
 @dataclass(frozen=True)
 class NamedCards:
-    """What a board card names, each read once; a relative path starts from the folder of the board card."""
+    """The cards that a board card names, each read once; a relative path starts from the folder of the board card."""
 
     prior: PriorCard | None  # None if it cannot be read
     tables: Mapping[str, CoefficientCard]  # by setup, as far as they can be read
-    faults: tuple[Fault, ...]  # of the others, with the place where each was named
+    faults: tuple[Fault, ...]  # of cards that cannot be read, with the place on the board card
 
 
-def load_named(
+def load_named_cards(
     board: Board, prior: PriorCard | None = None, tables: Mapping[str, CoefficientCard] | None = None
 ) -> NamedCards:
-    """Read every card that a board card names and that is not given; tables are by setup."""
-    file, beside = board.file, board.folder
+    """Read the cards that a board card names, except those that are passed; tables are by setup."""
+    file, folder = board.file, board.folder
     faults: list[Fault] = []
-    where = f"{file} [material] prior"
+    card_place = f"{file} [material] prior"
     if prior is None:
-        prior = _read(load_prior, board.prior, beside, where, faults)
+        prior = _read_card(load_prior, board.prior, folder, card_place, faults)
     if prior is not None:
         name, prior = prior.name, prior.for_board(board.isotropic)
-        faults += [] if prior is not None else [_of_another_symmetry(where, name, board.isotropic)]
+        faults += [] if prior is not None else [_symmetry_fault(card_place, name, board.isotropic)]
     if tables is not None:
         return NamedCards(prior, tables, tuple(faults))
-    found: dict[str, CoefficientCard] = {}
-    for setup, where in zip(board.setups, setup_places(file, [setup.name for setup in board.setups]), strict=True):
+    coefficient_tables: dict[str, CoefficientCard] = {}
+    for setup, card_place in zip(board.setups, setup_places(file, [setup.name for setup in board.setups]), strict=True):
         if setup.table_name:
-            place = f"{where} published_coefficients"
-            table = _read(load_coefficients, setup.table_name, beside, place, faults)
-            found |= {} if table is None else {setup.name: table}
-    return NamedCards(prior, found, tuple(faults))
+            place = f"{card_place} published_coefficients"
+            table = _read_card(load_coefficients, setup.table_name, folder, place, faults)
+            coefficient_tables |= {} if table is None else {setup.name: table}
+    return NamedCards(prior, coefficient_tables, tuple(faults))
 
 
-def _of_another_symmetry(place: str, name: str, is_isotropic: bool) -> Fault:
-    """The fault of a prior that states one modulus for a board of three, or three for a board of one."""
+def _symmetry_fault(place: str, name: str, is_isotropic: bool) -> Fault:
+    """The fault of an isotropic prior for an orthotropic board, or of an orthotropic prior for an isotropic board."""
     if not is_isotropic:
         return Fault(place, "a prior of three constants", f"{name}, which states E alone", "or isotropic = true?")
     remedy = "weakly-informative states one, or a card of your own with [E]"
     return Fault(place, "a prior of E, because isotropic = true", f"{name}, which states none", remedy)
 
 
-def _read(
-    load: Callable[[str, Path | None], Card], name: str, beside: Path | None, place: str, faults: list[Fault]
+def _read_card(
+    load: Callable[[str, Path | None], Card], name: str, folder: Path | None, place: str, faults: list[Fault]
 ) -> Card | None:
-    """Read one card; its faults join the others."""
+    """Read one card; its faults are added to `faults`."""
     try:
-        return load(name, beside)
+        return load(name, folder)
     except InputError as error:
-        faults += [Fault(f"{place} -> {one.place}", one.wanted, one.got, one.remedy) for one in error.faults]
+        faults += [Fault(f"{place} -> {fault.place}", fault.wanted, fault.got, fault.remedy) for fault in error.faults]
         return None

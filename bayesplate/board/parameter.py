@@ -23,11 +23,11 @@ class Owner:
         return self.name or "board"
 
 
-BOARD = Owner()
+BOARD_OWNER = Owner()
 
 
-def shown_name(key: str, owner: Owner, effect: str = "") -> str:
-    """The name of a parameter wherever it is shown: "clamp_rotation.compliance[cantilever]"; nothing takes it apart."""
+def parameter_name(key: str, owner: Owner, effect: str = "") -> str:
+    """The name of a parameter wherever it is shown: "clamp_rotation.compliance[cantilever]"; it is never parsed."""
     of_effect = f"{effect}." if effect else ""
     of_owner = f"[{owner.name}]" if owner.name else ""
     return f"{of_effect}{key}{of_owner}"
@@ -52,13 +52,13 @@ class Parameter:
 
     @property
     def is_assumed(self) -> bool:
-        """Whether the prior is still the very object that was assumed: whoever states another one replaces it."""
+        """Whether the prior is still the very object that was assumed: a stated prior replaces it."""
         return self.prior is self.assumed
 
     @property
     def name(self) -> str:
         """The name among all parameters of a board."""
-        return self.replaces or shown_name(self.key, self.owner, self.effect)
+        return self.replaces or parameter_name(self.key, self.owner, self.effect)
 
     @property
     def is_of_effect(self) -> bool:
@@ -85,9 +85,15 @@ class Parameter:
         return float(np.clip(self.prior.value(1.0), self.prior.lower, self.prior.upper))
 
 
-_PEOPLE = {"Pa": (1e-9, "GPa"), "m": (1e3, "mm"), "kg": (1e3, "g"), "1": (1.0, ""), "rad": (180.0 / np.pi, "degrees")}
+_UNITS = {
+    "Pa": (1e-9, "GPa"),
+    "m": (1e3, "mm"),
+    "kg": (1e3, "g"),
+    "1": (1.0, ""),
+    "rad": (180.0 / np.pi, "degrees"),
+}
 
 
-def unit_of_people(unit: str) -> tuple[float, str]:
+def display_unit(unit: str) -> tuple[float, str]:
     """Factor from an SI unit to the one that people use, and its name."""
-    return _PEOPLE.get(unit, (1.0, unit))
+    return _UNITS.get(unit, (1.0, unit))

@@ -14,19 +14,19 @@ from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.board.prior_keys import DensityPrior, ElasticPrior, NoisePrior, PoissonPrior, RigidityPrior
 from bayesplate.board.prior_keys import StatedPrior as StatedPrior
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.schema import Card, validated
+from bayesplate.board.schema import BaseCard, validate_card
 from bayesplate.board.shelf import CardFile
-from bayesplate.board.stated import wrong_types
+from bayesplate.board.stated import type_faults
 from bayesplate.board.words import did_you_mean
 from bayesplate.board.writing import toml_text, write_card
 from bayesplate.errors import Fault, InputError
 
-OF_ISOTROPIC = "E"
+ISOTROPIC_MODULUS = "E"
 """The one modulus of an isotropic board, stated beside the three or alone."""
-_CONSTANTS = (*MODULI, *RIGIDITIES, OF_ISOTROPIC)
+_CONSTANTS = (*MODULI, *RIGIDITIES, ISOTROPIC_MODULUS)
 
 
-class PriorCard(Card):
+class PriorCard(BaseCard):
     """Priors of E_x, E_y, G_xy or of D_x, D_y, D_s, of E for isotropic boards, and optionally the noise and nu_xy.
 
     `load_prior` makes one.
@@ -70,7 +70,7 @@ class PriorCard(Card):
         poisson_xy : Quantity, optional
             Normal: `Quantity.from_mean(0.4, 0.08, "normal")`.
         density : Quantity, optional
-            kg m^-3; no density is taken from it, but a board of another one is asked about.
+            kg m^-3; it is no input of a fit, but a board of another density gets a question.
         title : str
 
         Returns
@@ -82,7 +82,7 @@ class PriorCard(Card):
         InputError
             With everything that a prior card cannot hold, and its place on the card.
         """
-        faults = list(wrong_types(str(name), (
+        faults = list(type_faults(str(name), (
             ("name", name, isinstance(name, str), "a text"),
             ("title", title, isinstance(title, str), "a text"),
             ("constants", constants, isinstance(constants, Mapping), "a dict of quantities by name"),
@@ -91,21 +91,21 @@ class PriorCard(Card):
         if faults:
             raise InputError(faults)
         if not isinstance(source, str):  # as `sources` has it, for a prior that is made of another one
-            source = {"noise" if key == "noise_percent" else key: one for key, one in source.items()}
+            source = {"noise" if key == "noise_percent" else key: text for key, text in source.items()}
         faults = [Fault(f"{name} {key}", f"one of {', '.join(_CONSTANTS)}", "an unknown name")
                   for key in constants if key not in _CONSTANTS]  # fmt: skip
-        known = "Quantity.from_median or Quantity.from_range, a constant known to some extent"
+        constant_wanted = "Quantity.from_median or Quantity.from_range, a constant known to some extent"
         for key, quantity, kinds, wanted in (
-            *((key, one, ("log-normal", "log-uniform"), known) for key, one in constants.items()),
+            *((key, constant, ("log-normal", "log-uniform"), constant_wanted) for key, constant in constants.items()),
             ("noise", noise, ("log-normal",), "Quantity.from_median"),
             ("poisson_xy", poisson_xy, ("normal",), 'Quantity.from_mean(0.4, 0.08, "normal")'),
             ("density", density, ("log-normal",), "Quantity.from_mean(430, 60)"),
         ):
-            if not (_is_of_a_card(quantity, kinds) or (quantity is None and key not in constants)):
+            if not (_can_be_stated(quantity, kinds) or (quantity is None and key not in constants)):
                 got = "another kind of quantity" if isinstance(quantity, Quantity) else repr(quantity)
                 faults.append(Fault(f"{name} {key}", f"{wanted}, without bounds", got))
-        further = {"noise": noise, "poisson_xy": poisson_xy, "density_kg_m3": density}
-        stated = {**constants, **{key: one for key, one in further.items() if one is not None}}
+        other_priors = {"noise": noise, "poisson_xy": poisson_xy, "density_kg_m3": density}
+        stated = {**constants, **{key: prior for key, prior in other_priors.items() if prior is not None}}
         faults += _source_faults(name, source, stated)
         if faults:
             raise InputError(faults)
@@ -113,12 +113,12 @@ class PriorCard(Card):
         fields = {"noise": "stated_noise", "poisson_xy": "stated_poisson", "density_kg_m3": "stated_density"}
         priors: dict[str, Any] = {
             fields.get(key, key): StatedPrior(
-                one.scaled(100.0) if key == "noise" else one, source if isinstance(source, str) else source[key]
+                prior.scaled(100.0) if key == "noise" else prior, source if isinstance(source, str) else source[key]
             )
-            for key, one in stated.items()
+            for key, prior in stated.items()
         }
-        made = cls.model_construct(format=1, name=name, title=title, **priors)
-        return validated(cls, CardFile(made.table(), f"{name}.toml"), _set_faults)
+        card = cls.model_construct(format=1, name=name, title=title, **priors)
+        return validate_card(cls, CardFile(card.table(), f"{name}.toml"), _constant_faults)
 
     def table(self) -> dict[str, Any]:
         """The table of the card."""
@@ -155,8 +155,8 @@ class PriorCard(Card):
 
         Of a prior of isotropic boards alone E_x, which is their E.
         """
-        found = {name: stated for name in (*MODULI, *RIGIDITIES) if (stated := getattr(self, name)) is not None}
-        return found if found or self.E is None else {"E_x": self.E}
+        constants = {name: prior for name in (*MODULI, *RIGIDITIES) if (prior := getattr(self, name)) is not None}
+        return constants if constants or self.E is None else {"E_x": self.E}
 
     @property
     def is_of_isotropic(self) -> bool:
@@ -197,15 +197,15 @@ class PriorCard(Card):
             "poisson_xy": self.stated_poisson,
             "density_kg_m3": self.stated_density,
         }
-        return {name: one.source for name, one in (self.stated_constants | stated).items() if one}
+        return {name: prior.source for name, prior in (self.stated_constants | stated).items() if prior}
 
 
 def load_prior(name_or_path: str | os.PathLike[str], beside: Path | None = None) -> PriorCard:
     """Read a prior card, a shipped one or a path from the folder `beside`; InputError names every fault at once."""
-    return validated(PriorCard, CardFile.load("priors", name_or_path, beside), _set_faults)
+    return validate_card(PriorCard, CardFile.load("priors", name_or_path, beside), _constant_faults)
 
 
-def _is_of_a_card(quantity: object, kinds: tuple[str, ...]) -> bool:
+def _can_be_stated(quantity: object, kinds: tuple[str, ...]) -> bool:
     """Whether a prior card can state a density: of one of these kinds, without bounds but those of its kind."""
     if not isinstance(quantity, Quantity) or quantity.is_exact or quantity.kind not in kinds:
         return False
@@ -219,19 +219,24 @@ def _source_faults(name: str, source: str | Mapping[str, str], stated: Collectio
         if not source.strip():
             yield Fault(f"{name} source", wanted, "an empty text")
         return
-    known = (*_CONSTANTS, "noise", "poisson_xy", "density_kg_m3")
+    names = (*_CONSTANTS, "noise", "poisson_xy", "density_kg_m3")
     for key in source:
-        if key not in known:
-            yield Fault(f"{name} source {key}", f"one of {', '.join(known)}", str(key), did_you_mean(str(key), known))
+        if key not in names:
+            yield Fault(
+                f"{name} source {key}",
+                f"one of {', '.join(names)}",
+                str(key),
+                did_you_mean(str(key), names),
+            )
     for key in stated:
         if not isinstance(source.get(key), str) or not source[key].strip():
             yield Fault(f"{name} source {key}", wanted, repr(source.get(key)))
 
 
-def _set_faults(table: Mapping[str, Any], file: str) -> list[Fault]:
+def _constant_faults(table: Mapping[str, Any], file: str) -> list[Fault]:
     """The constants are all moduli, all rigidities, or E alone."""
-    given = [name for name in (*MODULI, *RIGIDITIES) if name in table]
-    if tuple(given) in (MODULI, RIGIDITIES) or (not given and OF_ISOTROPIC in table):
+    names = [name for name in (*MODULI, *RIGIDITIES) if name in table]
+    if tuple(names) in (MODULI, RIGIDITIES) or (not names and ISOTROPIC_MODULUS in table):
         return []
     wanted = f"all of {', '.join(MODULI)} or all of {', '.join(RIGIDITIES)}"
-    return [Fault(file, wanted, ", ".join(given) or "none of them")]
+    return [Fault(file, wanted, ", ".join(names) or "none of them")]

@@ -1,4 +1,4 @@
-"""A number with its uncertainty is a prior: readings, a standard deviation, log-normal, bounded."""
+"""A number with its uncertainty, used as a prior: from readings, a standard deviation, a median or a range."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bayesplate.board.density import Density, Kind
+from bayesplate.board.density import DensityKind, ProbabilityDensity
 from bayesplate.errors import Fault, InputError
 
 
 @dataclass(frozen=True)
-class Quantity(Density):
-    """A number and what is not known about it.
+class Quantity(ProbabilityDensity):
+    """A number and its uncertainty.
 
     It is sampled in a standard coordinate z, normal with mean 0 and standard deviation 1: `value` leads from z to the
     number, `standard` back, `log_prior` is the density of z. An exact quantity has one value whatever z is.
@@ -55,9 +55,9 @@ class Quantity(Density):
             raise InputError(faults)
 
     def _faults(self) -> Iterator[Fault]:
-        """What makes no quantity of these values."""
-        if self.kind not in get_args(Kind):
-            yield Fault("kind", ", ".join(get_args(Kind)), repr(self.kind))
+        """Faults of values that make no quantity."""
+        if self.kind not in get_args(DensityKind):
+            yield Fault("kind", ", ".join(get_args(DensityKind)), repr(self.kind))
         if not math.isfinite(self.mean):
             yield Fault("mean", "a finite number", f"{self.mean}")
         for name, size in (("sd", self.sd), ("resolution", self.resolution), ("place_sd", self.place_sd)):
@@ -81,9 +81,9 @@ class Quantity(Density):
 
     @classmethod
     def from_mean(
-        cls, mean: float, sd: float, kind: Kind = "log-normal", lower: float = -math.inf, upper: float = math.inf
+        cls, mean: float, sd: float, kind: DensityKind = "log-normal", lower: float = -math.inf, upper: float = math.inf
     ) -> Quantity:
-        """A number with a standard deviation, both in the quantity's unit; log-normal unless said otherwise."""
+        """A number with a standard deviation, both in the quantity's unit; log-normal by default."""
         return cls(_number("mean", mean), _number("sd", sd), kind, _number("lower", lower), _number("upper", upper))
 
     @classmethod
@@ -123,7 +123,7 @@ class Quantity(Density):
         resolution: float = 0.0,
         at_x: Sequence[float] = (),
         at_y: Sequence[float] = (),
-        kind: Kind = "log-normal",
+        kind: DensityKind = "log-normal",
         place_sd: float = 0.0,
     ) -> Quantity:
         """The mean of readings, with sd**2 = s**2 / n + resolution**2 / 12.
@@ -144,8 +144,8 @@ class Quantity(Density):
         place_sd : float
             See the class.
         """
-        given: object = readings
-        if isinstance(given, str) or not isinstance(given, Iterable):
+        stated_readings: object = readings
+        if isinstance(stated_readings, str) or not isinstance(stated_readings, Iterable):
             raise InputError(Fault("readings", "a list or an array of numbers", repr(readings)))
         values = tuple(_number("readings", value) for value in readings)
         if not values:
@@ -162,8 +162,8 @@ class Quantity(Density):
                    at_x=places_x, at_y=places_y, place_sd=_number("place_sd", place_sd))  # fmt: skip
 
     @classmethod
-    def of(cls, stated: Quantity | ArrayLike | None, kind: Kind = "log-normal") -> Quantity:
-        """What was stated as a quantity: a number is exact, an array holds readings, a quantity stays.
+    def of(cls, stated: Quantity | ArrayLike | None, kind: DensityKind = "log-normal") -> Quantity:
+        """A stated value as a quantity: a number is exact, an array holds readings, a quantity stays.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""What readings at places say of a thickness or a width: a smooth random field, conditioned on readings with errors.
+"""A thickness or a width that was read at places: a smooth random field, conditioned on readings with errors.
 
 The field is constant but for a Gaussian process: a polynomial over the board whose coefficients are those of smooth
 random functions, as far as polynomials of this degree hold them. The constant is its mean over the board; everything
@@ -23,24 +23,24 @@ Degrees = tuple[tuple[int, int], ...]
 DEGREE = 6
 """Highest degree of the polynomials, x and y together."""
 LENGTH_SCALE = 0.5
-"""Over which the field varies, as a fraction of each side."""
+"""Length over which the field varies, as a fraction of each side."""
 _N_POINTS = 24
-_SPANNED = 1e-9
-_STEPS_AMPLITUDE, _STEPS_SCATTER = np.geomspace(1e-4, 0.2, 27), np.geomspace(1e-5, 0.1, 19)
-_PASSES = 2
+_SMALLEST_VARIANCE = 1e-9
+_AMPLITUDES, _SCATTERS = np.geomspace(1e-4, 0.2, 27), np.geomspace(1e-5, 0.1, 19)
+_N_PASSES = 2
 
 
 @dataclass(frozen=True)
-class UsualSizes:
+class FieldScales:
     """Scales of the half-Cauchy priors, as fractions of the mean: half of all boards lie below, half above."""
 
     field: float  # standard deviation over the board
     scatter: float  # standard deviation of a reading besides its rounding
 
 
-THICKNESS = UsualSizes(field=0.015, scatter=0.005)
+THICKNESS_SCALES = FieldScales(field=0.015, scatter=0.005)
 """0.015 is the root mean square over the board of a taper of 5 % from end to end, what hand-planed boards have."""
-WIDTH = UsualSizes(field=0.01, scatter=0.001)
+WIDTH_SCALES = FieldScales(field=0.01, scatter=0.001)
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Surface:
 
 @dataclass(frozen=True, eq=False)
 class ConditionedField:
-    """A field as its readings leave it, normal in its mean and its n coefficients."""
+    """The posterior of a field given its readings, normal in its mean and its n coefficients."""
 
     degrees: Degrees  # of the polynomials besides the constant
     mean: float  # of the field's mean over the board, in the unit of the readings, and so its sd
@@ -86,7 +86,7 @@ class PlacedReadings:
     y: tuple[float, ...]
     resolution: float  # in the unit of the readings
     place_sd: tuple[float, float]  # of the places, fractions of the sides
-    usual: UsualSizes
+    usual: FieldScales
     is_along_x_only: bool = False
 
 
@@ -98,7 +98,7 @@ def thickness_readings(thickness: Quantity, length_x: Quantity, length_y: Quanti
     if len(set(zip(x, y, strict=True))) < 2:
         return None
     place_sd = (thickness.place_sd / length_x.mean, thickness.place_sd / length_y.mean)
-    return PlacedReadings(thickness.readings, x, y, thickness.resolution, place_sd, THICKNESS)
+    return PlacedReadings(thickness.readings, x, y, thickness.resolution, place_sd, THICKNESS_SCALES)
 
 
 def width_readings(width: Quantity, length_x: Quantity) -> PlacedReadings | None:
@@ -107,15 +107,15 @@ def width_readings(width: Quantity, length_x: Quantity) -> PlacedReadings | None
     if len(set(x)) < 2:
         return None
     place_sd = (width.place_sd / length_x.mean, 0.0)
-    return PlacedReadings(width.readings, x, (0.5,) * len(x), width.resolution, place_sd, WIDTH, True)
+    return PlacedReadings(width.readings, x, (0.5,) * len(x), width.resolution, place_sd, WIDTH_SCALES, True)
 
 
 def _fractions(places: tuple[float, ...], side: Quantity) -> tuple[float, ...]:
-    return tuple(min(max(at / side.mean, 0.0), 1.0) for at in places)
+    return tuple(min(max(place / side.mean, 0.0), 1.0) for place in places)
 
 
 @lru_cache(maxsize=64)
-def conditioned(read: PlacedReadings) -> ConditionedField:
+def condition_field(read: PlacedReadings) -> ConditionedField:
     """The field given its readings, averaged over amplitudes and scatters by their probabilities.
 
     Where the readings do not support a field the small amplitudes are the probable ones, and the field shrinks to
@@ -123,15 +123,15 @@ def conditioned(read: PlacedReadings) -> ConditionedField:
     """
     scale = statistics.mean(read.values)
     relative = np.array(read.values) / scale
-    degrees = _degrees(read.is_along_x_only)
+    degrees = _polynomial_degrees(read.is_along_x_only)
     x, y = np.array(read.x), np.array(read.y)
-    at_places = _design(degrees, x, y)
-    own = np.full(relative.size, (read.resolution / scale) ** 2 / 12.0)
+    design = _design_matrix(degrees, x, y)
+    rounding_variance = np.full(relative.size, (read.resolution / scale) ** 2 / 12.0)
     slopes = [np.zeros(relative.size)] * 2
-    for _ in range(_PASSES if any(read.place_sd) else 1):
-        moved = sum((sd * slope) ** 2 for sd, slope in zip(read.place_sd, slopes, strict=True))
-        mean, covariance = _averaged(relative, at_places, own + moved, degrees, read.usual)
-        slopes = [_design(degrees, x, y, order)[:, 1:] @ mean[1:] for order in ((1, 0), (0, 1))]
+    for _ in range(_N_PASSES if any(read.place_sd) else 1):
+        place_variance = sum((sd * slope) ** 2 for sd, slope in zip(read.place_sd, slopes, strict=True))
+        mean, covariance = _average(relative, design, rounding_variance + place_variance, degrees, read.usual)
+        slopes = [_design_matrix(degrees, x, y, order)[:, 1:] @ mean[1:] for order in ((1, 0), (0, 1))]
     sd = float(np.sqrt(covariance[0, 0]))
     with_mean = covariance[1:, 0] / sd / mean[0]
     return ConditionedField(
@@ -144,95 +144,101 @@ def conditioned(read: PlacedReadings) -> ConditionedField:
     )
 
 
-def sd_after(read: PlacedReadings, x: Floats, y: Floats) -> float:
+def sd_after_readings(read: PlacedReadings, x: Floats, y: Floats) -> float:
     """Expected standard deviation of the field's mean after readings at further places (n,), fractions of the sides.
 
-    What will be read there scatters as the readings at hand do, so that amplitudes and scatters keep the probabilities
-    that they have now.
+    The further readings are taken to scatter as the present ones do, so that amplitudes and scatters keep their present
+    probabilities.
     """
     scale = statistics.mean(read.values)
-    known = conditioned(read)
-    degrees = _degrees(read.is_along_x_only)
-    at = np.concatenate([read.x, x]), np.concatenate([read.y, y])
-    slope = known.shape * known.mean / scale
-    own = np.full(len(at[0]), (read.resolution / scale) ** 2 / 12.0)
+    field = condition_field(read)
+    degrees = _polynomial_degrees(read.is_along_x_only)
+    places = np.concatenate([read.x, x]), np.concatenate([read.y, y])
+    slope = field.shape * field.mean / scale
+    variances = np.full(len(places[0]), (read.resolution / scale) ** 2 / 12.0)
     for sd, order in zip(read.place_sd, ((1, 0), (0, 1)), strict=True):
-        own += (sd * (_design(degrees, *at, order)[:, 1:] @ slope)) ** 2
-    design, relative, n = _design(degrees, *at) @ _smooth(degrees), np.array(read.values) / scale, len(read.values)
-    log_weights = _regressed(relative, design[:n], own[:n], read.usual)[0]
+        variances += (sd * (_design_matrix(degrees, *places, order)[:, 1:] @ slope)) ** 2
+    design, relative, n = (
+        _design_matrix(degrees, *places) @ _smooth_basis(degrees),
+        np.array(read.values) / scale,
+        len(read.values),
+    )
+    log_weights = _regress(relative, design[:n], variances[:n], read.usual)[0]
     weights = np.exp(log_weights - log_weights.max())
-    after = _regressed(np.ones(len(design)), design, own, read.usual)[2][..., 0, 0]
-    return float(scale * np.sqrt(np.average(after, weights=weights)))
+    mean_variances = _regress(np.ones(len(design)), design, variances, read.usual)[2][..., 0, 0]
+    return float(scale * np.sqrt(np.average(mean_variances, weights=weights)))
 
 
-def _averaged(
-    readings: Floats, at_places: Floats, own: Floats, degrees: Degrees, usual: UsualSizes
+def _average(
+    readings: Floats, design: Floats, variances: Floats, degrees: Degrees, scales: FieldScales
 ) -> tuple[Floats, Floats]:
     """Mean and covariance of all coefficients, the constant first, over amplitudes and scatters."""
-    spanned = _smooth(degrees)
-    log_weights, means, covariances = _regressed(readings, at_places @ spanned, own, usual)
+    basis = _smooth_basis(degrees)
+    log_weights, means, covariances = _regress(readings, design @ basis, variances, scales)
     weights = np.exp(log_weights - log_weights.max())
     weights /= weights.sum()
     mean = np.tensordot(weights, means, axes=2)
-    spread = covariances + (means - mean)[..., :, None] * (means - mean)[..., None, :]
-    return spanned @ mean, spanned @ np.tensordot(weights, spread, axes=2) @ spanned.T
+    second_moments = covariances + (means - mean)[..., :, None] * (means - mean)[..., None, :]
+    return basis @ mean, basis @ np.tensordot(weights, second_moments, axes=2) @ basis.T
 
 
-def _regressed(readings: Floats, design: Floats, own: Floats, usual: UsualSizes) -> tuple[Floats, Floats, Floats]:
+def _regress(
+    readings: Floats, design: Floats, reading_variances: Floats, scales: FieldScales
+) -> tuple[Floats, Floats, Floats]:
     """Regression on the constant and on standard smooth functions, for each amplitude and scatter, the constant first.
 
     Log probability (n_a, n_s), mean (n_a, n_s, r) and covariance (n_a, n_s, r, r).
     """
-    amplitude, scatter = _STEPS_AMPLITUDE, _STEPS_SCATTER
-    variances = own + scatter[:, None] ** 2  # (n_s, n)
-    weighted = design / variances[..., None]
+    amplitude, scatter = _AMPLITUDES, _SCATTERS
+    variances = reading_variances + scatter[:, None] ** 2  # (n_s, n)
+    weighted_design = design / variances[..., None]
     precision = np.zeros((amplitude.size, scatter.size, *(design.shape[1],) * 2))
-    precision += np.einsum("sni,nj->sij", weighted, design)
-    inner = np.arange(1, design.shape[1])
-    precision[:, :, inner, inner] += amplitude[:, None, None] ** -2.0
+    precision += np.einsum("sni,nj->sij", weighted_design, design)
+    smooth_terms = np.arange(1, design.shape[1])
+    precision[:, :, smooth_terms, smooth_terms] += amplitude[:, None, None] ** -2.0
     covariance = np.linalg.inv(precision)
-    about = readings - 1.0
-    told = np.einsum("sni,n->si", weighted, about)
-    mean = np.einsum("asij,sj->asi", covariance, told)
-    misfit = np.sum(about**2 / variances, axis=1) - np.einsum("asi,si->as", mean, told)
+    deviations = readings - 1.0
+    weighted_deviations = np.einsum("sni,n->si", weighted_design, deviations)
+    mean = np.einsum("asij,sj->asi", covariance, weighted_deviations)
+    misfit = np.sum(deviations**2 / variances, axis=1) - np.einsum("asi,si->as", mean, weighted_deviations)
     log_size = np.log(variances).sum(axis=1) + np.linalg.slogdet(precision)[1]
-    log_size += 2.0 * inner.size * np.log(amplitude)[:, None]
+    log_size += 2.0 * smooth_terms.size * np.log(amplitude)[:, None]
     priors = (np.log(steps / (1.0 + (steps / scale) ** 2)) for steps, scale in
-              ((amplitude[:, None], usual.field), (scatter, usual.scatter)))  # fmt: skip
+              ((amplitude[:, None], scales.field), (scatter, scales.scatter)))  # fmt: skip
     mean[..., 0] += 1.0
     return np.asarray(-0.5 * (misfit + log_size) + sum(priors)), mean, np.asarray(covariance)
 
 
 @lru_cache(maxsize=8)
-def _smooth(degrees: Degrees) -> Floats:
+def _smooth_basis(degrees: Degrees) -> Floats:
     """Coefficients of the constant and of independent functions that together vary as smooth ones do: (n, r) array.
 
     Their covariance is that of exp(-d^2 / (2 LENGTH_SCALE^2)) with the mean over the board taken out; its trace is one,
     so that the amplitude is the standard deviation over the board.
     """
     points, weights = leggauss(_N_POINTS)
-    at, weights = 0.5 * (points + 1.0), 0.5 * weights
-    values = weights * np.stack([legendre(k, at) for k in range(DEGREE + 1)])
-    one = values @ np.exp(-0.5 * ((at[:, None] - at) / LENGTH_SCALE) ** 2) @ values.T
+    coordinates, weights = 0.5 * (points + 1.0), 0.5 * weights
+    values = weights * np.stack([legendre(k, coordinates) for k in range(DEGREE + 1)])
+    side_covariance = values @ np.exp(-0.5 * ((coordinates[:, None] - coordinates) / LENGTH_SCALE) ** 2) @ values.T
     i, j = np.array(degrees).T
-    across = one[j][:, j] if j.any() else 1.0
-    covariance = (one[i][:, i] * across)[1:, 1:]
+    across_covariance = side_covariance[j][:, j] if j.any() else 1.0
+    covariance = (side_covariance[i][:, i] * across_covariance)[1:, 1:]
     variances, directions = np.linalg.eigh(covariance / np.trace(covariance))
-    kept = variances > _SPANNED
-    spanned = np.zeros((len(degrees), 1 + int(kept.sum())))
-    spanned[0, 0] = 1.0
-    spanned[1:, 1:] = directions[:, kept] * np.sqrt(variances[kept])
-    return spanned
+    is_spanned = variances > _SMALLEST_VARIANCE
+    basis = np.zeros((len(degrees), 1 + int(is_spanned.sum())))
+    basis[0, 0] = 1.0
+    basis[1:, 1:] = directions[:, is_spanned] * np.sqrt(variances[is_spanned])
+    return basis
 
 
-def _degrees(is_along_x_only: bool) -> Degrees:
+def _polynomial_degrees(is_along_x_only: bool) -> Degrees:
     """Degrees of all polynomials, the constant first."""
     if is_along_x_only:
         return tuple((i, 0) for i in range(DEGREE + 1))
     return tuple((total - j, j) for total in range(DEGREE + 1) for j in range(total + 1))
 
 
-def _design(degrees: Degrees, x: Floats, y: Floats, order: tuple[int, int] = (0, 0)) -> Floats:
+def _design_matrix(degrees: Degrees, x: Floats, y: Floats, order: tuple[int, int] = (0, 0)) -> Floats:
     """Derivatives of every polynomial at places: (n_places, n) array."""
     return np.stack([legendre(i, x, order[0]) * legendre(j, y, order[1]) for i, j in degrees], axis=-1)
 

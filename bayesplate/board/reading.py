@@ -1,4 +1,4 @@
-"""What was read of one mode: a reading, whose label is stated, or a peak, which has none."""
+"""Measured frequencies: a reading has a label, a peak has none."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from pydantic import ConfigDict, Field
 
 from bayesplate.board.measures import QuantityReader
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.repeated import FURTHEST_FREQUENCIES
+from bayesplate.board.repeated import LARGEST_FREQUENCY_RATIO
 from bayesplate.board.stated import quantity_of
 from bayesplate.board.values import Choice, Key, Number
 from bayesplate.labels import Label
 
 NO_OFFSET = Label(0, 0)
-_HERTZ = Number(
+_FREQUENCY_NUMBER = Number(
     0.1, 1e6, "Hz", "in Hz; the zero-frequency modes of a free board are not listed", "in Hz: 1 kHz is 1000 Hz"
 )
-FREQUENCY = QuantityReader(_HERTZ, furthest=FURTHEST_FREQUENCIES).key
+FREQUENCY = QuantityReader(_FREQUENCY_NUMBER, furthest=LARGEST_FREQUENCY_RATIO).key
 SIGN = Key(Choice(("+", "-")))
-OPEN, PROBABILITY = 1e-9, "a probability: 98 % is 0.98"
-CHANCE = Number(OPEN, 1 - OPEN, hint=PROBABILITY).key
+SMALLEST_PROBABILITY, PROBABILITY_HINT = 1e-9, "a probability: 98 % is 0.98"
+PROBABILITY = Number(SMALLEST_PROBABILITY, 1 - SMALLEST_PROBABILITY, hint=PROBABILITY_HINT).key
 _DAMPING = Number(1e-6, 100, "%", "the damping ratio in percent: half the loss factor").key
 
 
@@ -94,9 +94,9 @@ class Reading:
         InputError
             If the label cannot be read, or the frequency is no number.
         """
-        read = Label.parse(label_text(label))
-        quantity = quantity_of(frequency, f"frequency of {read}", "in Hz")
-        return cls(read, (read.m - first_label[0], read.n - first_label[1]), quantity, sign)
+        parsed_label = Label.parse(label_text(label))
+        quantity = quantity_of(frequency, f"frequency of {parsed_label}", "in Hz")
+        return cls(parsed_label, (parsed_label.m - first_label[0], parsed_label.n - first_label[1]), quantity, sign)
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class Peak:
     sign: Annotated[str, SIGN] = ""
     amplitude: Annotated[float | None, Number(1e-12, 1e12).key] = None
     damping: Annotated[float | None, Field(alias="damping_percent"), _DAMPING] = None
-    spurious: Annotated[float | None, Field(alias="spurious_probability"), CHANCE] = None
+    spurious: Annotated[float | None, Field(alias="spurious_probability"), PROBABILITY] = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frequency", quantity_of(self.frequency, "frequency of a peak", "in Hz"))

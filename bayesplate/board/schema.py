@@ -1,4 +1,4 @@
-"""A table is held against a model, and everything that does not fit becomes a fault with its place."""
+"""Tables are validated by a model, and everything that does not fit becomes a fault with its place."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from pydantic.fields import FieldInfo
 
 from bayesplate.board.shelf import CardFile
 from bayesplate.board.values import Complaint, Key, Refusal, Text, read_format, read_name
-from bayesplate.board.words import did_you_mean, name_complaint, quoted, shown
+from bayesplate.board.words import did_you_mean, name_complaint, quote_text, show_value
 from bayesplate.errors import Fault, InputError
 
 MOST_FAULTS = 50
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,60}")
-Keys = tuple[str, ...]
+KeyPath = tuple[str, ...]
 
 
 class Section(BaseModel):
@@ -26,18 +26,18 @@ class Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class Card(Section):
-    """A whole card: what the cards of all kinds have."""
+class BaseCard(Section):
+    """The keys that the cards of all kinds have."""
 
     format: Annotated[Literal[1], Key(read_format)] = Field(description="1")
     name: Annotated[str, Key(read_name)] = Field(description="the name of the file without .toml")
     title: Text = ""
 
 
-CardModel = TypeVar("CardModel", bound=Card)
+CardModel = TypeVar("CardModel", bound=BaseCard)
 
 
-def validated(
+def validate_card(
     model: type[CardModel],
     card: CardFile,
     faults_of: Callable[[Mapping[str, Any], str], Iterable[Fault]] = lambda table, file: (),
@@ -46,29 +46,29 @@ def validated(
 ) -> CardModel:
     """A card from the table of its file; raises InputError with every fault at once.
 
-    `faults_of` tells what is wrong with keys beside one another, from the raw table and the file's name in messages.
+    `faults_of` returns the faults between keys, from the raw table and the file's name in messages.
     """
     table, file = card.table, file or card.shown
-    found = [*_name_faults(table, file, card.stem), *faults_of(table, file)]
+    faults = [*_name_faults(table, file, card.stem), *faults_of(table, file)]
     try:
-        read = model.model_validate(table, context={"card": card, **(context or {})})
+        valid_card = model.model_validate(table, context={"card": card, **(context or {})})
     except ValidationError as error:
         details = error.errors(include_url=False)
-        found += [fault for detail in details[:MOST_FAULTS] for fault in _faults(model, table, file, detail)]
-        more = len(details) - MOST_FAULTS
+        faults += [fault for detail in details[:MOST_FAULTS] for fault in _error_faults(model, table, file, detail)]
+        n_unlisted = len(details) - MOST_FAULTS
     else:
-        if not found:
-            return read
-        more = 0
-    more = max(more, 0) + len(found[MOST_FAULTS:])
-    listed = found[:MOST_FAULTS]
-    if more:
-        listed.append(Fault(file, "a card without faults", f"{more} more faults, not listed"))
-    raise InputError(listed)
+        if not faults:
+            return valid_card
+        n_unlisted = 0
+    n_unlisted = max(n_unlisted, 0) + len(faults[MOST_FAULTS:])
+    listed_faults = faults[:MOST_FAULTS]
+    if n_unlisted:
+        listed_faults.append(Fault(file, "a card without faults", f"{n_unlisted} more faults, not listed"))
+    raise InputError(listed_faults)
 
 
-def place(file: str, table: Mapping[str, Any], inside: Sequence[str | int]) -> str:
-    """Where a value stands: 'my-board.toml [plate] thickness_mm', 'my-board.toml [[setup]] 2 "free" edges.x0'."""
+def fault_place(file: str, table: Mapping[str, Any], inside: Sequence[str | int]) -> str:
+    """Place of a value: 'my-board.toml [plate] thickness_mm', 'my-board.toml [[setup]] 2 "free" edges.x0'."""
     if not inside:
         return file
     head, *rest = inside
@@ -78,31 +78,33 @@ def place(file: str, table: Mapping[str, Any], inside: Sequence[str | int]) -> s
         rest = rest[1:]
         entry = value[number] if number < len(value) else None
         name = entry.get("name") if isinstance(entry, dict) else None
-        text = f"{file} [[{head}]] {number + 1}" + (f" {quoted(name)}" if isinstance(name, str) else "")
+        text = f"{file} [[{head}]] {number + 1}" + (f" {quote_text(name)}" if isinstance(name, str) else "")
     elif isinstance(value, dict):
         rest = rest[1:] if rest and isinstance(rest[0], int) else rest
-        text = f"{file} [{_key(str(head))}]"
+        text = f"{file} [{_shown_key(str(head))}]"
     else:
-        text = f"{file} {_key(str(head))}"
+        text = f"{file} {_shown_key(str(head))}"
     separator = " "
     for part in rest:
-        text += f" {part + 1}" if isinstance(part, int) else separator + _key(part)
+        text += f" {part + 1}" if isinstance(part, int) else separator + _shown_key(part)
         separator = " " if isinstance(part, int) else "."
     return text
 
 
-def _key(key: str) -> str:
-    return key if _BARE_KEY.fullmatch(key) else quoted(key)
+def _shown_key(key: str) -> str:
+    return key if _BARE_KEY.fullmatch(key) else quote_text(key)
 
 
-def _faults(model: type[Section], table: Mapping[str, Any], file: str, detail: Any) -> Iterator[Fault]:
+def _error_faults(model: type[Section], table: Mapping[str, Any], file: str, detail: Any) -> Iterator[Fault]:
     """The faults behind one error of pydantic."""
     inside: tuple[str | int, ...] = detail["loc"]
-    for one in _complaints(model, inside, detail):
-        yield Fault(place(file, table, (*inside, *one.inside)), one.wanted, one.got, one.remedy)
+    for complaint in _error_complaints(model, inside, detail):
+        yield Fault(
+            fault_place(file, table, (*inside, *complaint.inside)), complaint.wanted, complaint.got, complaint.remedy
+        )
 
 
-def _complaints(model: type[Section], inside: tuple[str | int, ...], detail: Any) -> Sequence[Complaint]:
+def _error_complaints(model: type[Section], inside: tuple[str | int, ...], detail: Any) -> Sequence[Complaint]:
     error = detail.get("ctx", {}).get("error")
     if isinstance(error, Refusal):
         return error.complaints
@@ -114,35 +116,35 @@ def _complaints(model: type[Section], inside: tuple[str | int, ...], detail: Any
         return (Complaint(sections[keys[:-1]][keys[-1]], "nothing"),)
     if detail["type"] == "too_long":
         return (Complaint(f"at most {detail['ctx']['max_length']} tables", str(len(detail["input"]))),)
-    several = detail["type"] in ("tuple_type", "list_type")
-    wanted = f"tables below [[{'.'.join(keys)}]], in double brackets" if several else "a table"
-    return (Complaint(wanted, shown(detail["input"])),)
+    wants_tables = detail["type"] in ("tuple_type", "list_type")
+    wanted = f"tables below [[{'.'.join(keys)}]], in double brackets" if wants_tables else "a table"
+    return (Complaint(wanted, show_value(detail["input"])),)
 
 
-def _unknown_key(keys: Keys, sections: Mapping[Keys, Mapping[str, str]]) -> Complaint:
+def _unknown_key(keys: KeyPath, sections: Mapping[KeyPath, Mapping[str, str]]) -> Complaint:
     *outer, key = keys
-    known = sections[tuple(outer)]
-    remedy = did_you_mean(key, known)
-    home = next((place for place, others in sections.items() if key in others), None)
-    if not remedy and home is not None:
-        remedy = f"it belongs in [{'.'.join(home)}]" if home else "it belongs above the first table"
-    return Complaint(f"one of {', '.join(known)}", "an unknown key", remedy)
+    known_keys = sections[tuple(outer)]
+    remedy = did_you_mean(key, known_keys)
+    home_section = next((path for path, section_keys in sections.items() if key in section_keys), None)
+    if not remedy and home_section is not None:
+        remedy = f"it belongs in [{'.'.join(home_section)}]" if home_section else "it belongs above the first table"
+    return Complaint(f"one of {', '.join(known_keys)}", "an unknown key", remedy)
 
 
 @cache
-def sections_of(model: Any) -> dict[Keys, dict[str, str]]:
+def sections_of(model: Any) -> dict[KeyPath, dict[str, str]]:
     """The sections of a card model: key path to known keys, each with a description of what is wanted."""
-    found: dict[Keys, dict[str, str]] = {(): {}}
-    for name, field in _fields(model).items():
+    sections: dict[KeyPath, dict[str, str]] = {(): {}}
+    for name, field in _model_fields(model).items():
         key = field.alias or name
-        found[()][key] = field.description or "a value"
-        for inner in _models_in(field.annotation):
+        sections[()][key] = field.description or "a value"
+        for inner in _inner_models(field.annotation):
             for path, keys in sections_of(inner).items():
-                found[(key, *path)] = keys
-    return found
+                sections[(key, *path)] = keys
+    return sections
 
 
-def _fields(model: Any) -> dict[str, FieldInfo]:
+def _model_fields(model: Any) -> dict[str, FieldInfo]:
     """The fields of a pydantic model, or of a dataclass that pydantic reads."""
     if issubclass(model, BaseModel):
         return model.model_fields
@@ -150,11 +152,11 @@ def _fields(model: Any) -> dict[str, FieldInfo]:
     return {name: FieldInfo.from_annotation(hints[name]) for name in model.__dataclass_fields__}
 
 
-def _models_in(annotation: Any) -> Iterator[type]:
+def _inner_models(annotation: Any) -> Iterator[type]:
     if hasattr(annotation, "__pydantic_config__") or hasattr(annotation, "model_fields"):
         yield annotation
     for part in get_args(annotation):
-        yield from _models_in(part)
+        yield from _inner_models(part)
 
 
 def _name_faults(table: Mapping[str, Any], file: str, stem: str) -> list[Fault]:
@@ -165,5 +167,5 @@ def _name_faults(table: Mapping[str, Any], file: str, stem: str) -> list[Fault]:
     complaint = name_complaint(stem)
     if complaint:
         remedy = "rename the file" + ("" if name_complaint(name) else f" to {name}.toml")
-        return [Fault(file, complaint, quoted(stem), remedy)]
-    return [Fault(f"{file} name", f"{quoted(stem)}, the name of the file", quoted(name))]
+        return [Fault(file, complaint, quote_text(stem), remedy)]
+    return [Fault(f"{file} name", f"{quote_text(stem)}, the name of the file", quote_text(name))]

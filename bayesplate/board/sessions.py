@@ -1,8 +1,9 @@
 """Sessions: setups that hold a board alike, on several days or after it was taken out of the clamp and put back.
 
-What a board does that its plate does not is the same in all of them: two sessions that both find a mode 1 % too low
-tell once, not twice, that the plate is wrong there. What clamping anew changes differs. The noise of a session is what
-scatters about the board's own frequencies, and between these and the plate's lies the model discrepancy of each mode,
+The real board departs from its ideal plate in the same way in all sessions: two sessions that both read a mode 1 % too
+low say once, not twice, that the plate is wrong there. The change from clamping anew differs between sessions. The
+noise of a session is the scatter about the board's own frequencies, and between these and the plate's lies the model
+discrepancy of each mode,
 
     ln f of the board = ln f of the plate + s d,
 
@@ -23,102 +24,105 @@ import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
-from bayesplate.board.parameter import Owner, Parameter, shown_name
+from bayesplate.board.parameter import Owner, Parameter, parameter_name
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import DEFAULT_NOISE, Setup
 from bayesplate.labels import Label
 
-DISCREPANCY, OF_MODES = "discrepancy", "discrepancies of the modes"
+DISCREPANCY, MODE_DISCREPANCIES = "discrepancy", "discrepancies of the modes"
 _SOURCE = "free boards, which no clamp disturbs, settle at 0.24-0.30 %"
 
 
-def sessions(board: Board) -> tuple[tuple[Setup, ...], ...]:
+def session_groups(board: Board) -> tuple[tuple[Setup, ...], ...]:
     """Groups of two setups or more that hold the board alike, load it alike and name its modes alike."""
     groups: list[list[Setup]] = []
     for setup in board.setups:
-        own = next((group for group in groups if _is_held_alike(group[0], setup)), None)
-        if own is None:
+        matching_group = next((group for group in groups if _is_held_alike(group[0], setup)), None)
+        if matching_group is None:
             groups.append([setup])
         else:
-            own.append(setup)
+            matching_group.append(setup)
     return tuple(tuple(group) for group in groups if len(group) > 1)
 
 
-def notes(board: Board) -> tuple[str, ...]:
+def session_notes(board: Board) -> tuple[str, ...]:
     """A sentence for each group of sessions."""
     return tuple(
         f"{', '.join(setup.name for setup in group[:-1])} and {group[-1].name} hold the board alike: they are taken "
         "for sessions of one setup, which share how the real board departs from the ideal plate"
-        for group in sessions(board)
+        for group in session_groups(board)
     )
 
 
-def _is_held_alike(one: Setup, other: Setup) -> bool:
-    covered = ({edge: length.mean for edge, length in each.clamped.items()} for each in (one, other))
+def _is_held_alike(setup: Setup, other: Setup) -> bool:
+    covered = ({edge: length.mean for edge, length in session.clamped.items()} for session in (setup, other))
     return next(covered) == next(covered) and all(
-        getattr(one, name) == getattr(other, name)
+        getattr(setup, name) == getattr(other, name)
         for name in ("ends_x", "ends_y", "first_label", "attached", "fluid", "bounce")
     )
 
 
 def with_discrepancies(board: Board) -> Board:
-    """The board with the discrepancies that its sessions share, one for each labelled mode; own priors stay."""
-    found = board
-    for group in sessions(board):
+    """The board with the discrepancies that its sessions share, one for each labelled mode; stated priors stay."""
+    extended_board = board
+    for group in session_groups(board):
         owner = Owner("group", f"{group[0].name} to {group[-1].name}")
         labels = sorted({label for setup in group for label in setup.labels})
-        new = (one for one in _parameters(owner, labels) if one.name not in board.inputs)
-        setups = tuple(replace(one, group=owner) if one in group else one for one in found.setups)
-        found = replace(found.with_parameters(new), setups=setups)
-    return found
+        parameters = (
+            parameter for parameter in _discrepancy_parameters(owner, labels) if parameter.name not in board.inputs
+        )
+        setups = tuple(replace(setup, group=owner) if setup in group else setup for setup in extended_board.setups)
+        extended_board = replace(extended_board.with_parameters(parameters), setups=setups)
+    return extended_board
 
 
-def _parameters(owner: Owner, labels: Sequence[Label]) -> Iterator[Parameter]:
+def _discrepancy_parameters(owner: Owner, labels: Sequence[Label]) -> Iterator[Parameter]:
     words = "discrepancy of the board from its plate"
     yield Parameter(DISCREPANCY, owner, DEFAULT_NOISE, "1", source=_SOURCE, words=words)
-    standard = Quantity.from_mean(0.0, 1.0, "normal")
+    standard_normal = Quantity.from_mean(0.0, 1.0, "normal")
     for label in labels:
         look = f"shifts mode {label} in all sessions"
-        yield Parameter(_key(label), owner, standard, "1", words=OF_MODES, look=look)
+        yield Parameter(_discrepancy_key(label), owner, standard_normal, "1", words=MODE_DISCREPANCIES, look=look)
 
 
-def shared_share(setup: Setup) -> float:
-    """Share of the variance of a setup's noise that a further session would find again, by the medians of the priors.
+def shared_variance_share(setup: Setup) -> float:
+    """Share of the variance of a setup's noise that a further session would repeat, by the medians of the priors.
 
-    None where its sessions share their discrepancies already: what is called noise there is the scatter of a session.
+    Zero where its sessions share their discrepancies already: the noise is then the scatter of a session alone.
     """
     if setup.group is not None:
         return 0.0
-    shared = DEFAULT_NOISE.median**2
-    return float(shared / (shared + setup.noise.median**2))
+    shared_variance = DEFAULT_NOISE.median**2
+    return float(shared_variance / (shared_variance + setup.noise.median**2))
 
 
-def same_modes(board: Board) -> tuple[tuple[int, ...], ...]:
-    """Which readings are of one mode in sessions of one setup, each reading in one of the groups, in their order.
+def readings_by_mode(board: Board) -> tuple[tuple[int, ...], ...]:
+    """Indices of the readings of each mode in all sessions of one setup; every reading is in one group, in its order.
 
-    A reading tells what the same mode is in another session, whatever the model: who asks how well a model predicts a
-    mode leaves all its readings out.
+    A reading predicts the same mode in another session whatever the model: a test of how well a model predicts a mode
+    leaves all readings of the mode out.
     """
-    found: dict[tuple[Owner | int, Label], list[int]] = {}
+    groups: dict[tuple[Owner | int, Label], list[int]] = {}
     reading = 0
-    for place, setup in enumerate(board.setups):
+    for position, setup in enumerate(board.setups):
         for label in setup.labels:
-            found.setdefault((place if setup.group is None else setup.group, label), []).append(reading)
+            groups.setdefault((position if setup.group is None else setup.group, label), []).append(reading)
             reading += 1
-    return tuple(map(tuple, found.values()))
+    return tuple(map(tuple, groups.values()))
 
 
 def discrepancy_names(setup: Setup, label: Label) -> tuple[str, str] | None:
-    """Names of the parameters whose product shifts ln f of a mode of a setup; None where it shares nothing."""
+    """Names of the parameters whose product shifts ln f of a mode; None where the setup shares no discrepancies."""
     if setup.group is None:
         return None
-    return shown_name(DISCREPANCY, setup.group), shown_name(_key(label), setup.group)
+    return parameter_name(DISCREPANCY, setup.group), parameter_name(_discrepancy_key(label), setup.group)
 
 
-def unknown_discrepancies(board: Board, setup: Setup) -> Floats:
+def unknown_discrepancy_variance(board: Board, setup: Setup) -> Floats:
     """Variance of the discrepancies of a setup's modes that no session has read: (n_modes,) array.
 
-    Zero of those whose discrepancy is a parameter of the board, and where sessions share nothing and the noise has it.
+    Zero for modes whose discrepancy is a parameter of the board, and where sessions share none and the noise includes
+    it.
     """
     variance = np.zeros(len(setup.labels))
     for i, label in enumerate(setup.labels):
@@ -129,23 +133,23 @@ def unknown_discrepancies(board: Board, setup: Setup) -> Floats:
     return variance
 
 
-def under_prior_scales(board: Board, values: Values, slopes: Floats, inputs: Floats) -> tuple[Floats, Floats]:
-    """Slopes (n_modes, n_inputs) and standard coordinates (n_inputs,) where discrepancies have their prior size.
+def rescale_discrepancies(board: Board, values: Values, slopes: Floats, inputs: Floats) -> tuple[Floats, Floats]:
+    """Slopes (n_modes, n_inputs) and standard coordinates (n_inputs,) with the discrepancies at their prior scale.
 
-    A fit lets their scale follow the residual. Who judges the residual must not: like noise that is left free, a scale
-    that has followed it would let any residual pass. The discrepancies stay what they were; their scale moves nothing.
+    In a fit the scale follows the residual. A test of the residual takes the prior scale: like free noise, a fitted
+    scale would let any residual pass. The discrepancies keep their values; the slope by their scale is zero.
     """
     slopes, inputs = slopes.copy(), inputs.copy()
-    for i, one in enumerate(board.uncertain):
-        if one.owner.kind != "group":
+    for i, parameter in enumerate(board.uncertain):
+        if parameter.owner.kind != "group":
             continue
-        scale = shown_name(DISCREPANCY, one.owner)
+        scale = parameter_name(DISCREPANCY, parameter.owner)
         prior = board.inputs[scale]
-        factor = float(np.hypot(prior.mean, prior.sd) / values[scale]) if one.name != scale else 0.0
+        factor = float(np.hypot(prior.mean, prior.sd) / values[scale]) if parameter.name != scale else 0.0
         slopes[:, i] *= factor
         inputs[i] = inputs[i] / factor if factor else 0.0
     return slopes, inputs
 
 
-def _key(label: Label) -> str:
+def _discrepancy_key(label: Label) -> str:
     return f"{DISCREPANCY} {label}"

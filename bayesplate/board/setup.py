@@ -13,22 +13,30 @@ from numpy.typing import ArrayLike, NDArray
 
 from bayesplate.board.attached import AttachedItem, DeclaredFluid
 from bayesplate.board.coefficients import CoefficientCard
-from bayesplate.board.parameter import Owner, Parameter, shown_name
+from bayesplate.board.parameter import Owner, Parameter, parameter_name
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import FREQUENCY, NO_OFFSET, Peak, Reading, label_text
-from bayesplate.board.setup_keys import MISSED, SPURIOUS, Edges, End, HammerKeys, SetupKeys, SupportKeys
-from bayesplate.board.stated import are, is_place, quantities_of, quantity_of, wrong_types
+from bayesplate.board.setup_keys import (
+    DEFAULT_MISSED,
+    DEFAULT_SPURIOUS,
+    EdgeCondition,
+    Edges,
+    HammerKeys,
+    SetupKeys,
+    SupportKeys,
+)
+from bayesplate.board.stated import are_instances, is_place, quantities_of, quantity_of, type_faults
 from bayesplate.board.words import EDGES
 from bayesplate.errors import Fault, InputError
 from bayesplate.labels import Label
 
-Ends = tuple[End, End]
+EdgeConditions = tuple[EdgeCondition, EdgeCondition]
 DEFAULT_NOISE = Quantity.from_median(0.003, np.exp(0.5))
 CLAMPED_NOISE = Quantity.from_median(0.008, np.exp(0.5))
 """Relative noise of a frequency: free boards settle at 0.24-0.30 %; re-clamping one board spreads it by 1-2.4 %."""
-_ALIKE = ("name", "clamped", "first_label", "resolution", "missed", "spurious", "attached")
-"""What a setup has as its table states it."""
+_FIELDS_AS_STATED = ("name", "clamped", "first_label", "resolution", "missed", "spurious", "attached")
+"""Fields that a setup and its table have in common."""
 NOISE_WANTED = "a relative noise and how far it may be off: Quantity.from_median(0.005, 2)"
 
 
@@ -37,7 +45,7 @@ def _is_number(value: object) -> bool:
 
 
 def assumed_noise(edges: Sequence[str], prior: PriorCard | None = None) -> Quantity:
-    """The relative noise where none is stated, that of the prior or else of such edges: an object of its own."""
+    """The relative noise where none is stated, from the prior or else from the edges: a new object."""
     if prior is not None and prior.noise_percent is not None:
         return prior.noise_percent.scaled(1e-2)
     return replace(CLAMPED_NOISE if "clamped" in edges else DEFAULT_NOISE)
@@ -58,7 +66,7 @@ class Setup:
     resolution : float, Hz
         Readings that are plain numbers are rounded to this; 0 if not rounded.
     peaks : tuple of Peak
-        Those without a label.
+        Peaks without a label.
     missed : float
         Probability that a mode below the highest peak left no peak.
     spurious : float
@@ -83,15 +91,15 @@ class Setup:
     """
 
     name: str
-    ends_x: Ends
-    ends_y: Ends
+    ends_x: EdgeConditions
+    ends_y: EdgeConditions
     readings: tuple[Reading, ...]
     noise: Quantity
     clamped: Mapping[str, Quantity] = field(default_factory=dict)
     resolution: float = 0.0
     peaks: tuple[Peak, ...] = ()
-    missed: float = MISSED
-    spurious: float = SPURIOUS
+    missed: float = DEFAULT_MISSED
+    spurious: float = DEFAULT_SPURIOUS
     first_label: Label = NO_OFFSET
     published_coefficients: CoefficientCard | None = None
     attached: tuple[AttachedItem, ...] = ()
@@ -104,7 +112,9 @@ class Setup:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "noise", quantity_of(self.noise, f"{self.name} noise", "relative"))
-        covered = {edge: quantity_of(one, f"{self.name} clamped {edge}", "in m") for edge, one in self.clamped.items()}
+        covered = {
+            edge: quantity_of(length, f"{self.name} clamped {edge}", "in m") for edge, length in self.clamped.items()
+        }
         object.__setattr__(self, "clamped", covered)
         if self.bounce is not None:
             object.__setattr__(self, "bounce", quantity_of(self.bounce, f"{self.name} bounce", "in Hz"))
@@ -130,8 +140,8 @@ class Setup:
     ) -> Setup:
         """A setup from numbers and arrays.
 
-        What is wrong with them beyond the names of edges and labels is said with the place on a card, when a board
-        with this setup is used.
+        Faults other than those of edge names and labels are reported with their place on a card, when a board with this
+        setup is used.
 
         Parameters
         ----------
@@ -169,7 +179,7 @@ class Setup:
         InputError
             With every label, frequency, peak and name of an edge that cannot be read.
         """
-        faults = list(wrong_types(str(name), (
+        faults = list(type_faults(str(name), (
             ("name", name, isinstance(name, str), "a text"),
             ("frequencies", frequencies, isinstance(frequencies, Mapping), "a dict of frequencies by label"),
             ("edges", edges, isinstance(edges, str | Mapping), "a word, or a dict of words by edge"),
@@ -179,7 +189,7 @@ class Setup:
             ("clamped", clamped, isinstance(clamped, Mapping | None), "a dict of lengths by edge"),
             ("signs", signs, isinstance(signs, Mapping | None), "a dict of signs by label"),
             ("unlabelled", unlabelled, isinstance(unlabelled, list | tuple | np.ndarray), "a list of peaks"),
-            ("attached", attached, are(attached, AttachedItem), "a list of AttachedItem"),
+            ("attached", attached, are_instances(attached, AttachedItem), "a list of AttachedItem"),
             ("hammer", hammer, hammer is None or is_place(hammer), "a place (x, y) in m"),
             ("fluid", fluid, isinstance(fluid, DeclaredFluid | None), "a DeclaredFluid"),
             ("published_coefficients", published_coefficients,
@@ -190,28 +200,28 @@ class Setup:
         if not isinstance(edges, str) and set(edges) != set(EDGES):
             faults.append(Fault(f"{name} edges", "a word for each of x0, x1, y0, y1", ", ".join(edges) or "none"))
         words = dict.fromkeys(EDGES, edges) if isinstance(edges, str) else {edge: edges.get(edge, "") for edge in EDGES}
-        told = {Label.parse(label_text(label)): sign for label, sign in (signs or {}).items()}
-        read: dict[Label, Quantity] = {}
+        signs_by_label = {Label.parse(label_text(label)): sign for label, sign in (signs or {}).items()}
+        frequencies_by_label: dict[Label, Quantity] = {}
         for label, frequency in frequencies.items():
             try:
-                one = Reading.of(label, frequency)
+                reading = Reading.of(label, frequency)
             except InputError as error:
                 faults += [replace(fault, place=f"{name} {fault.place}") for fault in error.faults]
                 continue
-            if one.label in read:
-                faults.append(Fault(f"{name} frequencies", f"the label {one.label} once", f"{label!r} again"))
-            read[one.label] = one.frequency
-        stray = [label for label in told if label not in read]
+            if reading.label in frequencies_by_label:
+                faults.append(Fault(f"{name} frequencies", f"the label {reading.label} once", f"{label!r} again"))
+            frequencies_by_label[reading.label] = reading.frequency
+        stray = [label for label in signs_by_label if label not in frequencies_by_label]
         faults += [Fault(f"{name} signs", "a label among the frequencies", str(label)) for label in stray]
         faults += [
-            Fault(f"{name} clamped", "one of x0, x1, y0, y1", str(one)) for one in clamped or {} if one not in EDGES
+            Fault(f"{name} clamped", "one of x0, x1, y0, y1", str(edge)) for edge in clamped or {} if edge not in EDGES
         ]
-        covered, no_lengths = quantities_of(clamped or {}, f"{name} clamped", "in m")
-        peaks = {i: one for i, one in enumerate(unlabelled, start=1) if isinstance(one, Peak)}
-        others = {i: one for i, one in enumerate(unlabelled, start=1) if not isinstance(one, Peak)}
-        hertz, no_peaks = quantities_of(others, f"{name} unlabelled", "in Hz, or a Peak")
-        peaks |= {i: Peak(one) for i, one in hertz.items()}
-        faults += [*no_lengths, *no_peaks]
+        covered, length_faults = quantities_of(clamped or {}, f"{name} clamped", "in m")
+        peaks = {i: peak for i, peak in enumerate(unlabelled, start=1) if isinstance(peak, Peak)}
+        plain_frequencies = {i: value for i, value in enumerate(unlabelled, start=1) if not isinstance(value, Peak)}
+        quantities, peak_faults = quantities_of(plain_frequencies, f"{name} unlabelled", "in Hz, or a Peak")
+        peaks |= {i: Peak(quantity) for i, quantity in quantities.items()}
+        faults += [*length_faults, *peak_faults]
         if faults:
             raise InputError(faults)
         keys = SetupKeys.model_construct(
@@ -222,8 +232,8 @@ class Setup:
             resolution=float(resolution),
             noise=noise,
             peaks=tuple(peaks[i] for i in sorted(peaks)),
-            frequencies=read,
-            signs=told,
+            frequencies=frequencies_by_label,
+            signs=signs_by_label,
             attached=tuple(attached),
             hammer=None if hammer is None else HammerKeys.model_construct(place=hammer),
             support=None if bounce is None else SupportKeys.model_construct(bounce=bounce),
@@ -234,16 +244,16 @@ class Setup:
     @classmethod
     def from_keys(cls, keys: SetupKeys) -> Setup:
         """The setup that a table [setup] of a card states; its published coefficients are still to be read."""
-        edges, first = keys.edges, keys.first_label
-        made = cls(
-            **{name: getattr(keys, name) for name in _ALIKE},
+        edges, first_label = keys.edges, keys.first_label
+        setup = cls(
+            **{name: getattr(keys, name) for name in _FIELDS_AS_STATED},
             ends_x=(edges.x0, edges.x1),
             ends_y=(edges.y0, edges.y1),
             readings=tuple(
                 Reading(
                     label,
-                    (label.m - first.m, label.n - first.n),
-                    _joined_with_rounding(frequency, keys.resolution),
+                    (label.m - first_label.m, label.n - first_label.n),
+                    _join_rounding_error(frequency, keys.resolution),
                     keys.signs.get(label, ""),
                     keys.confidence_in(label),
                 )
@@ -251,7 +261,7 @@ class Setup:
             ),
             noise=DEFAULT_NOISE if keys.noise is None else keys.noise,
             peaks=tuple(
-                replace(peak, frequency=_joined_with_rounding(peak.frequency, keys.resolution))
+                replace(peak, frequency=_join_rounding_error(peak.frequency, keys.resolution))
                 for peak in (*map(Peak, keys.unlabelled), *keys.peaks)
             ),
             hammer=None if keys.hammer is None else keys.hammer.place,
@@ -259,7 +269,7 @@ class Setup:
             bounce=None if keys.support is None else keys.support.bounce,
             table_name=keys.published_coefficients,
         )
-        return made.assuming_noise() if keys.noise is None else made
+        return setup.assuming_noise() if keys.noise is None else setup
 
     def table(self) -> dict[str, Any]:
         """The table [setup] of a card that states the setup.
@@ -272,20 +282,20 @@ class Setup:
             while text in frequencies:
                 text = text.replace(",", ", ", 1)
             frequencies[text] = FREQUENCY.write(reading.frequency)
-        doubted = {reading.label: reading.confidence for reading in self.readings if reading.confidence != 1}
-        is_alike = len(doubted) == len(self.readings) and len({*doubted.values()}) == 1
-        bare = tuple(takewhile(lambda peak: peak.is_bare, self.peaks))
-        published = self.published_coefficients
+        confidences = {reading.label: reading.confidence for reading in self.readings if reading.confidence != 1}
+        is_alike = len(confidences) == len(self.readings) and len({*confidences.values()}) == 1
+        bare_peaks = tuple(takewhile(lambda peak: peak.is_bare, self.peaks))
+        coefficient_card = self.published_coefficients
         keys = SetupKeys.model_construct(
             None,
-            **{name: getattr(self, name) for name in _ALIKE},
+            **{name: getattr(self, name) for name in _FIELDS_AS_STATED},
             edges=Edges.model_construct(None, **self.edges),
-            published_coefficients=self.table_name if published is None else published.name,
+            published_coefficients=self.table_name if coefficient_card is None else coefficient_card.name,
             noise=None if self.is_noise_assumed else self.noise,
-            unlabelled=tuple(peak.frequency for peak in bare),
-            peaks=self.peaks[len(bare) :],
+            unlabelled=tuple(peak.frequency for peak in bare_peaks),
+            peaks=self.peaks[len(bare_peaks) :],
             signs={reading.label: reading.sign for reading in self.readings if reading.sign},
-            label_confidence=next(iter(doubted.values())) if is_alike else doubted or 1.0,
+            label_confidence=next(iter(confidences.values())) if is_alike else confidences or 1.0,
             hammer=None if self.hammer is None else HammerKeys.model_construct(place=self.hammer),
             support=None if self.bounce is None else SupportKeys.model_construct(bounce=self.bounce),
             fluid=self.fluid,
@@ -300,7 +310,7 @@ class Setup:
 
     @property
     def is_noise_assumed(self) -> bool:
-        """Whether the noise is still the very object that was assumed: whoever states another one replaces it."""
+        """Whether the noise is still the very object that was assumed: a stated noise replaces it."""
         return self.noise is self.assumed
 
     @property
@@ -359,10 +369,10 @@ class Setup:
 
     def input_name(self, edge: str) -> str:
         """Name of the clamped length of an edge among the board's inputs."""
-        return shown_name(f"clamped_{edge}", self.owner)
+        return parameter_name(f"clamped_{edge}", self.owner)
 
 
-def _joined_with_rounding(frequency: Quantity, resolution: float) -> Quantity:
+def _join_rounding_error(frequency: Quantity, resolution: float) -> Quantity:
     """A list of readings with their standard error joined with the rounding error; a single number stays as it is."""
     if len(frequency.readings) < 2 or frequency.resolution or not resolution:
         return frequency

@@ -11,60 +11,68 @@ from bayesplate.board.attached import AttachedItem, DeclaredFluid
 from bayesplate.board.measures import (
     FIRST_LABEL,
     MOST_MODES,
+    MOST_MODES_REASON,
     NOISE,
     PLACE,
-    WHY_MOST_MODES,
     Place,
     QuantityReader,
-    by_label,
+    table_by_label,
 )
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.reading import CHANCE, FREQUENCY, NO_OFFSET, OPEN, PROBABILITY, SIGN, Peak
-from bayesplate.board.repeated import FURTHEST_SIZES, RULE, peak_comma_complaint
+from bayesplate.board.reading import (
+    FREQUENCY,
+    NO_OFFSET,
+    PROBABILITY,
+    PROBABILITY_HINT,
+    SIGN,
+    SMALLEST_PROBABILITY,
+    Peak,
+)
+from bayesplate.board.repeated import LARGEST_SIZE_RATIO, RULE, peak_comma_complaint
 from bayesplate.board.schema import Section
 from bayesplate.board.values import (
+    CardReference,
     Choice,
     Complaint,
     Key,
     Number,
-    Reference,
     Refusal,
     Text,
-    read_each,
+    read_entries,
+    read_items,
     read_list,
     read_name,
-    read_table,
     refuse,
 )
-from bayesplate.board.words import EDGE_WORDS, EDGES, shown
+from bayesplate.board.words import EDGE_WORDS, EDGES, show_value
 from bayesplate.labels import Label
 
 MOST_ATTACHED = 50
 DEFAULT_SETUP_NAME = "setup"
-MISSED, SPURIOUS = 0.2, 0.02
+DEFAULT_MISSED, DEFAULT_SPURIOUS = 0.2, 0.02
 """Probabilities where a card states none: that a mode below the highest peak left no peak, that a peak is no mode."""
 
-_CONFIDENCE = Number(OPEN, 1, hint=PROBABILITY).key
-_CONFIDENCES = by_label(_CONFIDENCE)
-_CLAMPED = Number(0.01, 100_000, "mm", "leave the edge out if the clamp covers nothing")
-_CLAMPED_LENGTH = QuantityReader(_CLAMPED, furthest=FURTHEST_SIZES, resolution=RULE).key
-_BOUNCE = QuantityReader(Number(0.01, 1000, "Hz"), furthest=FURTHEST_SIZES).key
+_CONFIDENCE = Number(SMALLEST_PROBABILITY, 1, hint=PROBABILITY_HINT).key
+_CONFIDENCES = table_by_label(_CONFIDENCE)
+_CLAMPED_NUMBER = Number(0.01, 100_000, "mm", "leave the edge out if the clamp covers nothing")
+_CLAMPED_LENGTH = QuantityReader(_CLAMPED_NUMBER, furthest=LARGEST_SIZE_RATIO, resolution=RULE).key
+_BOUNCE = QuantityReader(Number(0.01, 1000, "Hz"), furthest=LARGEST_SIZE_RATIO).key
 _EDGE_WANTED = 'a word for each of the four edges x0, x1, y0, y1: "clamped", "supported" or "free"'
 
-End = Literal["clamped", "supported", "free"]
-ReadEdge = Annotated[End, Key(Choice(EDGE_WORDS))]
+EdgeCondition = Literal["clamped", "supported", "free"]
+EdgeConditionField = Annotated[EdgeCondition, Key(Choice(EDGE_WORDS))]
 
 
 class Edges(Section):
     """How the four edges are held; x0 is the edge at x = 0."""
 
-    x0: ReadEdge = Field(description=_EDGE_WANTED)
-    x1: ReadEdge = Field(description=_EDGE_WANTED)
-    y0: ReadEdge = Field(description=_EDGE_WANTED)
-    y1: ReadEdge = Field(description=_EDGE_WANTED)
+    x0: EdgeConditionField = Field(description=_EDGE_WANTED)
+    x1: EdgeConditionField = Field(description=_EDGE_WANTED)
+    y0: EdgeConditionField = Field(description=_EDGE_WANTED)
+    y1: EdgeConditionField = Field(description=_EDGE_WANTED)
 
     @property
-    def words(self) -> dict[str, End]:
+    def words(self) -> dict[str, EdgeCondition]:
         """Edge name to word, in the order x0, x1, y0, y1."""
         return dict(self)
 
@@ -74,9 +82,9 @@ def edge_letters(words: Mapping[str, str]) -> str:
     return "".join(words[edge][0].upper() for edge in ("x0", "y0", "x1", "y1"))
 
 
-def edge_words(text: object) -> dict[str, End] | None:
+def edge_words(text: object) -> dict[str, EdgeCondition] | None:
     """All four edges from one word, or from four letters in the paper's order x0, y0, x1, y1; None from other texts."""
-    letters: dict[str, End] = {"C": "clamped", "S": "supported", "F": "free"}
+    letters: dict[str, EdgeCondition] = {"C": "clamped", "S": "supported", "F": "free"}
     for word in letters.values():
         if text == word:
             return dict.fromkeys(EDGES, word)
@@ -86,13 +94,15 @@ def edge_words(text: object) -> dict[str, End] | None:
     return {"x0": x0, "x1": x1, "y0": y0, "y1": y1}
 
 
-def _edges_table(value: object) -> object:
-    """Refuse a word where the table of the edges stands, and write out the table that it may mean."""
+def _check_edges_table(value: object) -> object:
+    """Refuse a word in place of the table of edges, with the table that it may mean as the remedy."""
     if isinstance(value, dict):
         return value
     words = edge_words(value)
     table = ", ".join(f'{edge} = "{word}"' for edge, word in (words or {}).items())
-    raise Refusal(Complaint("a table", shown(value), f"edges = {{ {table} }}" if words else "x0 is the edge at x = 0"))
+    raise Refusal(
+        Complaint("a table", show_value(value), f"edges = {{ {table} }}" if words else "x0 is the edge at x = 0")
+    )
 
 
 class HammerKeys(Section):
@@ -117,22 +127,24 @@ def _read_setup_name(value: object) -> str:
 def _read_unlabelled(value: object) -> tuple[Quantity, ...]:
     if value == []:
         return ()
-    items = read_list(value, "frequencies", MOST_MODES, WHY_MOST_MODES)
+    items = read_list(value, "frequencies", MOST_MODES, MOST_MODES_REASON)
     refuse(peak_comma_complaint(items))
-    return tuple(read_each(enumerate(items), FREQUENCY.read))
+    return tuple(read_items(enumerate(items), FREQUENCY.read))
 
 
 def _read_clamped(value: object) -> dict[str, Quantity]:
     if not isinstance(value, dict):
-        raise Refusal(Complaint("a table of clamped edges, { x0 = 30 }", shown(value)))
-    return read_table(value, dict.fromkeys(EDGES, _CLAMPED_LENGTH.read))
+        raise Refusal(Complaint("a table of clamped edges, { x0 = 30 }", show_value(value)))
+    return read_entries(value, dict.fromkeys(EDGES, _CLAMPED_LENGTH.read))
 
 
-_CLAMPS = Key(_read_clamped, lambda found: {edge: _CLAMPED_LENGTH.write(one) for edge, one in found.items()})
-_UNLABELLED = Key(_read_unlabelled, lambda found: [FREQUENCY.write(one) for one in found])
-_ALL_OR_EACH = Key(
+_CLAMPED_LENGTHS = Key(
+    _read_clamped, lambda lengths: {edge: _CLAMPED_LENGTH.write(length) for edge, length in lengths.items()}
+)
+_UNLABELLED = Key(_read_unlabelled, lambda frequencies: [FREQUENCY.write(frequency) for frequency in frequencies])
+_CONFIDENCE_OR_TABLE = Key(
     lambda value: _CONFIDENCES.read(value) if isinstance(value, dict) else _CONFIDENCE.read(value),
-    lambda found: _CONFIDENCES.write(found) if isinstance(found, Mapping) else found,
+    lambda confidence: _CONFIDENCES.write(confidence) if isinstance(confidence, Mapping) else confidence,
 )
 
 
@@ -141,19 +153,21 @@ class SetupKeys(Section):
 
     name: Annotated[str, Key(_read_setup_name)] = DEFAULT_SETUP_NAME
     notes: Text = ""
-    edges: Annotated[Edges, BeforeValidator(_edges_table)] = Field(description=_EDGE_WANTED)
-    clamped: Annotated[Mapping[str, Quantity], _CLAMPS] = Field(default={}, alias="clamped_mm")
+    edges: Annotated[Edges, BeforeValidator(_check_edges_table)] = Field(description=_EDGE_WANTED)
+    clamped: Annotated[Mapping[str, Quantity], _CLAMPED_LENGTHS] = Field(default={}, alias="clamped_mm")
     first_label: Annotated[Label, FIRST_LABEL] = NO_OFFSET
     resolution: Annotated[float, Number(1e-6, 1000, "Hz").key] = Field(default=0.0, alias="resolution_hz")
-    published_coefficients: Reference = ""
+    published_coefficients: CardReference = ""
     noise: Annotated[Quantity | None, NOISE] = Field(default=None, alias="noise_percent")
     unlabelled: Annotated[tuple[Quantity, ...], _UNLABELLED] = Field(default=(), alias="unlabelled_hz")
     peaks: tuple[Peak, ...] = Field(default=(), max_length=MOST_MODES)
-    missed: Annotated[float, CHANCE] = Field(default=MISSED, alias="missed_probability")
-    spurious: Annotated[float, CHANCE] = Field(default=SPURIOUS, alias="spurious_probability")
-    frequencies: Annotated[Mapping[Label, Quantity], by_label(FREQUENCY)] = Field(default={}, alias="frequencies_hz")
-    signs: Annotated[Mapping[Label, str], by_label(SIGN)] = {}
-    label_confidence: Annotated[float | Mapping[Label, float], _ALL_OR_EACH] = 1.0
+    missed: Annotated[float, PROBABILITY] = Field(default=DEFAULT_MISSED, alias="missed_probability")
+    spurious: Annotated[float, PROBABILITY] = Field(default=DEFAULT_SPURIOUS, alias="spurious_probability")
+    frequencies: Annotated[Mapping[Label, Quantity], table_by_label(FREQUENCY)] = Field(
+        default={}, alias="frequencies_hz"
+    )
+    signs: Annotated[Mapping[Label, str], table_by_label(SIGN)] = {}
+    label_confidence: Annotated[float | Mapping[Label, float], _CONFIDENCE_OR_TABLE] = 1.0
     attached: tuple[AttachedItem, ...] = Field(default=(), max_length=MOST_ATTACHED)
     hammer: HammerKeys | None = None
     support: SupportKeys | None = None
@@ -163,7 +177,7 @@ class SetupKeys(Section):
     @model_validator(mode="before")
     @classmethod
     def _always_has_frequencies(cls, table: Any) -> Any:
-        """None at all are a fault of their key, like an empty table of them."""
+        """Missing frequencies are a fault of their key, like an empty table."""
         return {"frequencies_hz": {}, **table} if isinstance(table, dict) else table
 
     def confidence_in(self, label: Label) -> float:
@@ -171,17 +185,19 @@ class SetupKeys(Section):
         stated = self.label_confidence
         return stated.get(label, 1.0) if isinstance(stated, Mapping) else stated
 
-    # These compare two keys. They read info.data, which holds the earlier keys that were themselves in order, so that
-    # they complain beside the faults of other keys and never because of one.
+    # The validators below compare two keys. info.data holds the earlier keys that are valid, so that the fault of one
+    # key never causes another fault.
 
     @field_validator("clamped")
     @classmethod
     def _names_clamped_edges(cls, value: Mapping[str, Quantity], info: ValidationInfo) -> Mapping[str, Quantity]:
         edges = info.data.get("edges")
         if edges is not None:
-            loose = [edge for edge in value if edges.words[edge] != "clamped"]
-            if loose:
-                raise Refusal(*(Complaint("a clamped edge", f"a {edges.words[e]} one", inside=(e,)) for e in loose))
+            unclamped = [edge for edge in value if edges.words[edge] != "clamped"]
+            if unclamped:
+                raise Refusal(
+                    *(Complaint("a clamped edge", f"a {edges.words[edge]} one", inside=(edge,)) for edge in unclamped)
+                )
         return value
 
     @field_validator("air")
@@ -196,9 +212,9 @@ class SetupKeys(Section):
     def _stands_once(cls, value: tuple[Peak, ...]) -> tuple[Peak, ...]:
         firsts = [(i, value.index(peak)) for i, peak in enumerate(value)]
         wanted, remedy = "a peak of its own", "repeated readings of one peak are a list: hz = [.., ..]"
-        again = [Complaint(wanted, f"peak {first + 1} again", remedy, (i,)) for i, first in firsts if first < i]
-        if again:
-            raise Refusal(*again)
+        complaints = [Complaint(wanted, f"peak {first + 1} again", remedy, (i,)) for i, first in firsts if first < i]
+        if complaints:
+            raise Refusal(*complaints)
         return value
 
     @field_validator("frequencies")

@@ -1,4 +1,4 @@
-"""Files of cards: their place, a path or a name on the shelf that comes with the package, and the table they hold."""
+"""Files of cards, by their path or by their name on the shelf of shipped cards, and the tables in them."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, Literal
 
-from bayesplate.board.toml import read_file, read_table
-from bayesplate.board.words import did_you_mean, quoted
+from bayesplate.board.toml import parse_toml, read_file
+from bayesplate.board.words import did_you_mean, quote_text
 from bayesplate.board.writing import toml_text
-from bayesplate.errors import Fault, InputError, plain
+from bayesplate.errors import Fault, InputError, printable
 
 CardKind = Literal["boards", "priors", "coefficients", "campaigns"]
 _SINGULAR = {"boards": "board", "priors": "prior", "coefficients": "coefficient", "campaigns": "campaign"}
 CAMPAIGN_REMEDY = "check, fit, diagnose and plan take it"
 _PACKAGE = Path(__file__).resolve().parents[1]
-_INSTALLED = _PACKAGE / "models"
-_CHECKOUT = _PACKAGE.parent / "models"
+_INSTALLED_SHELF = _PACKAGE / "models"
+_CHECKOUT_SHELF = _PACKAGE.parent / "models"
 
 
 def shelf_folder(kind: CardKind) -> Path:
     """The folder of the shipped cards of one kind, in the package or the checkout; InputError if there is none."""
-    for shelf in (_INSTALLED, _CHECKOUT):
+    for shelf in (_INSTALLED_SHELF, _CHECKOUT_SHELF):
         if (shelf / kind).is_dir():
             return shelf / kind
-    both = f"neither {_INSTALLED / kind} nor {_CHECKOUT / kind}"
-    raise InputError(Fault("shelf of cards", f"the folder models/{kind}", both, "install bayesplate again"))
+    folders = f"neither {_INSTALLED_SHELF / kind} nor {_CHECKOUT_SHELF / kind}"
+    raise InputError(Fault("shelf of cards", f"the folder models/{kind}", folders, "install bayesplate again"))
 
 
 def card_names(kind: CardKind) -> tuple[str, ...]:
@@ -37,7 +37,7 @@ def card_names(kind: CardKind) -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in shelf_folder(kind).glob("*.toml")))
 
 
-def find(kind: CardKind, name_or_path: str | os.PathLike[str], beside: Path | None = None) -> Path:
+def find_card(kind: CardKind, name_or_path: str | os.PathLike[str], beside: Path | None = None) -> Path:
     """The file of a card: a path, from the folder `beside`, if it looks like one, otherwise a name on the shelf.
 
     Raises InputError if a name is not on the shelf, with the nearest card and how to write a path.
@@ -50,44 +50,44 @@ def find(kind: CardKind, name_or_path: str | os.PathLike[str], beside: Path | No
         return shelf_folder(kind) / f"{text}.toml"
     wanted = f"the name of a {_SINGULAR[kind]} card, or a path that ends in .toml"
     got = f"no card of that name in {shelf_folder(kind)}"
-    here = Path(f"{text}.toml")
+    local_file = Path(f"{text}.toml")
     is_possible = "\0" not in text and len(text) < 200
     if kind == "boards" and text in card_names("campaigns"):
         remedy = f"it is a campaign: {CAMPAIGN_REMEDY}"
-    elif is_possible and here.is_file():
-        remedy = f"there is a file here: write {quoted(str(here))}"
+    elif is_possible and local_file.is_file():
+        remedy = f"there is a file here: write {quote_text(str(local_file))}"
     elif is_possible and Path(text).suffix and Path(text).is_file():
         remedy = "a card is a TOML file; bayesplate new writes a first one, for the frequencies to be put in"
     else:
-        remedy = did_you_mean(text, names) or f"a card in {plain(os.getcwd())} is given as a path"
-    raise InputError(Fault(quoted(text), wanted, got, remedy))
+        remedy = did_you_mean(text, names) or f"a card in {printable(os.getcwd())} is given as a path"
+    raise InputError(Fault(quote_text(text), wanted, got, remedy))
 
 
 @dataclass(frozen=True)
 class CardFile:
-    """The table of a card, as its file states it, or would state it where there is none."""
+    """The table of a card, read from a file or made in Python."""
 
     table: Mapping[str, Any]
     name: str
-    folder: Path | None = None  # where the cards stand that it names by a relative path
-    read: str = ""  # the text of the file; empty where the table was made otherwise
+    folder: Path | None = None  # from which the relative paths on the card start
+    read: str = ""  # the text of the file; empty for a table made in Python
 
     @classmethod
     def load(cls, kind: CardKind, name_or_path: str | os.PathLike[str], beside: Path | None = None) -> CardFile:
         """A card of the shelf by its name, or of a path; raises InputError if it is no table."""
-        path = find(kind, name_or_path, beside)
+        path = find_card(kind, name_or_path, beside)
         return cls.of(read_file(path), path.name, path.parent)
 
     @classmethod
     def of(cls, content: bytes | str, name: str, folder: Path | None = None) -> CardFile:
         """A card from the content of a file; raises InputError if it is no table."""
         data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
-        return cls(read_table(data, plain(name)), name, folder, data.decode("utf-8"))
+        return cls(parse_toml(data, printable(name)), name, folder, data.decode("utf-8"))
 
     @property
     def shown(self) -> str:
-        """Its name as messages show it."""
-        return plain(self.name)
+        """The name of the file as messages show it."""
+        return printable(self.name)
 
     @property
     def stem(self) -> str:

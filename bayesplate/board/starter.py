@@ -1,4 +1,4 @@
-"""The text of a first board card, from a few numbers; what was not given stands there as an example to be replaced."""
+"""The text of a first board card from a few numbers; missing numbers stand there as examples to be replaced."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from bayesplate.board.words import EDGES
 from bayesplate.board.writing import toml_value
 from bayesplate.labels import Label
 
-_EXAMPLE = "# an example: put yours here"
+_EXAMPLE_COMMENT = "# an example: put yours here"
 HALF_TOP = {"length_x": 550.0, "length_y": 200.0, "thickness": 2.8}
-"""A guitar half-top, mm: stands in for what is not known yet; its density is that of the wood whatever its sizes."""
+"""Sizes of a guitar half-top, mm, as examples; its density is that of the wood whatever the sizes."""
 
 SPRUCE_DENSITY = 420.0
-_AIR = (
+_AIR_LINES = (
     "# The air of the room moves with the board; take these three lines out for frequencies computed without it.",
     "[setup.fluid]",
     "density_kg_m3 = 1.2",
@@ -28,7 +28,7 @@ def starter_text(
     edges: Mapping[str, str],
     prior: str,
     frequencies: Mapping[str, float],  # label to Hz
-    examples: Sequence[Label],  # modes of such a board: lines to be filled in where they were not measured
+    examples: Sequence[Label],  # modes of such a board: lines to be filled in for those not measured
     **texts: str,
 ) -> str:
     """A board card in TOML; `texts` stand above its tables."""
@@ -39,9 +39,9 @@ def starter_text(
         *(f"{key} = {toml_value(text)}" for key, text in texts.items() if text),
         "",
         "[plate]  # the whole board; x is along the grain",
-        _size(sizes, "length_x", "length_x_mm = {:g}"),
-        _size(sizes, "length_y", "length_y_mm = {:g}"),
-        _size(sizes, "thickness", f"thickness_mm = {{{{ mean = {{:g}}, sd = {CALIPER:g} }}}}"),
+        _size_line(sizes, "length_x", "length_x_mm = {:g}"),
+        _size_line(sizes, "length_y", "length_y_mm = {:g}"),
+        _size_line(sizes, "thickness", f"thickness_mm = {{{{ mean = {{:g}}, sd = {CALIPER:g} }}}}"),
         f"mass_g = {sizes['mass']:g}"
         if "mass" in sizes
         else f"density_kg_m3 = {SPRUCE_DENSITY:g}  # an example: put mass_g here in its place",
@@ -55,14 +55,14 @@ def starter_text(
     if "clamped" in edges.values():
         lines.append("# clamped_mm = { x0 = 30 }  # what the clamp covers, where the plate's length includes it")
     lines.append("# unlabelled_hz = [404, 448.8]  # peaks of which you cannot tell the mode")
-    lines += ["", *_AIR]
+    lines += ["", *_AIR_LINES]
     lines += ["", '[setup.frequencies_hz]  # "(m,n)": m nodal lines crossed along x, n along y']
     lines += [f"{toml_value(label)} = {hz:g}" for label, hz in frequencies.items()]
     lines += [f'# "{label}" = ' for label in examples if str(label) not in frequencies]
     return "\n".join(lines) + "\n"
 
 
-def _size(sizes: Mapping[str, float], name: str, form: str) -> str:
+def _size_line(sizes: Mapping[str, float], name: str, form: str) -> str:
     if name in sizes:
         return form.format(sizes[name])
-    return f"{form.format(HALF_TOP[name])}  {_EXAMPLE}"
+    return f"{form.format(HALF_TOP[name])}  {_EXAMPLE_COMMENT}"

@@ -12,32 +12,40 @@ from pydantic import BeforeValidator
 from pydantic_core import core_schema
 
 from bayesplate.board.units import OTHER_UNITS, SI, in_unit
-from bayesplate.board.words import EFFECT_NAMES, did_you_mean, effect_named, listed, name_complaint, quoted, shown
+from bayesplate.board.words import (
+    EFFECT_NAMES,
+    canonical_effect,
+    did_you_mean,
+    list_words,
+    name_complaint,
+    quote_text,
+    show_value,
+)
 
 T = TypeVar("T")
-Inside = tuple[str | int, ...]
+ValuePath = tuple[str | int, ...]
 
 
 @dataclass(frozen=True)
 class Complaint:
-    """What is wrong with a value, before it is known in which file and section it stands."""
+    """A fault of a value without its place: the reader of a value does not know the file and the section."""
 
     wanted: str
     got: str
     remedy: str = ""
-    inside: Inside = ()
+    inside: ValuePath = ()
 
 
 class Refusal(ValueError):
     """One or more complaints about a value; pydantic carries it to `bayesplate.board.schema`."""
 
     def __init__(self, *complaints: Complaint) -> None:
-        super().__init__("; ".join(f"wanted {one.wanted}, got {one.got}" for one in complaints))
+        super().__init__("; ".join(f"wanted {complaint.wanted}, got {complaint.got}" for complaint in complaints))
         self.complaints = complaints
 
     def inside(self, *keys: str | int) -> list[Complaint]:
-        """The complaints about a part of a value."""
-        return [replace(one, inside=(*keys, *one.inside)) for one in self.complaints]
+        """The complaints about a part of a value, with the keys that lead to the part."""
+        return [replace(complaint, inside=(*keys, *complaint.inside)) for complaint in self.complaints]
 
 
 @dataclass(frozen=True)
@@ -48,55 +56,55 @@ class Key:
     write: Callable[[Any], Any] = lambda value: value  # to what the TOML writer takes
 
     def __get_pydantic_core_schema__(self, source: object, handler: object) -> core_schema.CoreSchema:
-        writing = core_schema.plain_serializer_function_ser_schema(self.write)
-        return core_schema.no_info_plain_validator_function(self.read, serialization=writing)
+        serializer = core_schema.plain_serializer_function_ser_schema(self.write)
+        return core_schema.no_info_plain_validator_function(self.read, serialization=serializer)
 
 
 def refuse(complaint: Complaint | None) -> None:
-    """Raise what is wrong with a value, if anything is."""
+    """Raise a complaint about a value; do nothing without one."""
     if complaint is not None:
         raise Refusal(complaint)
 
 
-def read_each(items: Iterable[tuple[str | int, Any]], read: Callable[[Any], T]) -> list[T]:
-    """Read the parts of a list or table and refuse all bad ones at once."""
-    good: list[T] = []
-    bad: list[Complaint] = []
+def read_items(items: Iterable[tuple[str | int, Any]], read: Callable[[Any], T]) -> list[T]:
+    """Read the items of a list or table and refuse all bad ones at once."""
+    values: list[T] = []
+    complaints: list[Complaint] = []
     for key, value in items:
         try:
-            good.append(read(value))
+            values.append(read(value))
         except Refusal as refusal:
-            bad += refusal.inside(key)
-    if bad:
-        raise Refusal(*bad)
-    return good
+            complaints += refusal.inside(key)
+    if complaints:
+        raise Refusal(*complaints)
+    return values
 
 
-def read_table(
+def read_entries(
     table: dict[str, Any], readers: Mapping[str, Callable[[Any], Any]], needed: Iterable[str] = ()
 ) -> dict[str, Any]:
     """Read each entry of a table with the reader of its key; unknown keys are refused with the nearest known one."""
-    good: dict[str, Any] = {}
-    bad: list[Complaint] = []
+    entries: dict[str, Any] = {}
+    complaints: list[Complaint] = []
     for key, value in table.items():
         if key not in readers:
-            known = f"one of {', '.join(readers)}"
-            bad.append(Complaint(known, "an unknown key", did_you_mean(key, readers), (key,)))
+            wanted = f"one of {', '.join(readers)}"
+            complaints.append(Complaint(wanted, "an unknown key", did_you_mean(key, readers), (key,)))
             continue
         try:
-            good[key] = readers[key](value)
+            entries[key] = readers[key](value)
         except Refusal as refusal:
-            bad += refusal.inside(key)
-    bad += [Complaint("a value", "nothing", inside=(key,)) for key in needed if key not in table]
-    if bad:
-        raise Refusal(*bad)
-    return good
+            complaints += refusal.inside(key)
+    complaints += [Complaint("a value", "nothing", inside=(key,)) for key in needed if key not in table]
+    if complaints:
+        raise Refusal(*complaints)
+    return entries
 
 
 def read_list(value: object, what: str, most: int, why: str = "") -> list[Any]:
     """A list that is neither empty nor longer than `most`."""
     if not isinstance(value, list):
-        raise Refusal(Complaint(f"a list of {what}", shown(value)))
+        raise Refusal(Complaint(f"a list of {what}", show_value(value)))
     if not value:
         raise Refusal(Complaint(f"at least one of {what}", "an empty list"))
     if len(value) > most:
@@ -104,8 +112,8 @@ def read_list(value: object, what: str, most: int, why: str = "") -> list[Any]:
     return value
 
 
-def one_or_more(tables: str, most: int) -> BeforeValidator:
-    """A table alone is a list of one; the tables are read by their model."""
+def list_of_tables(tables: str, most: int) -> BeforeValidator:
+    """A validator that takes a single table for a list of one; their model reads the tables."""
     return BeforeValidator(lambda value: [value] if isinstance(value, dict) else read_list(value, tables, most))
 
 
@@ -113,8 +121,8 @@ def one_or_more(tables: str, most: int) -> BeforeValidator:
 class Number:
     """Reads a finite number between two limits, in the unit that stands in the key.
 
-    The range is checked before any arithmetic, so that 1e300 or a thousand-digit integer never reaches a formula. What
-    is below it, but positive, may be in another unit: `too_small` says so.
+    The range is checked before any arithmetic, so that 1e300 or a thousand-digit integer never reaches a formula. A
+    positive number below the range may be in another unit: `too_small` says so.
     """
 
     low: float
@@ -125,15 +133,15 @@ class Number:
 
     def __call__(self, value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise Refusal(Complaint("a number", shown(value), number_hint(value, self.unit)))
+            raise Refusal(Complaint("a number", show_value(value), number_hint(value, self.unit)))
         if isinstance(value, float) and not math.isfinite(value):
-            raise Refusal(Complaint("a finite number", shown(value)))
+            raise Refusal(Complaint("a finite number", show_value(value)))
         if value <= 0 < self.low:
-            raise Refusal(Complaint("a positive number", shown(value), self.hint))
+            raise Refusal(Complaint("a positive number", show_value(value), self.hint))
         if not self.low <= value <= self.high:
             limits = f"a number from {self.low:.10g} to {self.high:.10g} {self.unit}".rstrip()
             hint = self.too_small if value < self.low else ""
-            raise Refusal(Complaint(limits, shown(value), hint or self.hint))
+            raise Refusal(Complaint(limits, show_value(value), hint or self.hint))
         return float(value)
 
     @property
@@ -152,16 +160,16 @@ def number_hint(value: object, unit: str) -> str:
     if not isinstance(value, str):
         return ""
     text = value.strip()
-    if strange := strange_character(value):
-        return strange
+    if remedy := strange_character_remedy(value):
+        return remedy
     if re.fullmatch(r"[+-]?[0-9]{1,12},[0-9]{1,12}", text):
-        return two_readings(text) or f"a decimal point and no quotes: {text.replace(',', '.')}"
+        return comma_ambiguity(text) or f"a decimal point and no quotes: {text.replace(',', '.')}"
     if re.fullmatch(r"[+-]?[0-9]{1,12}(\.[0-9]{0,12})?", text):
         return "no quotes around a number"
-    stated = re.fullmatch(r"([0-9]{1,9}(?:\.[0-9]{1,9})?) ?([A-Za-z/0-9%\"]{1,8})", text)
-    if stated and (factor := OTHER_UNITS.get(unit, {}).get(stated[2])):
-        meant = f"{float(stated[1]) * factor:.4g}"
-        return f"{text} are {meant} {unit}: write {meant} alone, the unit stands in the key"
+    with_unit = re.fullmatch(r"([0-9]{1,9}(?:\.[0-9]{1,9})?) ?([A-Za-z/0-9%\"]{1,8})", text)
+    if with_unit and (factor := OTHER_UNITS.get(unit, {}).get(with_unit[2])):
+        number = f"{float(with_unit[1]) * factor:.4g}"
+        return f"{text} are {number} {unit}: write {number} alone, the unit stands in the key"
     if re.fullmatch(r"[0-9.]{1,12} ?[A-Za-z/0-9%]{1,8}", text):
         return "the unit stands in the key: write the number alone"
     return ""
@@ -176,20 +184,20 @@ _STRANGE = {
 }
 
 
-def strange_character(text: str) -> str:
-    """What to write in place of a character that programs for texts put beside numbers; empty if there is none."""
+def strange_character_remedy(text: str) -> str:
+    """What to write in place of a typographic character of word processors beside a number; empty if there is none."""
     return next((f"it holds {remedy}" for character, remedy in _STRANGE.items() if character in text), "")
 
 
-def two_readings(text: str) -> str:
-    """Both numbers that "1,024" may be, where the comma may part thousands as well as decimals; empty for others."""
+def comma_ambiguity(text: str) -> str:
+    """Both numbers that "1,024" may mean, its comma separating thousands or decimals; empty for other texts."""
     if not re.fullmatch(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}", text):
         return ""
     return f"ambiguous: write {text.replace(',', '.')} or {text.replace(',', '')}, whichever is meant"
 
 
 @dataclass(frozen=True)
-class Whole:
+class WholeNumber:
     """Reads a whole number between two limits."""
 
     low: int
@@ -197,7 +205,7 @@ class Whole:
 
     def __call__(self, value: object) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or not self.low <= value <= self.high:
-            raise Refusal(Complaint(f"a whole number from {self.low} to {self.high}", shown(value)))
+            raise Refusal(Complaint(f"a whole number from {self.low} to {self.high}", show_value(value)))
         return value
 
 
@@ -211,23 +219,23 @@ class Choice:
         if isinstance(value, str) and value in self.words:
             return value
         remedy = did_you_mean(value, self.words) if isinstance(value, str) else ""
-        raise Refusal(Complaint(listed(self.words), shown(value), remedy))
+        raise Refusal(Complaint(list_words(self.words), show_value(value), remedy))
 
 
 def read_format(value: object) -> int:
     """The number of the card format."""
     if isinstance(value, bool) or value != 1 or not isinstance(value, int):
-        raise Refusal(Complaint("1", shown(value), "this version reads card format 1"))
+        raise Refusal(Complaint("1", show_value(value), "this version reads card format 1"))
     return value
 
 
 def read_name(value: object) -> str:
     """A name that can become a file name."""
     if not isinstance(value, str):
-        raise Refusal(Complaint("a name", shown(value)))
+        raise Refusal(Complaint("a name", show_value(value)))
     complaint = name_complaint(value)
     if complaint:
-        raise Refusal(Complaint(complaint, quoted(value)))
+        raise Refusal(Complaint(complaint, quote_text(value)))
     return value
 
 
@@ -238,39 +246,39 @@ def read_reference(value: object) -> str:
     return read_name(value)
 
 
-def read_switch(value: object) -> bool:
+def read_boolean(value: object) -> bool:
     """Read true or false."""
     if not isinstance(value, bool):
-        raise Refusal(Complaint("true or false", shown(value)))
+        raise Refusal(Complaint("true or false", show_value(value)))
     return value
 
 
 def read_text(value: object) -> str:
     """A text for people: any writing, no control characters."""
     if not isinstance(value, str):
-        raise Refusal(Complaint("a text in quotes", shown(value)))
+        raise Refusal(Complaint("a text in quotes", show_value(value)))
     if len(value) > 4000:
         raise Refusal(Complaint("a text of at most 4000 characters", f"{len(value)} characters"))
     if re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", value):
-        raise Refusal(Complaint("a text without control characters", quoted(value)))
+        raise Refusal(Complaint("a text without control characters", quote_text(value)))
     return value
 
 
 def read_effect(value: object) -> str:
     """The name of an effect, or another one that is accepted for it."""
-    return Choice(EFFECT_NAMES)(effect_named(value) if isinstance(value, str) else value)
+    return Choice(EFFECT_NAMES)(canonical_effect(value) if isinstance(value, str) else value)
 
 
 def read_effects(value: object) -> tuple[str, ...]:
     """A list of different effects; it may be empty."""
     if value == []:
         return ()
-    read = read_each(enumerate(read_list(value, "names of effects", len(EFFECT_NAMES))), read_effect)
-    twice = sorted({word for word in read if read.count(word) > 1})
-    if twice:
-        raise Refusal(Complaint("each name once", f"{listed(twice)} twice"))
-    return tuple(read)
+    effects = read_items(enumerate(read_list(value, "names of effects", len(EFFECT_NAMES))), read_effect)
+    repeated = sorted({word for word in effects if effects.count(word) > 1})
+    if repeated:
+        raise Refusal(Complaint("each name once", f"{list_words(repeated)} twice"))
+    return tuple(effects)
 
 
 Text = Annotated[str, Key(read_text)]
-Reference = Annotated[str, Key(read_reference)]
+CardReference = Annotated[str, Key(read_reference)]

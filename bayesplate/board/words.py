@@ -1,4 +1,4 @@
-"""The words a card may use, the rule for names, and how a wrong word or value is shown and mended."""
+"""The words of a card, the rule for names, and how messages show a wrong word or value and its remedy."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 from datetime import date, datetime, time
 
-from bayesplate.errors import plain
+from bayesplate.errors import printable
 
 EDGES = ("x0", "x1", "y0", "y1")
 EDGE_WORDS = ("clamped", "supported", "free")
@@ -33,7 +33,7 @@ EFFECT_NAMES = (
     "poisson_ratio",
 )
 OTHER_EFFECT_NAMES = {"air_loading": "fluid_loading"}
-"""Names that are accepted wherever a user names an effect, each with the library's own."""
+"""Accepted names of effects, each with the library's own name."""
 
 LONGEST_NAME = 80
 NAME_RULE = f"A-Z, a-z, 0-9, '.', '_' or '-', beginning with a letter or digit, at most {LONGEST_NAME} characters"
@@ -43,8 +43,8 @@ _UNIT = re.compile(r"_(mm|g|kg_m3|hz|gpa|percent|n_m)$")
 _LONGEST_SHOWN = 60
 
 
-def effect_named(word: str) -> str:
-    """The library's own name of an effect where another one is accepted for it; any other word as it is."""
+def canonical_effect(word: str) -> str:
+    """The library's name of an effect from any accepted name; any other word unchanged."""
     return OTHER_EFFECT_NAMES.get(word, word)
 
 
@@ -57,24 +57,26 @@ def name_complaint(name: str) -> str:
     return ""
 
 
-def quoted(text: str) -> str:
+def quote_text(text: str) -> str:
     """A text in double quotes, shortened, with control and direction characters made visible."""
     short = text if len(text) <= _LONGEST_SHOWN else text[:_LONGEST_SHOWN] + "..."
-    return '"' + plain(short).replace('"', '\\"') + '"'
+    return '"' + printable(short).replace('"', '\\"') + '"'
 
 
-def shown(value: object) -> str:
+def show_value(value: object) -> str:
     """A value from a card as a message shows it."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        return quoted(value)
+        return quote_text(value)
     if isinstance(value, int) and value.bit_length() > 200:
         return f"a whole number of {value.bit_length()} bits"
     if isinstance(value, int | float):
         return repr(value)
     if isinstance(value, dict):
-        return "an empty table" if not value else "a table with " + _some(plain(str(key)) for key in list(value)[:4])
+        return (
+            "an empty table" if not value else "a table with " + _join(printable(str(key)) for key in list(value)[:4])
+        )
     if isinstance(value, list):
         return "an empty list" if not value else f"a list of {len(value)}"
     if isinstance(value, datetime | date | time):
@@ -82,14 +84,14 @@ def shown(value: object) -> str:
     return "nothing" if value is None else type(value).__name__
 
 
-def _some(words: Iterable[str]) -> str:
+def _join(words: Iterable[str]) -> str:
     return ", ".join(word[:_LONGEST_SHOWN] for word in words)
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
-    """The known word that was probably meant, or an empty text; a forgotten unit is forgiven.
+def nearest_word(word: str, known: Iterable[str]) -> str:
+    """The known word nearest to a misspelt one, or an empty text; a missing unit suffix does not count.
 
-    A part of one word alone stands for it: "shear" for transverse_shear.
+    A part that only one known word has stands for it: "shear" for transverse_shear.
     """
     if len(word) > _LONGEST_SHOWN:
         return ""
@@ -99,32 +101,32 @@ def nearest(word: str, known: Iterable[str]) -> str:
         candidates.setdefault(_UNIT.sub("", name), name)
         candidates[name] = name
     for spelling in (word, _UNIT.sub("", word)):
-        close = difflib.get_close_matches(spelling, candidates, n=1, cutoff=0.6)
-        if close:
-            return candidates[close[0]]
-    parts = _parts(word)
-    having = [name for name in names if parts and parts <= _parts(name)]
-    return having[0] if len(having) == 1 else ""
+        close_matches = difflib.get_close_matches(spelling, candidates, n=1, cutoff=0.6)
+        if close_matches:
+            return candidates[close_matches[0]]
+    word_parts = _name_parts(word)
+    matches = [name for name in names if word_parts and word_parts <= _name_parts(name)]
+    return matches[0] if len(matches) == 1 else ""
 
 
-def _parts(name: str) -> set[str]:
+def _name_parts(name: str) -> set[str]:
     return set(re.split(r"[-_ ]+", name.casefold())) - {""}
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """A remedy that names the nearest known word; empty if none is near."""
-    name = nearest(word, known)
+    name = nearest_word(word, known)
     return f"did you mean {name}?" if name else ""
 
 
-def listed(words: Iterable[str]) -> str:
+def list_words(words: Iterable[str]) -> str:
     """Words in quotes: "a", "b" or "c"."""
     *most, last = (f'"{word}"' for word in words)
     return f"{', '.join(most)} or {last}" if most else last
 
 
 def setup_places(file: str, names: Sequence[str]) -> list[str]:
-    """Where each setup of a card stands: "my-board.toml [setup]", 'my-board.toml [[setup]] 2 "free"'."""
+    """Place of each setup on a card: "my-board.toml [setup]", 'my-board.toml [[setup]] 2 "free"'."""
     if len(names) == 1:
         return [f"{file} [setup]"]
     return [f'{file} [[setup]] {number} "{name}"' for number, name in enumerate(names, start=1)]

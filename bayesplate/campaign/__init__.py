@@ -1,14 +1,16 @@
-"""What several boards share: given it the boards are independent, so each is solved once and alone.
+"""Parameters that several boards share: given these the boards are independent, so that each is solved once and alone.
 
-shared      what is shared, and which columns of each board it sets
-given       the density of a board where what is shared is given
-likelihood  what a board says of it, everything of its own integrated out: found from draws
+shared      the shared parameters, and the columns of each board that they set
+given       the density of a board, given the shared parameters
+likelihood  a board's likelihood of the shared parameters, all of its own integrated out, from draws
 evidence    the probability of a board's readings
-pulls       what a board says, as a normal likelihood
-together    the boards' likelihoods multiplied, all of them or all but one
-boards      each board's draws, by itself and where the others are
-learning    from boards alone to what they teach together
-claim       whether a board wants what the others teach, and whether a shared effect may be claimed
-common      what is left over on all boards alike, mode by mode
-population  the distribution that the boards' constants come from
+pulls       a board's likelihood of the shared parameters, as a normal one
+scatter     shared parameters that differ between boards
+together    the product of the boards' likelihoods, of all of them or of all but one
+boards      each board's draws, alone and under what the others teach
+learning    the posterior of the shared parameters from boards that were fitted alone
+claim       whether a board agrees with the others, and whether a shared effect may be claimed
+search      the probability of effects that all boards share
+common      residuals of each mode that all boards have in common
+population  the distribution of the boards' constants
 """

@@ -1,7 +1,7 @@
-"""Boards left out: whether each wants what the others teach, and whether a shared effect may be claimed.
+"""Boards left out: whether each agrees with the others, and whether a shared effect may be claimed.
 
-Each is judged against the rest, so that a value that one refuses is noticed; an effect is claimed where boards left out
-are predicted better by what the others teach.
+Each board is judged against the rest, so that a shared value is noticed which one board refuses. An effect is claimed
+where the shared parameters that the others teach predict the boards left out better.
 """
 
 from __future__ import annotations
@@ -11,25 +11,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayesplate.campaign.boards import Member
-from bayesplate.campaign.learning import Learnt
-from bayesplate.campaign.together import Together, values_of
+from bayesplate.campaign.boards import FittedBoard
+from bayesplate.campaign.learning import SharedPosterior
+from bayesplate.campaign.together import CombinedBoards, shared_values
 from bayesplate.diagnosis.claim import STANDARD_ERRORS, score_gain
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.results.contract import Spread
 
-_SAYS = 0.25
-"""Precision, in units of the prior's, above which a board says something of a direction: its posterior is then
-narrower by a tenth at least. A likelihood with a slope and no curvature moves a posterior and leaves it as wide; the
-variance of its slope would be taken for zero, and a lean of one standard deviation for a refusal."""
-REFUSED = 0.05
+_LEAST_PRECISION = 0.25
+"""Precision, over that of the prior, above which a board informs a direction: its posterior is then narrower by a tenth
+at least. A likelihood with a slope and no curvature moves a posterior and leaves it as wide; the variance of its slope
+would count as zero, and a slope of one standard deviation as a refusal."""
+REFUSED_BELOW = 0.05
 """p-value, multiplied by the number of boards, below which a board refuses what the others teach."""
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class LeftOutBoard:
     """A board when the others teach it the shared parameters."""
 
     log_score: float  # ln of the probability of its readings, the shared parameters learned from the others
@@ -37,38 +37,40 @@ class LeftOut:
     refuses: bool  # whether it does not want what they teach, as many boards as were asked being allowed for
 
 
-def left_out(together: Together) -> dict[str, LeftOut]:
-    """Every board left out in turn."""
-    everything, refused = together.log_evidence(), refusing(together)
+def judge_left_out_boards(together: CombinedBoards) -> dict[str, LeftOutBoard]:
+    """Leave each board out in turn and judge it against the others."""
+    log_evidence, refusing_names = together.log_evidence(), refusing_boards(together)
     return {
-        name: LeftOut(everything - together.log_evidence((i,)), p_value(together, i), name in refused)
+        name: LeftOutBoard(
+            log_evidence - together.log_evidence((i,)), board_p_value(together, i), name in refusing_names
+        )
         for i, name in enumerate(together.names)
     }
 
 
-def refusing(together: Together) -> tuple[str, ...]:
-    """Names of the boards that refuse what the others teach, as many as were asked being allowed for.
+def refusing_boards(together: CombinedBoards) -> tuple[str, ...]:
+    """Names of the boards that refuse what the others teach, with a correction for the number of boards.
 
-    The one that refuses most is left out before the others are asked again: it had taught them too. Where two are left
-    that do not agree, both are named: nothing tells which of them is the odd one.
+    The board with the smallest p-value is left out before the others are judged again, because it had taught them too.
+    Where the last two boards do not agree, both are named: nothing tells which of them is odd.
     """
-    out: list[int] = []
+    refusing_indices: list[int] = []
     n = len(together.names)
-    while len(out) < n - 1:
-        values = {i: p_value(together, i, out) for i in range(n) if i not in out}
+    while len(refusing_indices) < n - 1:
+        values = {i: board_p_value(together, i, refusing_indices) for i in range(n) if i not in refusing_indices}
         worst = min(values, key=lambda i: values[i])
-        if values[worst] * len(values) >= REFUSED:
+        if values[worst] * len(values) >= REFUSED_BELOW:
             break
-        out += [worst] if len(values) > 2 else list(values)
-    return tuple(together.names[i] for i in sorted(out))
+        refusing_indices += [worst] if len(values) > 2 else list(values)
+    return tuple(together.names[i] for i in sorted(refusing_indices))
 
 
-def p_value(together: Together, board: int, without: Collection[int] = ()) -> float:
-    """Of one board against the others, or those of them that are not left out: the score test of its likelihood.
+def board_p_value(together: CombinedBoards, board: int, without: Collection[int] = ()) -> float:
+    """P-value of one board against the others that are not left out: the score test of its likelihood.
 
-    The board's own posterior, its prior divided out, amounts to a normal likelihood exp(h'z - z'Pz / 2). If the board
-    is one of the others' kind, who teach its numbers with the mean m and the covariance C, its slope h - P m there is
-    normal about zero with the covariance P + P C P. Only directions count of which the board says something.
+    The board's own posterior, its prior divided out, is a normal likelihood exp(h'z - z'Pz / 2). If the board is of the
+    same kind as the others, which teach its numbers with the mean m and the covariance C, its slope h - P m there is
+    normal about zero with the covariance P + P C P. Only directions count that the board informs.
 
     References
     ----------
@@ -80,16 +82,18 @@ def p_value(together: Together, board: int, without: Collection[int] = ()) -> fl
     mean, covariance = together.taught((board, *without))
     pull = together.pulls[board]
     sizes, directions = np.linalg.eigh(pull.precision)
-    told = directions[:, sizes > _SAYS]
-    if not told.size:
+    informed_directions = directions[:, sizes > _LEAST_PRECISION]
+    if not informed_directions.size:
         return 1.0
-    slope = told.T @ (pull.lean - pull.precision @ mean)
-    spread = told.T @ (pull.precision + pull.precision @ covariance @ pull.precision) @ told
-    return float(chi2.sf(slope @ np.linalg.solve(spread, slope), told.shape[1]))
+    slope = informed_directions.T @ (pull.lean - pull.precision @ mean)
+    spread = (
+        informed_directions.T @ (pull.precision + pull.precision @ covariance @ pull.precision) @ informed_directions
+    )
+    return float(chi2.sf(slope @ np.linalg.solve(spread, slope), informed_directions.shape[1]))
 
 
 LEAST_GAIN = float(np.log(20.0))
-"""By how much the boards' scores have to rise in any case: a few that gain nearly nothing scatter as little."""
+"""Least gain in the sum of log scores: the scatter of boards that gain nearly nothing is as small."""
 _N_DRAWS = 4000
 _LINE = 18
 
@@ -120,37 +124,40 @@ class SharedClaim:
     holds: bool
 
 
-def judge(boards: Mapping[str, TaughtBoard]) -> SharedClaim:
+def judge_shared_effect(boards: Mapping[str, TaughtBoard]) -> SharedClaim:
     """Judge a shared effect by the boards that were left out."""
-    gains = [one.log_score_gain for one in boards.values()]
+    gains = [board.log_score_gain for board in boards.values()]
     total, error = score_gain(gains)
-    refused = tuple(name for name, one in boards.items() if one.refuses)
-    better = sum(gain > 0.0 for gain in gains)
-    holds = total > max(STANDARD_ERRORS * error, LEAST_GAIN) and 2 * better > len(gains) and not refused
-    return SharedClaim(total, error, refused, better, holds)
+    refused_by = tuple(name for name, board in boards.items() if board.refuses)
+    n_better = sum(gain > 0.0 for gain in gains)
+    holds = total > max(STANDARD_ERRORS * error, LEAST_GAIN) and 2 * n_better > len(gains) and not refused_by
+    return SharedClaim(total, error, refused_by, n_better, holds)
 
 
-def taught_boards(learnt: Learnt, before: Mapping[str, Member], seed: int) -> dict[str, TaughtBoard]:
-    """Every board left out in turn; `before` are the boards fitted without the effect, nothing shared."""
-    together, found = learnt.together, {}
-    for i, (name, one) in enumerate(left_out(together).items()):
+def taught_boards(learnt: SharedPosterior, before: Mapping[str, FittedBoard], seed: int) -> dict[str, TaughtBoard]:
+    """Predict each board by what the others teach; `before` are the boards fitted without the shared effect."""
+    together, boards = learnt.together, {}
+    for i, (name, left_out_board) in enumerate(judge_left_out_boards(together).items()):
         rng = np.random.default_rng([seed, _LINE, i])
-        without = before[name]
+        bare_board = before[name]
         _, draws = learnt.board_left_out(i, rng, seed)
-        taught = values_of(together.shared, together.taught_draws(rng, _N_DRAWS, (i,)))
-        found[name] = TaughtBoard(
-            log_score_gain=one.log_score - without.alone.log_evidence,
-            before_rms_cents=rms_cents(without.inference, without.draws),
+        taught_values = shared_values(together.shared, together.taught_draws(rng, _N_DRAWS, (i,)))
+        boards[name] = TaughtBoard(
+            log_score_gain=left_out_board.log_score - bare_board.alone.log_evidence,
+            before_rms_cents=rms_cents(bare_board.inference, bare_board.draws),
             after_rms_cents=rms_cents(learnt.members[i].inference, draws),
-            p_value=one.p_value,
-            refuses=one.refuses,
-            others={number.name: Spread.of(taught[number.name], number.unit) for number in together.shared},
+            p_value=left_out_board.p_value,
+            refuses=left_out_board.refuses,
+            others={
+                parameter.name: Spread.of(taught_values[parameter.name], parameter.unit)
+                for parameter in together.shared
+            },
         )
-    return found
+    return boards
 
 
 def rms_cents(inference: Inference, draws: Draws) -> float:
-    """Error of the labelled modes: measured over the posterior mean of the prediction, root of the mean square."""
+    """Rms error of the labelled modes, cents: measured over the posterior mean of the prediction."""
     predicted = draws.log_frequency.reshape(-1, draws.log_frequency.shape[-1])
     measured = np.concatenate([setup.measured for setup in inference.problem.board.setups])
     residuals = cents(np.log(measured) - np.log(np.exp(predicted).mean(axis=0)))

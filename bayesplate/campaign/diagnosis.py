@@ -1,4 +1,4 @@
-"""diagnosis.json of a campaign as types: what the boards lack in common, and what left-out boards say of it."""
+"""diagnosis.json of a campaign as types: the effects that the boards share, and the errors of boards left out."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.campaign.claim import SharedClaim, TaughtBoard
-from bayesplate.campaign.common import CommonResidual, clear_of_zero
-from bayesplate.campaign.search import Explanation
-from bayesplate.diagnosis.claim import IMPROBABLE
-from bayesplate.diagnosis.verdict import CLEARLY
-from bayesplate.effects.words import effect_name, effect_names, joined
+from bayesplate.campaign.common import CommonResidual, modes_clear_of_zero
+from bayesplate.campaign.search import CampaignExplanation
+from bayesplate.diagnosis.claim import IMPROBABLE_BELOW
+from bayesplate.diagnosis.verdict import CLEAR_FACTOR
+from bayesplate.effects.words import effect_name, effect_names, join_words
 
 FORMAT = 1
 _MOST_LISTED = 12
@@ -46,7 +46,7 @@ class CampaignDiagnosis:
     declared : bool
         Whether the card names them, so that nothing was searched for.
     reason : str
-    explanations : tuple of Explanation
+    explanations : tuple of CampaignExplanation
         The most probable first; none where the card names what is shared.
     probability_of_none : float or None
     conditions : SharedClaim or None
@@ -70,7 +70,7 @@ class CampaignDiagnosis:
     effects: tuple[str, ...]
     declared: bool
     reason: str
-    explanations: tuple[Explanation, ...]
+    explanations: tuple[CampaignExplanation, ...]
     probability_of_none: float | None
     conditions: SharedClaim | None
     left_out_boards: Mapping[str, TaughtBoard]
@@ -87,33 +87,40 @@ class CampaignDiagnosis:
         return self.explanations[0].effects if self.explanations else self.effects
 
 
-def named(found: Sequence[Explanation]) -> tuple[str, tuple[str, ...], str]:
-    """What a search over a campaign, its most probable explanation first, allows to say: a verdict, effects, the
-    reason.
+def campaign_verdict(found: Sequence[CampaignExplanation]) -> tuple[str, tuple[str, ...], str]:
+    """The verdict of a campaign from its explanations, the most probable first: the word, the effects, the reason.
 
     In a group the effects are the shared ones of any alternative, the most probable first.
     """
-    none = next(one.probability for one in found if one.way == "none")
-    if none >= IMPROBABLE:
+    none = next(explanation.probability for explanation in found if explanation.way == "none")
+    if none >= IMPROBABLE_BELOW:
         return "none needed", (), f"that the boards lack nothing has the probability {none:.2g}"
     best = found[0]
-    near = [one for one in found if CLEARLY * one.probability > best.probability]
-    shared = tuple(dict.fromkeys(effect for one in near if one.way == "shared" for effect in one.effects))
+    contenders = [explanation for explanation in found if CLEAR_FACTOR * explanation.probability > best.probability]
+    shared = tuple(
+        dict.fromkeys(
+            effect for explanation in contenders if explanation.way == "shared" for effect in explanation.effects
+        )
+    )
     if best.way != "shared":
-        rival = f"; {joined([words_of(one) for one in near[1:]], 'or')} may be as probable" if near[1:] else ""
+        rival = (
+            f"; {join_words([sharing_words(explanation) for explanation in contenders[1:]], 'or')} may be as probable"
+            if contenders[1:]
+            else ""
+        )
         what = "of which they share the first" if best.way == "shared and own" else "which the boards do not share"
-        return "unexplained", (), f"the most probable is {words_of(best)}, {what}{rival}"
-    if len(near) == 1:
-        rest = found[1]
-        times = best.probability / max(rest.probability, 1e-300)
-        shown = f"{times:.0f}" if times < 1000.0 else "more than 1000"
-        return "named", shared, f"{words_of(best)} is {shown} times as probable as {words_of(rest)}"
-    told = joined([words_of(one) for one in near], "or")
-    return "indistinguishable group", shared, f"{told} may be as probable"
+        return "unexplained", (), f"the most probable is {sharing_words(best)}, {what}{rival}"
+    if len(contenders) == 1:
+        runner_up = found[1]
+        times = best.probability / max(runner_up.probability, 1e-300)
+        factor = f"{times:.0f}" if times < 1000.0 else "more than 1000"
+        return "named", shared, f"{sharing_words(best)} is {factor} times as probable as {sharing_words(runner_up)}"
+    words = join_words([sharing_words(explanation) for explanation in contenders], "or")
+    return "indistinguishable group", shared, f"{words} may be as probable"
 
 
-def words_of(one: Explanation) -> str:
-    """An explanation as people say it."""
+def sharing_words(one: CampaignExplanation) -> str:
+    """An explanation of a campaign in words."""
     if one.way == "shared and own":
         shared, own = one.effects
         return f"{effect_name(shared)} alike on all boards beside {effect_name(own)} of another size on each"
@@ -126,29 +133,29 @@ def words_of(one: Explanation) -> str:
     }[one.way]
 
 
-def claim_sentence(diagnosis: CampaignDiagnosis) -> str:
-    """What may be said of the shared effects, and on what it rests."""
-    one = diagnosis.conditions
-    if one is None:
+def campaign_claim_sentence(diagnosis: CampaignDiagnosis) -> str:
+    """Whether the boards share the effects, with the scores and errors of the boards left out."""
+    claim = diagnosis.conditions
+    if claim is None:
         return f"Nothing is claimed: {diagnosis.reason}."
     n = len(diagnosis.left_out_boards)
     effects = effect_names(diagnosis.judged)
     scores = (
-        f"{one.n_better} of {n} boards that were left out are predicted better by what the others teach, in sum by "
-        f"{one.gain:.1f} ± {one.standard_error:.1f} in log score"
+        f"{claim.n_better} of {n} boards that were left out are predicted better by what the others teach, in sum by "
+        f"{claim.gain:.1f} ± {claim.standard_error:.1f} in log score"
     )
     errors = (
         f"error of the left-out boards {diagnosis.before.left_out_boards_rms_cents:.1f} cents before, "
         f"{diagnosis.after.left_out_boards_rms_cents:.1f} after"
     )
-    verb = "does" if len(one.refused_by) == 1 else "do"
-    refused = f"; {joined(one.refused_by)} {verb} not want it" if one.refused_by else ""
+    verb = "does" if len(claim.refused_by) == 1 else "do"
+    refused = f"; {join_words(claim.refused_by)} {verb} not want it" if claim.refused_by else ""
     head = f"The boards share {effects}" if diagnosis.claim else f"It is not claimed that the boards share {effects}"
     return f"{head}: {scores}{refused}; {errors}."
 
 
 def pooled_rms(boards: Mapping[str, float], counts: Mapping[str, int]) -> float:
-    """Root of the mean square over all modes of all boards."""
+    """Root mean square over all modes of all boards."""
     total = sum(counts[name] * rms**2 for name, rms in boards.items())
     return float(np.sqrt(total / sum(counts.values())))
 
@@ -160,31 +167,31 @@ def next_step(
     *,
     is_declared: bool,
     verdict: str = "named",
-    explanations: Sequence[Explanation] = (),
+    explanations: Sequence[CampaignExplanation] = (),
 ) -> str:
-    """What to do next.
+    """The recommendation: what to do next.
 
-    Ask a board that refuses, declare what boards have each of its own, or look for the cause of what is left over on
-    all of them. Where the card names what is shared, nothing else was searched for.
+    Measure a board that refuses again, declare an effect of which each board has its own size, or search for the cause
+    of residuals that all boards have in common. Where the card names the shared effects, there was no search.
     """
     if conditions is not None and conditions.refused_by:
-        boards, is_one = joined(conditions.refused_by), len(conditions.refused_by) == 1
+        boards, is_one = join_words(conditions.refused_by), len(conditions.refused_by) == 1
         if len(conditions.refused_by) == n_boards:
             return f"measure {boards} again: they do not agree on what they share"
         they, do = ("it", "does") if is_one else ("they", "do")
-        out = "it" if is_one else "them"
-        return f"measure {boards} again, or take {out} out of the campaign: {they} {do} not want what the others share"
-    best = next((one for one in explanations if one.effects), None)
+        them = "it" if is_one else "them"
+        return f"measure {boards} again, or take {them} out of the campaign: {they} {do} not want what the others share"
+    best = next((explanation for explanation in explanations if explanation.effects), None)
     if verdict == "unexplained" and best is not None:
-        where, own = f"the card of {best.board}" if best.board else "the campaign's card", best.effects[-1]
-        each = "" if best.board else ", for each board one of its own"
+        card, effect = f"the card of {best.board}" if best.board else "the campaign's card", best.effects[-1]
+        sizes = "" if best.board else ", for each board one of its own"
         return (
-            f"declare {effect_name(own)} on {where}, {own} in its effects beside those that it has{each}, and diagnose "
-            "again: what the boards share is judged beside it then"
+            f"declare {effect_name(effect)} on {card}, {effect} in its effects beside those that it has{sizes}, and "
+            "diagnose again: what the boards share is judged beside it then"
         )
-    clear = clear_of_zero(common)
-    if clear:
-        modes = joined(clear[:_MOST_LISTED])
+    clear_modes = modes_clear_of_zero(common)
+    if clear_modes:
+        modes = join_words(clear_modes[:_MOST_LISTED])
         searches = " of a card that names nothing shared searches for" if is_declared else ", for one board, says"
         return f"modes {modes} are off alike on all boards: bayesplate diagnose{searches} what moves them so"
     return ""

@@ -1,7 +1,7 @@
 """The probability of a board's readings, from draws of its posterior: bridge sampling.
 
-A mixture that is fitted to one half of the draws is compared with the posterior at the other half and at draws of its
-own; the ratio of the two densities in both directions gives the integral with the least error that these points allow.
+A mixture is fitted to one half of the draws, and compared with the posterior at the other half and at draws of the
+mixture; the ratios of the two densities there give the integral with the least error that these points allow.
 
 References
 ----------
@@ -19,10 +19,10 @@ from bayesplate.arrays import Floats
 from bayesplate.diagnosis.terms import log_sum
 from bayesplate.posterior.mixture import Mixture
 
-N_POINTS = 1024
-"""At which the density is looked at, among the draws and as many beside them."""
+N_BRIDGE_POINTS = 1024
+"""Points at which the density is evaluated, among the draws and among those of the mixture, at most."""
 _MOST_PASSES = 200
-_SETTLED = 1e-8
+_TOLERANCE = 1e-8
 
 
 def bridge_sampling(log_density: Callable[[Floats], Floats], draws: Floats, rng: np.random.Generator) -> float:
@@ -32,16 +32,19 @@ def bridge_sampling(log_density: Callable[[Floats], Floats], draws: Floats, rng:
     """
     half = len(draws) // 2
     mixture = Mixture.fitted(draws[:half])
-    there = draws[half:][:N_POINTS]
-    beside = mixture.points(N_POINTS, rng)
-    at_draws = log_density(there) - mixture.log_density(there)
-    at_points = log_density(beside) - mixture.log_density(beside)
+    posterior_points = draws[half:][:N_BRIDGE_POINTS]
+    mixture_points = mixture.points(N_BRIDGE_POINTS, rng)
+    at_draws = log_density(posterior_points) - mixture.log_density(posterior_points)
+    at_points = log_density(mixture_points) - mixture.log_density(mixture_points)
     at_points = np.where(np.isfinite(at_points), at_points, -np.inf)
-    log_share, found = np.log(len(there) / len(beside)), float(np.median(at_draws))
+    log_share, log_evidence = np.log(len(posterior_points) / len(mixture_points)), float(np.median(at_draws))
     for _ in range(_MOST_PASSES):
-        above = at_points - np.logaddexp(log_share + at_points, found)
-        below = -np.logaddexp(log_share + at_draws, found)
-        before, found = found, float(log_sum(above) - np.log(len(beside)) - log_sum(below) + np.log(len(there)))
-        if abs(found - before) < _SETTLED:
+        above = at_points - np.logaddexp(log_share + at_points, log_evidence)
+        below = -np.logaddexp(log_share + at_draws, log_evidence)
+        previous, log_evidence = (
+            log_evidence,
+            float(log_sum(above) - np.log(len(mixture_points)) - log_sum(below) + np.log(len(posterior_points))),
+        )
+        if abs(log_evidence - previous) < _TOLERANCE:
             break
-    return found
+    return log_evidence

@@ -1,10 +1,10 @@
-"""A board's likelihood of what is shared, everything of its own integrated out, from draws of its own posterior.
+"""A board's likelihood of the shared parameters, all of its own integrated out, from draws of its own posterior.
 
-Draws of the shared parameters z from a density proportional to r(z) L(z), r being known, tell L without any integral:
-its logarithm is a polynomial, and the one of greatest likelihood is that under which z has the moments of the draws.
-The polynomial is written in products of Hermite polynomials of the whitened z, which are nearly orthonormal where the
-draws are, and the few terms of higher order are drawn towards zero. Where there are no draws it goes on as it falls at
-their rim, with the curvature of a normal likelihood: a polynomial itself may rise there without bound.
+Draws of the shared parameters z from a density proportional to r(z) L(z), with r known, give L without any integral:
+ln L is taken as a polynomial, and that of maximum likelihood is the one under which z has the moments of the draws.
+The polynomial is written in products of Hermite polynomials of the whitened z, which are nearly orthonormal over the
+draws, and the few terms of higher order are drawn towards zero. Beyond the draws it is continued with the slope at
+their rim and the curvature of a normal likelihood, because the polynomial itself may rise there without bound.
 
 References
 ----------
@@ -24,31 +24,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.arrays import Floats
-from bayesplate.diagnosis.terms import log_sum, normalised
+from bayesplate.diagnosis.terms import log_sum, normalised_weights
 
-LogDensity = Callable[[Floats], Floats]
-"""From (n, n_shared) standard coordinates to (n,) logarithms of a density."""
+SharedLogDensity = Callable[[Floats], Floats]
+"""From (n, n_shared) standard coordinates of the shared parameters to (n,) logarithms of a density."""
 
 
 class Likelihood(Protocol):
-    """A board's likelihood of what is shared."""
+    """A board's likelihood of the shared parameters."""
 
     def at(self, z: Floats, /) -> Floats:
         """ln L at standard coordinates: (n,) array from (n, n_shared)."""
         ...
 
 
-_HIGHEST = 4
+_HIGHEST_ORDER = 4
 _DRAWS_PER_TERM = 20
-"""Effective draws for each term of an order that is to be used."""
+"""Effective draws that each term needs for an order to be used."""
 _REACH = 3.5
-"""Standard deviations of the draws up to which the polynomial is taken at its word."""
-_BACK = 0.05
+"""Standard deviations of the draws up to which the polynomial is used."""
+_STEP_BACK = 0.05
 """Step back from the rim, standard deviations, by which the slope there is found."""
-_SIZE = 0.3
+_COEFFICIENT_SD = 0.3
 """Standard deviation of the coefficients of terms of third and fourth order, before any draw."""
 _N_POINTS = 8192
-_WIDER = 1.5
+_WIDENING = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,13 +58,15 @@ class SharedLikelihood:
     Attributes
     ----------
     centre : (n_shared,) array
-        Mean of the standard coordinates of the draws that it was found from.
+        Mean of the standard coordinates of the draws.
     whitening : (n_shared, n_shared) array
         Takes coordinates less the centre to coordinates of unit spread.
     curvature : (n_shared, n_shared) array
-        Minus that of ln L beyond the draws, in coordinates of unit spread.
+        Minus the curvature of ln L beyond the draws, in coordinates of unit spread.
     coefficients : (n_terms,) array
-        Of the terms of first, second, ... order.
+        Coefficients of the terms of first, second, ... order.
+    level : float
+        Constant term of ln L.
     """
 
     centre: Floats
@@ -75,18 +77,18 @@ class SharedLikelihood:
 
     @classmethod
     def found(
-        cls, z: Floats, weights: Floats, n_effective: float, log_reference: LogDensity, log_evidence: float
+        cls, z: Floats, weights: Floats, n_effective: float, log_reference: SharedLogDensity, log_evidence: float
     ) -> SharedLikelihood:
-        """From draws of a density proportional to r(z) L(z).
+        """The likelihood from draws of a density proportional to r(z) L(z).
 
         Parameters
         ----------
         z : (n, n_shared) array
             Standard coordinates of the draws.
         weights : (n,) array
-            Of the draws; they sum to 1.
+            Weights of the draws; they sum to 1.
         n_effective : float
-            How many independent draws of equal weight they are worth.
+            Number of independent draws of equal weight that they are worth.
         log_reference : callable
             ln r, -inf where it is zero.
         log_evidence : float
@@ -96,58 +98,58 @@ class SharedLikelihood:
         factor = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
         whitening = np.asarray(np.linalg.inv(factor).T, dtype=np.float64)
         degree = _degree(z.shape[1], n_effective)
-        points, log_density = spread_points(centre, _WIDER * factor, _N_POINTS)
+        points, log_density = spread_points(centre, _WIDENING * factor, _N_POINTS)
         log_weights = log_reference(points) - log_density - np.log(len(points))
-        u, drawn = (points - centre) @ whitening, (z - centre) @ whitening
-        _, reference = moments(u, normalised(log_weights))
-        near, near_drawn = (u == _near(u)).all(axis=1), (drawn == _near(drawn)).all(axis=1)
-        share = weights[near_drawn].sum()
-        wanted = weights[near_drawn] @ _terms(drawn[near_drawn], degree) / share
-        there, log_weights = _terms(u[near], degree), log_weights[near]
-        firmness = np.where(_orders(z.shape[1], degree) > 2, _SIZE**-2.0 / n_effective, 0.0)
-        coefficients = _with_moments(there, log_weights, wanted, firmness)
-        level = log_evidence + np.log(share) - float(log_sum(log_weights + there @ coefficients))
-        return cls(centre, whitening, _told(reference), coefficients, level)
+        u, u_drawn = (points - centre) @ whitening, (z - centre) @ whitening
+        _, reference_covariance = moments(u, normalised_weights(log_weights))
+        is_near, is_near_drawn = (u == _within_reach(u)).all(axis=1), (u_drawn == _within_reach(u_drawn)).all(axis=1)
+        share = weights[is_near_drawn].sum()
+        term_means = weights[is_near_drawn] @ _hermite_terms(u_drawn[is_near_drawn], degree) / share
+        near_terms, log_weights = _hermite_terms(u[is_near], degree), log_weights[is_near]
+        firmness = np.where(_orders(z.shape[1], degree) > 2, _COEFFICIENT_SD**-2.0 / n_effective, 0.0)
+        coefficients = _match_means(near_terms, log_weights, term_means, firmness)
+        level = log_evidence + np.log(share) - float(log_sum(log_weights + near_terms @ coefficients))
+        return cls(centre, whitening, _added_precision(reference_covariance), coefficients, level)
 
     @property
     def degree(self) -> int:
         """Highest order of its terms."""
         n = self.centre.size
-        return next(d for d in range(2, _HIGHEST + 1) if len(_powers(n, d)) == self.coefficients.size)
+        return next(d for d in range(2, _HIGHEST_ORDER + 1) if len(_powers(n, d)) == self.coefficients.size)
 
     def at(self, z: Floats) -> Floats:
         """ln L at standard coordinates: (n,) array from (n, n_shared)."""
         u = (z - self.centre) @ self.whitening
-        near = _near(u)
-        found = self.level + self._polynomial(near)
+        near = _within_reach(u)
+        log_likelihood = self.level + self._polynomial(near)
         beyond = np.flatnonzero((u != near).any(axis=1))
         if beyond.size:
             away = u[beyond] - near[beyond]
-            step = _BACK * away / np.linalg.norm(away, axis=1)[:, None]
+            step = _STEP_BACK * away / np.linalg.norm(away, axis=1)[:, None]
             rise = self._polynomial(near[beyond]) - self._polynomial(near[beyond] - step)
-            found[beyond] += np.minimum(rise, 0.0) * np.linalg.norm(away, axis=1) / _BACK
-            found[beyond] -= 0.5 * np.einsum("ni,ij,nj->n", away, self.curvature, away)
-        return np.asarray(found)
+            log_likelihood[beyond] += np.minimum(rise, 0.0) * np.linalg.norm(away, axis=1) / _STEP_BACK
+            log_likelihood[beyond] -= 0.5 * np.einsum("ni,ij,nj->n", away, self.curvature, away)
+        return np.asarray(log_likelihood)
 
     def _polynomial(self, u: Floats) -> Floats:
-        return np.asarray(_terms(u, self.degree) @ self.coefficients)
+        return np.asarray(_hermite_terms(u, self.degree) @ self.coefficients)
 
 
-def _terms(u: Floats, degree: int) -> Floats:
+def _hermite_terms(u: Floats, degree: int) -> Floats:
     """Products of normalised Hermite polynomials by order: (n, n_terms) array."""
     polynomials, powers = _hermite(u, degree), _powers(u.shape[1], degree)
     return np.asarray(np.prod([polynomials[powers[:, i], i] for i in range(u.shape[1])], axis=0).T)
 
 
-def _near(u: Floats) -> Floats:
-    """The same points, those out of reach brought back towards the middle: in a corner of a box there are no draws."""
+def _within_reach(u: Floats) -> Floats:
+    """The points, those beyond `_REACH` from the middle moved back to it: by radius, as corners of a box lack draws."""
     radius = np.linalg.norm(u, axis=1, keepdims=True)
     return np.asarray(np.where(radius > _REACH, u * (_REACH / np.maximum(radius, _REACH)), u))
 
 
-def _told(reference: Floats) -> Floats:
-    """What draws of unit spread say beyond a reference of some covariance: a precision, nowhere negative."""
-    sizes, directions = np.linalg.eigh(np.eye(len(reference)) - np.linalg.inv(reference))
+def _added_precision(reference_covariance: Floats) -> Floats:
+    """Precision that draws of unit spread add to a reference of some covariance, nowhere negative."""
+    sizes, directions = np.linalg.eigh(np.eye(len(reference_covariance)) - np.linalg.inv(reference_covariance))
     return np.asarray((directions * np.maximum(sizes, 0.0)) @ directions.T)
 
 
@@ -165,7 +167,7 @@ def spread_points(centre: Floats, factor: Floats, n_points: int) -> tuple[Floats
     ----------
     centre : (k,) array
     factor : (k, k) array
-        Of its covariance.
+        Cholesky factor of its covariance.
     n_points : int
         A power of two.
     """
@@ -178,36 +180,36 @@ def spread_points(centre: Floats, factor: Floats, n_points: int) -> tuple[Floats
     return centre + normal @ factor.T, log_density
 
 
-def _with_moments(terms: Floats, log_weights: Floats, wanted: Floats, firmness: Floats) -> Floats:
-    """Coefficients of the exponential family that has wanted means of its terms: a convex problem."""
+def _match_means(terms: Floats, log_weights: Floats, term_means: Floats, firmness: Floats) -> Floats:
+    """Coefficients with which an exponential family has the given means of its terms: a convex problem."""
     from scipy.optimize import minimize
 
     def shares(c: Floats) -> Floats:
         log_shares = log_weights + terms @ c
         return np.asarray(np.exp(log_shares - log_sum(log_shares)))
 
-    def lack(c: Floats) -> tuple[float, Floats]:
-        value = float(log_sum(log_weights + terms @ c) - wanted @ c + 0.5 * firmness @ c**2)
-        return value, shares(c) @ terms - wanted + firmness * c
+    def objective(c: Floats) -> tuple[float, Floats]:
+        value = float(log_sum(log_weights + terms @ c) - term_means @ c + 0.5 * firmness @ c**2)
+        return value, shares(c) @ terms - term_means + firmness * c
 
     def curvature(c: Floats) -> Floats:
         _, covariance = moments(terms, shares(c))
         return covariance + np.diag(firmness)
 
-    found = minimize(lack, np.zeros(wanted.size), jac=True, hess=curvature, method="trust-exact")
-    return np.asarray(found.x, dtype=np.float64)
+    solution = minimize(objective, np.zeros(term_means.size), jac=True, hess=curvature, method="trust-exact")
+    return np.asarray(solution.x, dtype=np.float64)
 
 
 def _degree(n_shared: int, n_effective: float) -> int:
-    able = [d for d in range(2, _HIGHEST + 1) if _DRAWS_PER_TERM * _orders(n_shared, d).size <= n_effective]
-    return max(able, default=2)
+    degrees = [d for d in range(2, _HIGHEST_ORDER + 1) if _DRAWS_PER_TERM * _orders(n_shared, d).size <= n_effective]
+    return max(degrees, default=2)
 
 
 @lru_cache
 def _powers(n_shared: int, degree: int) -> NDArray[np.intp]:
     """Power of each coordinate in each term, by order: (n_terms, n_shared) array."""
-    factors = (each for d in range(1, degree + 1) for each in combinations_with_replacement(range(n_shared), d))
-    return np.array([[each.count(i) for i in range(n_shared)] for each in factors], dtype=np.intp)
+    products = (factors for d in range(1, degree + 1) for factors in combinations_with_replacement(range(n_shared), d))
+    return np.array([[factors.count(i) for i in range(n_shared)] for factors in products], dtype=np.intp)
 
 
 def _orders(n_shared: int, degree: int) -> NDArray[np.intp]:
@@ -217,7 +219,7 @@ def _orders(n_shared: int, degree: int) -> NDArray[np.intp]:
 
 def _hermite(u: Floats, degree: int) -> Floats:
     """Normalised Hermite polynomials of each coordinate: (degree + 1, k, n) array from (n, k)."""
-    found = [np.ones_like(u.T), u.T]
+    polynomials = [np.ones_like(u.T), u.T]
     for m in range(1, degree):
-        found.append((u.T * found[m] - np.sqrt(m) * found[m - 1]) / np.sqrt(m + 1.0))
-    return np.stack(found)
+        polynomials.append((u.T * polynomials[m] - np.sqrt(m) * polynomials[m - 1]) / np.sqrt(m + 1.0))
+    return np.stack(polynomials)

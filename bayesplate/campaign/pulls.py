@@ -1,4 +1,4 @@
-"""What a board says of the shared parameters by itself, as a normal likelihood."""
+"""A board's own likelihood of the shared parameters, as a normal one."""
 
 from __future__ import annotations
 
@@ -13,35 +13,34 @@ from bayesplate.campaign.likelihood import moments
 
 
 @dataclass(frozen=True, eq=False)
-class Pull:
-    """What a board's likelihood of the shared parameters amounts to as a normal one: exp(h'z - z'Pz / 2)."""
+class NormalLikelihood:
+    """A normal likelihood of the shared parameters: exp(h'z - z'Pz / 2)."""
 
     precision: Floats  # (n_shared, n_shared) array: P, positive semi-definite
-    lean: Floats  # (n_shared,) array: h = P times where it is highest
+    lean: Floats  # (n_shared,) array: h = P times the mode
 
     @classmethod
-    def of_draws(cls, z: Floats, weights: Floats, priors: Sequence[Quantity] = ()) -> Pull:
-        """From draws of the board's own posterior under these priors of z, by default standard normal; weights sum to
-        1.
+    def of_draws(cls, z: Floats, weights: Floats, priors: Sequence[Quantity] = ()) -> NormalLikelihood:
+        """The likelihood from draws of the board's own posterior under these priors of z, by default standard normal.
 
-        A posterior that is wider than the prior in a direction says nothing there.
+        The weights sum to 1. A direction in which the posterior is wider than the prior has no precision.
         """
         mean, covariance = moments(z, weights)
-        before = np.array([moments_before(one) for one in priors] or [(0.0, 1.0)] * mean.size)
-        after = np.linalg.inv(covariance)
-        gained, directions = np.linalg.eigh(after - np.diag(1.0 / before[:, 1]))
-        told = (directions * np.maximum(gained, 0.0)) @ directions.T
-        lean = after @ mean - before[:, 0] / before[:, 1]
-        return cls(told, (directions * (gained > 0.0)) @ directions.T @ lean)
+        prior_stats = np.array([prior_moments(prior) for prior in priors] or [(0.0, 1.0)] * mean.size)
+        posterior_precision = np.linalg.inv(covariance)
+        eigenvalues, directions = np.linalg.eigh(posterior_precision - np.diag(1.0 / prior_stats[:, 1]))
+        precision = (directions * np.maximum(eigenvalues, 0.0)) @ directions.T
+        lean = posterior_precision @ mean - prior_stats[:, 0] / prior_stats[:, 1]
+        return cls(precision, (directions * (eigenvalues > 0.0)) @ directions.T @ lean)
 
-    def scattered(self, width: Floats) -> Pull:
-        """What it says of the middle about which boards' own numbers scatter, with these standard deviations."""
-        weaker = np.linalg.inv(np.eye(width.size) + self.precision * width**2)
-        return Pull(np.asarray(weaker @ self.precision), np.asarray(weaker @ self.lean))
+    def scattered(self, width: Floats) -> NormalLikelihood:
+        """The likelihood of the middle about which the boards' own numbers scatter, with these standard deviations."""
+        shrinkage = np.linalg.inv(np.eye(width.size) + self.precision * width**2)
+        return NormalLikelihood(np.asarray(shrinkage @ self.precision), np.asarray(shrinkage @ self.lean))
 
 
-def moments_before(prior: Quantity) -> tuple[float, float]:
-    """Mean and variance of a standard coordinate before any reading, its bounds kept."""
+def prior_moments(prior: Quantity) -> tuple[float, float]:
+    """Prior mean and variance of a standard coordinate, within its bounds."""
     from scipy.stats import truncnorm
 
     low, high = prior.standard_bounds
@@ -49,7 +48,7 @@ def moments_before(prior: Quantity) -> tuple[float, float]:
     return float(mean), float(variance)
 
 
-def normal_posterior(pulls: Sequence[Pull]) -> tuple[Floats, Floats]:
+def normal_posterior(pulls: Sequence[NormalLikelihood]) -> tuple[Floats, Floats]:
     """Mean and covariance of z from several boards, its prior being standard normal."""
-    covariance = np.linalg.inv(np.eye(pulls[0].lean.size) + np.sum([one.precision for one in pulls], axis=0))
-    return covariance @ np.sum([one.lean for one in pulls], axis=0), covariance
+    covariance = np.linalg.inv(np.eye(pulls[0].lean.size) + np.sum([pull.precision for pull in pulls], axis=0))
+    return covariance @ np.sum([pull.lean for pull in pulls], axis=0), covariance

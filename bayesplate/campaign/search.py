@@ -1,16 +1,16 @@
-"""What boards lack in common: each board's tables of shifts, joined over the cells of one size for all.
+"""Effects that boards have in common: each board's tables of shifts, joined over the cells of one size for all boards.
 
-Each effect has one size per board here: one that every setup of a board has at a size of its own is not tried.
+Each effect has one size per board here: an effect with a size for each setup of a board is not tried.
 
 Each board's search holds, for every effect, cells of its sizes with the likelihood of the board's readings in each.
 Given the size the boards are independent, so that one size for all has the evidence
 
     sum over cells of  prior(cell) * product over boards of L(cell),
 
-beside each board with a size of its own, one board alone, and no effect at all. It costs nothing more than the boards'
-own searches. Cells are the same for all boards in the standard coordinates of the effect's prior. All boards may share
-two effects as well, as boards of one species and one sensor do: then a cell is one of each, and their shifts add. Or
-they share one, and have another at a size of its own each: that one is summed over on every board first.
+beside a size of its own for each board, an effect on one board alone, and no effect at all. It costs no more than the
+boards' own searches. Cells are the same for all boards in the standard coordinates of the effect's prior. All boards
+may share two effects as well, as boards of one species and one sensor do: then a cell is a pair of cells, and their
+shifts add. Or they share one effect, and each has another at its own size, which is summed over on each board first.
 """
 
 from __future__ import annotations
@@ -25,29 +25,35 @@ from bayesplate.arrays import Floats
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.peaks import with_own_labels
-from bayesplate.diagnosis.search import LEAST_TRACE, Ground, prepare_search
-from bayesplate.diagnosis.terms import log_sum, normalised
+from bayesplate.diagnosis.search import LEAST_TRACE, SearchGround, prepare_search
+from bayesplate.diagnosis.terms import log_sum, normalised_weights
 
-Way = Literal["none", "shared", "own", "one board", "shared and own"]
-Cell = tuple[float, ...]
+SharingPattern = Literal["none", "shared", "own", "one board", "shared and own"]
+CellKey = tuple[float, ...]
 
-PRIOR: Mapping[Way, float] = {"none": 0.5, "shared": 0.25, "one board": 0.15, "own": 0.08, "shared and own": 0.02}
-"""Prior probability of each way, divided among the effects, and among the boards, that it may be.
+SHARING_PRIOR: Mapping[SharingPattern, float] = {
+    "none": 0.5,
+    "shared": 0.25,
+    "one board": 0.15,
+    "own": 0.08,
+    "shared and own": 0.02,
+}
+"""Prior probability of each pattern, divided among its possible effects and boards.
 
-That of two where the boards cannot have two goes to the one effect of a size of its own.
+Where the boards cannot have two effects, the prior of "shared and own" goes to "own".
 """
-OF_TWO = 0.2
-"""Share of what is shared beforehand that is two effects, where the boards can have two."""
+PRIOR_SHARE_OF_TWO = 0.2
+"""Share of the prior of "shared" that pairs of effects have, where the boards can have two."""
 _DIGITS = 9
 
 
 @dataclass(frozen=True)
-class Explanation:
-    """One thing that the boards may have."""
+class CampaignExplanation:
+    """An explanation of the boards' residuals: effects, how the boards share them, and its probability."""
 
     # no effect; one size for all boards; a size of its own for each; one board alone; the first effect of one size for
     # all and the second of a size of its own for each
-    way: Way
+    way: SharingPattern
     effects: tuple[str, ...]  # empty for none; two where both are shared or the second is each board's own
     board: str  # the one board; otherwise empty
     log_evidence: float
@@ -56,122 +62,152 @@ class Explanation:
 
 @dataclass(frozen=True, eq=False)
 class BoardSearch:
-    """A board's tables, asked for what the boards may have in common."""
+    """A board's tables, and the evidence of effects in them."""
 
     name: str
-    ground: Ground  # with the labels of each hypothesis
+    ground: SearchGround  # with the labels of each hypothesis
 
     def hypothesis(self, effects: tuple[str, ...]) -> Hypothesis | None:
         """The hypothesis of these effects alone; None where the board cannot have them."""
-        return next((one for one in self.ground.hypotheses if one.members == effects and one.swap is None), None)
+        return next(
+            (
+                hypothesis
+                for hypothesis in self.ground.hypotheses
+                if hypothesis.members == effects and hypothesis.swap is None
+            ),
+            None,
+        )
 
     def log_evidence(self, effects: tuple[str, ...]) -> float:
-        """ln of the evidence of an effect of whatever size on this board, or of none."""
+        """ln of the evidence of effects on this board, of any size, or of no effect."""
         values = self.cells(effects)
         return float(log_sum(np.array([log_prior + log_likelihood for log_prior, log_likelihood in values.values()])))
 
-    def cells(self, effects: tuple[str, ...]) -> dict[Cell, tuple[float, float]]:
-        """ln of prior probability and of the likelihood of each cell of the sizes of one effect, of two, or of none."""
-        one = self.hypothesis(effects)
-        if one is None:
+    def cells(self, effects: tuple[str, ...]) -> dict[CellKey, tuple[float, float]]:
+        """ln of the prior and ln of the likelihood of each cell of the sizes of no effect, one or two, by key."""
+        hypothesis = self.hypothesis(effects)
+        if hypothesis is None:
             return {}
-        by_cell = one.log_by_cell(self.ground.baseline, self.ground.baseline.residual)
-        by_cell = by_cell - one.own.half_log_det + one.log_labels
+        by_cell = hypothesis.log_by_cell(self.ground.baseline, self.ground.baseline.residual)
+        by_cell = by_cell - hypothesis.own.half_log_det + hypothesis.log_labels
         with np.errstate(divide="ignore"):
-            log_prior = np.log(one.table.weights)
-        possible = np.flatnonzero(np.isfinite(log_prior))
-        keys = [tuple(float(part) for part in key) for key in _keys(one)[possible]]
+            log_prior = np.log(hypothesis.table.weights)
+        possible_cells = np.flatnonzero(np.isfinite(log_prior))
+        keys = [tuple(float(coordinate) for coordinate in key) for key in _cell_keys(hypothesis)[possible_cells]]
         return {
-            key: (float(log_prior[i]), float(by_cell[i] - log_prior[i])) for key, i in zip(keys, possible, strict=True)
+            key: (float(log_prior[i]), float(by_cell[i] - log_prior[i]))
+            for key, i in zip(keys, possible_cells, strict=True)
         }
 
-    def cells_beside(self, shared: str, own: str) -> dict[Cell, tuple[float, float]]:
-        """The same of each cell of one effect, another of whatever size being there as well; empty without pairs."""
-        one = self.hypothesis((shared, own)) or self.hypothesis((own, shared))
-        if one is None:
+    def cells_beside(self, shared: str, own: str) -> dict[CellKey, tuple[float, float]]:
+        """The same of each cell of one effect, summed over the sizes of another; empty where there is no such pair."""
+        hypothesis = self.hypothesis((shared, own)) or self.hypothesis((own, shared))
+        if hypothesis is None:
             return {}
-        first = 1 + one.table.parts[0].z.shape[1]
-        kept = slice(None, first) if one.members[0] == shared else slice(first, None)
-        by_cell: dict[Cell, list[tuple[float, float]]] = {}
-        for key, value in self.cells(one.members).items():
-            by_cell.setdefault(key[kept], []).append(value)
-        return {key: _summed(np.array(values)) for key, values in by_cell.items()}
+        n_first = 1 + hypothesis.table.parts[0].z.shape[1]
+        key_columns = slice(None, n_first) if hypothesis.members[0] == shared else slice(n_first, None)
+        by_cell: dict[CellKey, list[tuple[float, float]]] = {}
+        for key, value in self.cells(hypothesis.members).items():
+            by_cell.setdefault(key[key_columns], []).append(value)
+        return {key: _sum_cells(np.array(values)) for key, values in by_cell.items()}
 
 
-def _keys(one: Hypothesis) -> Floats:
-    """What a cell is on any board: form and standard coordinates of each of its effects, (n_cells, n) array."""
+def _cell_keys(hypothesis: Hypothesis) -> Floats:
+    """Keys of the cells, the same on all boards: form and standard coordinates of each effect, (n_cells, n) array."""
     keys = np.zeros((1, 0))
-    for table in one.table.parts or (one.table,):
-        own = np.column_stack([table.form, np.round(table.z, _DIGITS)])
-        keys = np.column_stack([np.repeat(keys, len(own), axis=0), np.tile(own, (len(keys), 1))])
+    for table in hypothesis.table.parts or (hypothesis.table,):
+        table_keys = np.column_stack([table.form, np.round(table.z, _DIGITS)])
+        keys = np.column_stack([np.repeat(keys, len(table_keys), axis=0), np.tile(table_keys, (len(keys), 1))])
     return keys
 
 
 def search_board(
     name: str, baseline: Baseline, effects: Sequence[str], tell: Callable[[float], None] | None = None
 ) -> BoardSearch:
-    """Tabulate effects on a board, and every pair of them: what one board would not show several may."""
+    """Tabulate effects on a board, and all pairs: several boards together may show what one board does not."""
     ground = prepare_search(baseline, tried=effects, tell=tell)
     return BoardSearch(name, with_own_labels(ground.with_hypotheses(effects)))
 
 
-def shown(boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
-    """Single effects, and those pairs both of which would show at nominal size on all boards together.
+def visible_effects(boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
+    """Single effects, and pairs of effects that are both visible at nominal size on all boards together.
 
-    A pair costs nothing for one that cannot be seen, so that every effect would seem to come with it.
+    An effect that cannot be seen would cost a pair nothing, so that every effect would seem to come with it.
     """
     traces = {
-        name: np.hypot.reduce([one.ground.candidates[name].trace for one in boards])
-        for each in effects
-        for name in each
+        name: np.hypot.reduce([board.ground.candidates[name].trace for board in boards])
+        for combination in effects
+        for name in combination
     }
-    return tuple(each for each in effects if len(each) == 1 or not min(traces[name] for name in each) < LEAST_TRACE)
+    return tuple(
+        combination
+        for combination in effects
+        if len(combination) == 1 or not min(traces[name] for name in combination) < LEAST_TRACE
+    )
 
 
-def explanations(boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...]]) -> tuple[Explanation, ...]:
-    """Everything that the boards may have of single effects and pairs, the most probable first."""
-    none = np.array([one.log_evidence(()) for one in boards])
-    shared = {each: log_evidence_shared(boards, each) for each in effects}
-    single = [each for each in effects if len(each) == 1]
-    pairs = [each for each in effects if len(each) == 2 and np.isfinite(shared[each])]
-    beside = [each for one, other in pairs for each in ((one, other), (other, one))]
-    of_two, mixed = (OF_TWO * PRIOR["shared"], PRIOR["shared and own"]) if pairs else (0.0, 0.0)
-    found: list[tuple[Way, tuple[str, ...], str, float, float]] = [
-        ("none", (), "", float(none.sum()), PRIOR["none"]),
-        *(("shared", pair, "", shared[pair], of_two / len(pairs)) for pair in pairs),
+def rank_campaign_explanations(
+    boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...]]
+) -> tuple[CampaignExplanation, ...]:
+    """All explanations of the boards by single effects and pairs, the most probable first."""
+    log_none = np.array([board.log_evidence(()) for board in boards])
+    shared = {combination: log_evidence_shared(boards, combination) for combination in effects}
+    single = [combination for combination in effects if len(combination) == 1]
+    pairs = [combination for combination in effects if len(combination) == 2 and np.isfinite(shared[combination])]
+    ordered_pairs = [pair for first, second in pairs for pair in ((first, second), (second, first))]
+    two_prior, mixed_prior = (
+        (PRIOR_SHARE_OF_TWO * SHARING_PRIOR["shared"], SHARING_PRIOR["shared and own"]) if pairs else (0.0, 0.0)
+    )
+    rows: list[tuple[SharingPattern, tuple[str, ...], str, float, float]] = [
+        ("none", (), "", float(log_none.sum()), SHARING_PRIOR["none"]),
+        *(("shared", pair, "", shared[pair], two_prior / len(pairs)) for pair in pairs),
         *(
-            ("shared and own", each, "", _over_common([one.cells_beside(*each) for one in boards]), mixed / len(beside))
-            for each in beside
+            (
+                "shared and own",
+                pair,
+                "",
+                _log_evidence_of_common_cells([board.cells_beside(*pair) for board in boards]),
+                mixed_prior / len(ordered_pairs),
+            )
+            for pair in ordered_pairs
         ),
     ]
     for effect in single:
-        alone = np.array([one.log_evidence(effect) for one in boards])
+        log_alone = np.array([board.log_evidence(effect) for board in boards])
         share = 1.0 / len(single)
-        found.append(("shared", effect, "", shared[effect], share * (PRIOR["shared"] - of_two)))
-        found.append(("own", effect, "", float(alone.sum()), share * (PRIOR["own"] + PRIOR["shared and own"] - mixed)))
-        each = share * PRIOR["one board"] / len(boards)
-        found += [
-            ("one board", effect, one.name, float(none.sum() - none[i] + alone[i]), each)
-            for i, one in enumerate(boards)
+        rows.append(("shared", effect, "", shared[effect], share * (SHARING_PRIOR["shared"] - two_prior)))
+        rows.append(
+            (
+                "own",
+                effect,
+                "",
+                float(log_alone.sum()),
+                share * (SHARING_PRIOR["own"] + SHARING_PRIOR["shared and own"] - mixed_prior),
+            )
+        )
+        board_prior = share * SHARING_PRIOR["one board"] / len(boards)
+        rows += [
+            ("one board", effect, board.name, float(log_none.sum() - log_none[i] + log_alone[i]), board_prior)
+            for i, board in enumerate(boards)
         ]
-    probability = normalised(np.array([log_evidence + np.log(prior) for *_, log_evidence, prior in found]))
+    probability = normalised_weights(np.array([log_evidence + np.log(prior) for *_, log_evidence, prior in rows]))
     order = np.argsort(-probability, kind="stable")
-    return tuple(Explanation(*found[int(i)][:4], float(probability[int(i)])) for i in order)
+    return tuple(CampaignExplanation(*rows[int(i)][:4], float(probability[int(i)])) for i in order)
 
 
 def log_evidence_shared(boards: Sequence[BoardSearch], effects: tuple[str, ...]) -> float:
-    """ln of the evidence of one size for all boards, of each effect; -inf where they have no cell in common."""
-    return _over_common([one.cells(effects) for one in boards])
+    """ln of the evidence of effects with one size for all boards; -inf where the boards have no cell in common."""
+    return _log_evidence_of_common_cells([board.cells(effects) for board in boards])
 
 
-def _summed(values: Floats) -> tuple[float, float]:
-    """ln of prior probability and likelihood of several cells together, from those of each: (n_cells, 2) array."""
+def _sum_cells(values: Floats) -> tuple[float, float]:
+    """ln of the prior and ln of the likelihood of several cells together, from those of each: (n_cells, 2) array."""
     log_prior = float(log_sum(values[:, 0]))
     return log_prior, float(log_sum(values.sum(axis=1))) - log_prior
 
 
-def _over_common(by_board: Sequence[Mapping[Cell, tuple[float, float]]]) -> float:
-    """ln of the evidence of cells that all boards have alike; -inf where there is none."""
+def _log_evidence_of_common_cells(by_board: Sequence[Mapping[CellKey, tuple[float, float]]]) -> float:
+    """ln of the evidence of the cells that all boards have in common; -inf where there are none."""
     common = set.intersection(*(set(cells) for cells in by_board))
     if not common:
         return -np.inf

@@ -1,4 +1,4 @@
-"""What boards share: parameters of their effects, as values or as ratios to the boards' own moduli."""
+"""Shared parameters of boards' effects, as values or as ratios to the boards' own moduli."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from bayesplate.effects.base import Ratio
 from bayesplate.errors import Fault, InputError
 
 MOST_PARAMETERS = 3
-"""Nodes over more would grow as a power of their number."""
+"""Largest number of shared parameters: quadrature nodes grow exponentially with it."""
 
 
 @dataclass(frozen=True)
-class Shared:
-    """One number that all boards of a campaign have in common, or about which their own scatter."""
+class SharedParameter:
+    """A number that all boards of a campaign share, or about which their own numbers scatter."""
 
     effect: str  # with the key: the parameter of the boards that it sets
     key: str
-    prior: Quantity  # of the number itself; its standard coordinate is what is sampled
+    prior: Quantity  # of the number itself; its standard coordinate is sampled
     unit: str  # SI; "1" for a ratio
     source: str = ""  # where the prior comes from; empty if a card states it
     to: str = ""  # the modulus that it is a ratio to; empty for a value
@@ -41,87 +41,120 @@ class Shared:
         return f"{self.effect}.{self.key}" + (f" / {self.to}" if self.to else "")
 
     def parameters(self, board: Board) -> tuple[Parameter, ...]:
-        """The uncertain parameters of a board that it sets: one per setup that has its own."""
-        return tuple(one for one in board.uncertain if (one.effect, one.key) == (self.effect, self.key))
+        """The uncertain parameters of a board that it sets: one, or one per setup."""
+        return tuple(
+            parameter for parameter in board.uncertain if (parameter.effect, parameter.key) == (self.effect, self.key)
+        )
 
     def of_board(self, value: Floats, values: Values) -> Floats:
-        """What the board's parameters are where the shared number has a value: (n,) arrays, SI."""
+        """The board's parameter from a value of the shared number: (n,) arrays, SI."""
         return value * modulus(self.to, values) if self.to else value
 
     def from_board(self, parameter: Floats, values: Values) -> Floats:
-        """The shared number that a board's parameter amounts to: the inverse of `of_board`."""
+        """The shared number from a board's parameter: the inverse of `of_board`."""
         return parameter / modulus(self.to, values) if self.to else parameter
 
 
 def modulus(name: str, values: Values) -> Floats:
     """E_x, E_y or G_xy of a board from its rigidities: (n,) array, Pa; not a number where no material exists."""
-    found = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
-    return np.asarray(found[MODULI.index(name)])
+    constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
+    return np.asarray(constants[MODULI.index(name)])
 
 
-def shared_by(card: CampaignCard, boards: Sequence[Board]) -> tuple[Shared, ...]:
-    """What the boards of a campaign, its effects declared, share: in the order of the card and of each effect's
-    parameters.
+def find_shared_parameters(card: CampaignCard, boards: Sequence[Board]) -> tuple[SharedParameter, ...]:
+    """The shared parameters of a campaign, whose effects the boards declare, in the order of the card and of each
+    effect's parameters.
 
-    InputError with everything that cannot be shared, board by board.
+    InputError with all faults of effects that cannot be shared, board by board.
     """
     file = card.path.name
-    found: list[Shared] = []
+    shared_parameters: list[SharedParameter] = []
     faults: list[Fault] = []
     for number, section in enumerate(card.shared, start=1):
         place = f'{file} [[shared]] {number} "{section.effect}"'
         try:
-            found += _of_effect(section, boards, place)
+            shared_parameters += _parameters_of_effect(section, boards, place)
         except InputError as error:
             faults += error.faults
-    if len(found) > MOST_PARAMETERS and not faults:
-        names = ", ".join(one.name for one in found)
+    if len(shared_parameters) > MOST_PARAMETERS and not faults:
+        names = ", ".join(parameter.name for parameter in shared_parameters)
         remedy = "share fewer effects; the others stay each board's own"
         faults.append(Fault(f"{file} [[shared]]", f"at most {MOST_PARAMETERS} shared parameters", names, remedy))
     if faults:
         raise InputError(faults)
-    return tuple(found)
+    return tuple(shared_parameters)
 
 
-def _of_effect(section: SharedSection, boards: Sequence[Board], place: str) -> list[Shared]:
-    """The parameters of one effect that all boards have, all uncertain and with one prior."""
+def _parameters_of_effect(section: SharedSection, boards: Sequence[Board], place: str) -> list[SharedParameter]:
+    """The shared parameters of one effect, which all boards must have, uncertain and with one prior."""
     ratios = EFFECTS[section.effect].ratios
     if section.way == "ratio" and not ratios:
-        able = ", ".join(name for name, effect in EFFECTS.items() if effect.ratios)
-        raise InputError(Fault(f"{place} as", "value", "ratio", f"only {able} has ratios to the boards' moduli"))
+        names = ", ".join(name for name, effect in EFFECTS.items() if effect.ratios)
+        raise InputError(Fault(f"{place} as", "value", "ratio", f"only {names} has ratios to the boards' moduli"))
     faults: list[Fault] = []
-    of_boards = [[one for one in board.parameters if one.effect == section.effect] for board in boards]
-    uncertain = {one.key for every in of_boards for one in every if not one.prior.is_exact}
-    keys = [one for one in dict.fromkeys(one.key for every in of_boards for one in every) if one in uncertain]
-    for board, every in zip(boards, of_boards, strict=True):
-        where = f"{place}, board {board.name}"
-        missing = [key for key in keys if key not in {one.key for one in every}]
-        known = [one.key for one in every if one.prior.is_exact and (one.key in keys or not keys)]
-        alone = [one.key for one in every if one.is_component or not one.is_of_effect]
-        if missing or not every:
-            faults.append(Fault(where, f"the parameters {', '.join(keys) or 'of the effect'}", "a board without them"))
-        if known:
+    parameters_by_board = [
+        [parameter for parameter in board.parameters if parameter.effect == section.effect] for board in boards
+    ]
+    uncertain_keys = {
+        parameter.key
+        for board_parameters in parameters_by_board
+        for parameter in board_parameters
+        if not parameter.prior.is_exact
+    }
+    keys = [
+        key
+        for key in dict.fromkeys(
+            parameter.key for board_parameters in parameters_by_board for parameter in board_parameters
+        )
+        if key in uncertain_keys
+    ]
+    for board, board_parameters in zip(boards, parameters_by_board, strict=True):
+        board_place = f"{place}, board {board.name}"
+        missing_keys = [key for key in keys if key not in {parameter.key for parameter in board_parameters}]
+        known_keys = [
+            parameter.key
+            for parameter in board_parameters
+            if parameter.prior.is_exact and (parameter.key in keys or not keys)
+        ]
+        own_keys = [
+            parameter.key for parameter in board_parameters if parameter.is_component or not parameter.is_of_effect
+        ]
+        if missing_keys or not board_parameters:
+            faults.append(
+                Fault(board_place, f"the parameters {', '.join(keys) or 'of the effect'}", "a board without them")
+            )
+        if known_keys:
             remedy = "leave it out of the shared effects, or state its uncertainty on the board's card"
-            faults.append(Fault(where, "something unknown to share", f"{', '.join(known)} known for sure", remedy))
-        if alone:
-            faults.append(Fault(where, "an effect that boards can share", f"{alone[0]}, which is each board's own"))
+            faults.append(
+                Fault(board_place, "something unknown to share", f"{', '.join(known_keys)} known for sure", remedy)
+            )
+        if own_keys:
+            faults.append(
+                Fault(board_place, "an effect that boards can share", f"{own_keys[0]}, which is each board's own")
+            )
     if faults:
         raise InputError(faults)
-    return [_shared(section, key, ratios.get(key), of_boards, place) for key in keys]
+    return [_shared_parameter(section, key, ratios.get(key), parameters_by_board, place) for key in keys]
 
 
-def _shared(
-    section: SharedSection, key: str, ratio: Ratio | None, of_boards: Sequence[Sequence[Parameter]], place: str
-) -> Shared:
+def _shared_parameter(
+    section: SharedSection,
+    key: str,
+    ratio: Ratio | None,
+    parameters_by_board: Sequence[Sequence[Parameter]],
+    place: str,
+) -> SharedParameter:
     scatter = 0.01 * section.scatter_percent
     if section.way == "ratio" and ratio is not None:
-        return Shared(section.effect, key, ratio.prior, "1", ratio.source, ratio.to, scatter)
-    same = [one for every in of_boards for one in every if one.key == key]
-    first = same[0]
-    if any(one.prior != first.prior for one in same):
-        got = f"{len({repr(one.prior) for one in same})} different ones of {key}"
+        return SharedParameter(section.effect, key, ratio.prior, "1", ratio.source, ratio.to, scatter)
+    same_parameters = [
+        parameter for board_parameters in parameters_by_board for parameter in board_parameters if parameter.key == key
+    ]
+    first = same_parameters[0]
+    if any(parameter.prior != first.prior for parameter in same_parameters):
+        got = f"{len({repr(parameter.prior) for parameter in same_parameters})} different ones of {key}"
         raise InputError(Fault(place, "one prior, because it is one number", got, "state the same on every board"))
     if scatter and first.prior.kind != "log-normal":
         wanted = "a positive number, which boards differ in by a percentage"
         raise InputError(Fault(f"{place} scatter_percent", wanted, f"{key}, whose prior is {first.prior.kind}"))
-    return Shared(section.effect, key, first.prior, first.unit, first.source, scatter=scatter)
+    return SharedParameter(section.effect, key, first.prior, first.unit, first.source, scatter=scatter)

@@ -1,4 +1,4 @@
-"""A campaign in summary.json, posterior.nc and its check: what its boards share, and every board's own."""
+"""A campaign in summary.json, posterior.nc and its check: the shared numbers, and each board's summary."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 
 from bayesplate.board.material import MODULI
-from bayesplate.campaign.boards import Member
-from bayesplate.campaign.claim import LeftOut, refusing
+from bayesplate.campaign.boards import FittedBoard
+from bayesplate.campaign.claim import LeftOutBoard, refusing_boards
 from bayesplate.campaign.common import CommonResidual
-from bayesplate.campaign.learning import ASTRAY, Learnt
+from bayesplate.campaign.learning import LARGEST_OFFSET, SharedPosterior
 from bayesplate.campaign.population import Population
 from bayesplate.campaign.scatter import scatters_of
-from bayesplate.campaign.together import FEWEST_POINTS, values_of
-from bayesplate.effects.words import joined
+from bayesplate.campaign.together import FEWEST_POINTS, shared_values
+from bayesplate.effects.words import join_words
 from bayesplate.posterior.inference import MOST_DRAWS_A_CHAIN
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.statistics import thin_walker_major
-from bayesplate.results.archive import DRAWN, sample_stats, tree_of
+from bayesplate.results.archive import DRAW_DIMENSIONS, build_tree, sample_stats
 from bayesplate.results.checking import CheckReport
 from bayesplate.results.contract import Elastic, Spread
 from bayesplate.results.summary import SamplerHealth, Summary
@@ -86,7 +86,7 @@ class CampaignSummary(CampaignRun):
     converged : bool
     shared : dict of SharedNumber
         By name: "attached_mass.mass", "transverse_shear.G_xz / E_x".
-    left_out_boards : dict of LeftOut
+    left_out_boards : dict of LeftOutBoard
         Empty where nothing is shared.
     common_residual : dict of CommonResidual
         By label.
@@ -99,7 +99,7 @@ class CampaignSummary(CampaignRun):
     """
 
     shared: Mapping[str, SharedNumber]
-    left_out_boards: Mapping[str, LeftOut]
+    left_out_boards: Mapping[str, LeftOutBoard]
     common_residual: Mapping[str, CommonResidual]
     population: PopulationSummary | None
     boards: Mapping[str, Summary]
@@ -111,32 +111,34 @@ class CampaignSummary(CampaignRun):
         return f"<CampaignSummary of {self.name}: {len(self.boards)} boards; {shared}>"
 
 
-def shared_numbers(learnt: Learnt, seed: int) -> dict[str, SharedNumber]:
-    """What is shared: from all boards, from each alone, and from all but each."""
+def shared_numbers(learnt: SharedPosterior, seed: int) -> dict[str, SharedNumber]:
+    """The shared numbers from all boards, from each board alone, and from all boards but each."""
     rng = np.random.default_rng([seed, _LINE])
     together, shared = learnt.together, learnt.together.shared
-    every = values_of(together.coordinates, learnt.chains.kept)
-    scatters = {one.of.name: Spread.of(every[one.name], one.unit) for one in scatters_of(shared)}
-    own = {one.name: _own(one, rng) for one in learnt.members}
-    others = {
-        name: values_of(shared, together.taught_draws(rng, _N_DRAWS, (i,))) for i, name in enumerate(together.names)
+    all_values = shared_values(together.coordinates, learnt.chains.kept)
+    scatters = {scatter.of.name: Spread.of(all_values[scatter.name], scatter.unit) for scatter in scatters_of(shared)}
+    own_values = {member.name: _values_of_board(member, rng) for member in learnt.members}
+    taught_values = {
+        name: shared_values(shared, together.taught_draws(rng, _N_DRAWS, (i,))) for i, name in enumerate(together.names)
     }
     return {
-        one.name: SharedNumber(
-            all_boards=Spread.of(every[one.name], one.unit),
-            scatter=scatters.get(one.name),
-            own={board: Spread.of(values[one.name], one.unit) for board, values in own.items()},
-            others={board: Spread.of(values[one.name], one.unit) for board, values in others.items()},
-            prior_source=one.source,
+        parameter.name: SharedNumber(
+            all_boards=Spread.of(all_values[parameter.name], parameter.unit),
+            scatter=scatters.get(parameter.name),
+            own={board: Spread.of(values[parameter.name], parameter.unit) for board, values in own_values.items()},
+            others={
+                board: Spread.of(values[parameter.name], parameter.unit) for board, values in taught_values.items()
+            },
+            prior_source=parameter.source,
         )
-        for one in shared
+        for parameter in shared
     }
 
 
-def _own(member: Member, rng: np.random.Generator) -> Mapping[str, np.ndarray]:
+def _values_of_board(member: FittedBoard, rng: np.random.Generator) -> Mapping[str, np.ndarray]:
     """The shared numbers at draws of a board's own posterior, the campaign's prior in place of the board's."""
-    picked = rng.choice(len(member.alone.z), size=_N_DRAWS, p=member.alone.weights)
-    return values_of(member.shared, member.alone.z[picked])
+    picked_draws = rng.choice(len(member.alone.z), size=_N_DRAWS, p=member.alone.weights)
+    return shared_values(member.shared, member.alone.z[picked_draws])
 
 
 def population_summary(population: Population, prior: str, seed: int) -> PopulationSummary:
@@ -148,7 +150,8 @@ def population_summary(population: Population, prior: str, seed: int) -> Populat
         sd_percent=_by_constant(100.0 * population.sds, "%"),
         next_board=_by_constant(np.exp(next_board), "Pa"),
         boards={
-            one.name: _by_constant(np.exp(population.pooled(i, rng)), "Pa") for i, one in enumerate(population.boards)
+            board.name: _by_constant(np.exp(population.pooled(i, rng)), "Pa")
+            for i, board in enumerate(population.boards)
         },
     )
 
@@ -157,36 +160,41 @@ def _by_constant(values: np.ndarray, unit: str) -> Elastic[Spread]:
     return Elastic(**{name: Spread.of(column, unit) for name, column in zip(MODULI, values.T, strict=True)})
 
 
-def learning_warnings(learnt: Learnt, effective: Mapping[str, float]) -> tuple[str, ...]:
-    """What a reader of the shared numbers must know; `effective` draws are what each board's posterior rests on."""
-    told = []
-    refused = refusing(learnt.together)
-    if refused:
-        boards = "board" if len(refused) == 1 else "boards"
-        same = "so little scatter" if scatters_of(learnt.together.shared) else "one value for all"
-        told.append(
-            f"{boards} {joined(refused)} {'does' if len(refused) == 1 else 'do'} not want what the others teach: "
-            f"{same} is not what these boards say"
+def learning_warnings(learnt: SharedPosterior, effective: Mapping[str, float]) -> tuple[str, ...]:
+    """Warnings on the shared numbers; `effective` is the number of draws on which each board's posterior rests."""
+    warnings = []
+    refusing_names = refusing_boards(learnt.together)
+    if refusing_names:
+        boards = "board" if len(refusing_names) == 1 else "boards"
+        scatter_words = "so little scatter" if scatters_of(learnt.together.shared) else "one value for all"
+        warnings.append(
+            f"{boards} {join_words(refusing_names)} {'does' if len(refusing_names) == 1 else 'do'} not want what the "
+            f"others teach: {scatter_words} is not what these boards say"
         )
     if learnt.together.fewest_points < FEWEST_POINTS:
-        told.append(
+        warnings.append(
             f"what all boards, or all but one, find likely rests on {learnt.together.fewest_points:.0f} points only: "
             "the shared intervals are rough"
         )
-    astray = [name for name, off in zip(learnt.together.names, learnt.astray, strict=True) if off > ASTRAY]
-    if astray:
-        told.append(
-            f"what {joined(astray)} {'says' if len(astray) == 1 else 'say'} of the shared numbers is no polynomial of "
-            f"low order in them: the shared means may be off by {max(learnt.astray):.1f} standard deviations"
+    astray_names = [
+        name for name, offset in zip(learnt.together.names, learnt.astray, strict=True) if offset > LARGEST_OFFSET
+    ]
+    if astray_names:
+        warnings.append(
+            f"what {join_words(astray_names)} {'says' if len(astray_names) == 1 else 'say'} of the shared numbers is "
+            f"no polynomial of low order in them: the shared means may be off by {max(learnt.astray):.1f} standard "
+            "deviations"
         )
-    poor = [name for name, one in effective.items() if one < FEWEST_WEIGHTED_DRAWS]
-    if poor:
-        told.append(f"few draws of {joined(poor)} stand for what all boards teach: their own intervals are rough")
-    return tuple(told)
+    poor_names = [name for name, n_draws in effective.items() if n_draws < FEWEST_WEIGHTED_DRAWS]
+    if poor_names:
+        warnings.append(
+            f"few draws of {join_words(poor_names)} stand for what all boards teach: their own intervals are rough"
+        )
+    return tuple(warnings)
 
 
 @dataclass(frozen=True)
-class CheckedShared:
+class SharedNumberCheck:
     """A number that the boards would share."""
 
     unit: str  # SI; "1" for a ratio
@@ -200,12 +208,12 @@ class CheckedShared:
 
 @dataclass(frozen=True, repr=False)
 class CampaignCheck:
-    """What a fit of a campaign would do.
+    """The check of a campaign before a fit: expected uncertainty of the shared numbers, and each board's check.
 
     Attributes
     ----------
     name, title : str
-    shared : dict of CheckedShared
+    shared : dict of SharedNumberCheck
     population : str or None
         Name of the prior of the population.
     boards : dict of CheckReport
@@ -213,13 +221,15 @@ class CampaignCheck:
 
     name: str
     title: str
-    shared: Mapping[str, CheckedShared]
+    shared: Mapping[str, SharedNumberCheck]
     population: str | None
     boards: Mapping[str, CheckReport]
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{name} ({one.expected_sd:.2f} of its prior's sd)" for name, one in self.shared.items())
-        return f"<CampaignCheck of {self.name}: {len(self.boards)} boards; {told or 'nothing shared'}>"
+        words = ", ".join(
+            f"{name} ({number.expected_sd:.2f} of its prior's sd)" for name, number in self.shared.items()
+        )
+        return f"<CampaignCheck of {self.name}: {len(self.boards)} boards; {words or 'nothing shared'}>"
 
 
 def archive_name(name: str) -> str:
@@ -227,22 +237,22 @@ def archive_name(name: str) -> str:
     return name.replace(" / ", " over ")
 
 
-def shared_tree(learnt: Learnt, attributes: Mapping[str, str]) -> Any:
+def shared_tree(learnt: SharedPosterior, attributes: Mapping[str, str]) -> Any:
     """Draws of shared numbers and scatters, SI, each board's log likelihood of them, the sampler's health: DataTree."""
     chains, convergence, together = learnt.chains, learnt.convergence, learnt.together
     thinned = [
-        thin_walker_major(each, chains.burn_in, convergence.tau_max, n_draws_max=MOST_DRAWS_A_CHAIN)
-        for each in (chains.draws, chains.log_prob)
+        thin_walker_major(draws, chains.burn_in, convergence.tau_max, n_draws_max=MOST_DRAWS_A_CHAIN)
+        for draws in (chains.draws, chains.log_prob)
     ]
     z, log_posterior = thinned
     likelihood = together.log_likelihoods(z.reshape(-1, z.shape[-1])).T.reshape(*z.shape[:2], -1)
-    values = values_of(together.coordinates, z)
-    return tree_of(
+    values = shared_values(together.coordinates, z)
+    return build_tree(
         {
-            "posterior": {archive_name(name): (DRAWN, np.asarray(each)) for name, each in values.items()},
-            "log_likelihood": {"board": ((*DRAWN, "name"), likelihood)},
+            "posterior": {archive_name(name): (DRAW_DIMENSIONS, np.asarray(draws)) for name, draws in values.items()},
+            "log_likelihood": {"board": ((*DRAW_DIMENSIONS, "name"), likelihood)},
             "sample_stats": sample_stats(log_posterior, convergence),
         },
-        {"name": together.names, "parameter": [archive_name(one.name) for one in together.coordinates]},
+        {"name": together.names, "parameter": [archive_name(coordinate.name) for coordinate in together.coordinates]},
         attributes,
     )

@@ -1,4 +1,4 @@
-"""The boards' likelihoods multiplied: what all of them, or all but some, say of the shared parameters."""
+"""The product of the boards' likelihoods: the posterior of the shared parameters from all boards, or all but some."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from bayesplate.arrays import Floats
-from bayesplate.campaign.likelihood import Likelihood, LogDensity, moments, spread_points
-from bayesplate.campaign.pulls import Pull, moments_before, normal_posterior
-from bayesplate.campaign.scatter import Scatter, ScatteredLikelihood, expected_width, scatters_of, widths
-from bayesplate.campaign.shared import Shared
-from bayesplate.diagnosis.terms import log_sum, normalised
+from bayesplate.campaign.likelihood import Likelihood, SharedLogDensity, moments, spread_points
+from bayesplate.campaign.pulls import NormalLikelihood, normal_posterior, prior_moments
+from bayesplate.campaign.scatter import Scatter, ScatteredLikelihood, expected_width, scatter_widths, scatters_of
+from bayesplate.campaign.shared import SharedParameter
+from bayesplate.diagnosis.terms import log_sum, normalised_weights
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.mixture import Mixture
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
@@ -21,56 +21,63 @@ from bayesplate.posterior.statistics import effective_draws
 
 _LINE = 21
 FEWEST_POINTS = 500
-"""Points of equal weight that what all boards, or all but one, find likely has to rest on."""
-_N_POINTS = {1: 2**12, 2: 2**14}
+"""Points of equal weight on which the posterior from all boards, or all but one, has to rest."""
+_N_POINTS_BY_DIMENSION = {1: 2**12, 2: 2**14}
 _MOST_POINTS = 2**15
-_WIDER = 1.6
-"""Than the posteriors from all boards and from all but each: the points at which densities are summed."""
+_WIDENING = 1.6
+"""Factor by which the points are spread wider than the posteriors from all boards and from all but each."""
 _ROUNDS = 12
 _HALVINGS = 30
-_N_FITTED = 4096
+_N_MIXTURE_DRAWS = 4096
 
 
 @dataclass(frozen=True, eq=False)
-class Together:
+class CombinedBoards:
     """Boards that are independent given the shared numbers and the scatters of those that have one."""
 
-    shared: tuple[Shared, ...]
+    shared: tuple[SharedParameter, ...]
     names: tuple[str, ...]  # of the boards
     likelihoods: tuple[Likelihood, ...]  # one per board, of its own numbers
-    pulls: tuple[Pull, ...]  # what each board says by itself, as a normal likelihood of its own numbers
+    pulls: tuple[NormalLikelihood, ...]  # one per board, the normal likelihood of its own numbers
     points: Floats  # (n_points, n_coordinates) array: standard coordinates at which densities are summed
     log_spread: Floats  # (n_points,) array: ln of the density of these points
 
     @classmethod
     def of(
-        cls, shared: Sequence[Shared], names: Sequence[str], likelihoods: Sequence[Likelihood], pulls: Sequence[Pull]
-    ) -> Together:
-        """Boards together, their points around all that they, or all but one of them, find likely."""
-        weaker = [one.scattered(expected_width(shared)) for one in pulls]
+        cls,
+        shared: Sequence[SharedParameter],
+        names: Sequence[str],
+        likelihoods: Sequence[Likelihood],
+        pulls: Sequence[NormalLikelihood],
+    ) -> CombinedBoards:
+        """The boards combined, with points around the posteriors from all of them and from all but each."""
+        scattered_pulls = [pull.scattered(expected_width(shared)) for pull in pulls]
         scatters = scatters_of(shared)
-        spread = _around(
-            [_beside(*normal_posterior([weaker[i] for i in kept]), scatters) for kept in _leaving_one(len(pulls))]
+        spread = _points_around(
+            [
+                _append_scatters(*normal_posterior([scattered_pulls[i] for i in indices]), scatters)
+                for indices in _leave_one_out(len(pulls))
+            ]
         )
-        found = cls(tuple(shared), tuple(names), tuple(likelihoods), tuple(pulls), *spread)
+        combined = cls(tuple(shared), tuple(names), tuple(likelihoods), tuple(pulls), *spread)
         for _ in range(_ROUNDS):
-            if found.fewest_points >= FEWEST_POINTS:
+            if combined.fewest_points >= FEWEST_POINTS:
                 break
-            points, log_spread = _around([found._towards(without) for without in found.left_out])
-            found = replace(found, points=points, log_spread=log_spread)
-        return found
+            points, log_spread = _points_around([combined._tempered_moments(without) for without in combined.left_out])
+            combined = replace(combined, points=points, log_spread=log_spread)
+        return combined
 
     @property
-    def coordinates(self) -> tuple[Shared | Scatter, ...]:
+    def coordinates(self) -> tuple[SharedParameter | Scatter, ...]:
         return (*self.shared, *scatters_of(self.shared))
 
     @cached_property
-    def _seen(self) -> tuple[Likelihood, ...]:
+    def _coordinate_likelihoods(self) -> tuple[Likelihood, ...]:
         """Each board's likelihood of the coordinates."""
         if len(self.coordinates) == len(self.shared):
             return self.likelihoods
-        both = zip(self.likelihoods, self.pulls, strict=True)
-        return tuple(ScatteredLikelihood(self.shared, own, pull) for own, pull in both)
+        pairs = zip(self.likelihoods, self.pulls, strict=True)
+        return tuple(ScatteredLikelihood(self.shared, own, pull) for own, pull in pairs)
 
     @property
     def left_out(self) -> list[tuple[int, ...]]:
@@ -79,16 +86,16 @@ class Together:
 
     def log_likelihoods(self, z: Floats) -> Floats:
         """ln of each board's likelihood at standard coordinates: (n_boards, n) array."""
-        return np.stack([one.at(z) for one in self._seen])
+        return np.stack([likelihood.at(z) for likelihood in self._coordinate_likelihoods])
 
     def log_prior(self, z: Floats) -> Floats:
         """ln of the prior density of the standard coordinates: (n,) array."""
-        return np.sum([one.prior.log_prior(z[:, i]) for i, one in enumerate(self.coordinates)], axis=0)
+        return np.sum([coordinate.prior.log_prior(z[:, i]) for i, coordinate in enumerate(self.coordinates)], axis=0)
 
     def log_density(self, z: Floats, without: Collection[int] = ()) -> Floats:
         """ln of the posterior density from all boards but some, not normalised: (n,) array."""
-        kept = [one for i, one in enumerate(self._seen) if i not in without]
-        return np.asarray(self.log_prior(z) + np.sum([one.at(z) for one in kept], axis=0))
+        likelihoods = [likelihood for i, likelihood in enumerate(self._coordinate_likelihoods) if i not in without]
+        return np.asarray(self.log_prior(z) + np.sum([likelihood.at(z) for likelihood in likelihoods], axis=0))
 
     def log_evidence(self, without: Collection[int] = ()) -> float:
         """ln of the probability of the readings of all boards but some."""
@@ -96,7 +103,7 @@ class Together:
 
     def weights(self, without: Collection[int] = ()) -> Floats:
         """Posterior weight of each point from all boards but some: (n_points,) array that sums to 1."""
-        return normalised(self._log_weights(without))
+        return normalised_weights(self._log_weights(without))
 
     def moments(self, without: Collection[int] = ()) -> tuple[Floats, Floats]:
         """Mean and covariance of the standard coordinates from all boards but some."""
@@ -104,114 +111,118 @@ class Together:
 
     @cached_property
     def fewest_points(self) -> float:
-        """Points of equal weight that the sums rest on, from all boards or all but one."""
+        """Number of points of equal weight on which the sums rest, the least from all boards or all but one."""
         return min(effective_draws(self.weights(without)) for without in self.left_out)
 
     @cached_property
-    def _of_a_board(self) -> Floats:
-        """A board's own numbers at each of the points, drawn anew where they scatter: (n_points, n_shared) array."""
+    def _board_numbers(self) -> Floats:
+        """A board's own numbers at each point, drawn about the shared ones where they scatter: (n_points, n_shared)
+        array."""
         n = len(self.shared)
         scattered = np.random.default_rng(_LINE).standard_normal((len(self.points), n))
-        return np.asarray(self.points[:, :n] + widths(self.shared, self.points) * scattered)
+        return np.asarray(self.points[:, :n] + scatter_widths(self.shared, self.points) * scattered)
 
     def taught(self, without: Collection[int] = ()) -> tuple[Floats, Floats]:
-        """Mean and covariance of the own numbers of a board that all boards but some teach, unseen itself."""
-        return moments(self._of_a_board, self.weights(without))
+        """Mean and covariance of an unmeasured board's own numbers, as all boards but some teach them."""
+        return moments(self._board_numbers, self.weights(without))
 
     def taught_draws(self, rng: np.random.Generator, n: int, without: Collection[int] = ()) -> Floats:
         """Draws of a board's own numbers as `taught`: (n, n_shared) array."""
-        return self._of_a_board[rng.choice(len(self.points), size=n, p=self.weights(without))]
+        return self._board_numbers[rng.choice(len(self.points), size=n, p=self.weights(without))]
 
     def under_all(self, board: int) -> tuple[Floats, Floats]:
-        """Mean and covariance of a board's own numbers under what the others and its own readings say."""
-        log_weights = self._log_weights((board,)) + self.likelihoods[board].at(self._of_a_board)
-        return moments(self._of_a_board, normalised(log_weights))
+        """Mean and covariance of a board's own numbers, given the other boards and its own readings."""
+        log_weights = self._log_weights((board,)) + self.likelihoods[board].at(self._board_numbers)
+        return moments(self._board_numbers, normalised_weights(log_weights))
 
-    def log_taught(self, without: Collection[int] = ()) -> LogDensity:
+    def log_taught(self, without: Collection[int] = ()) -> SharedLogDensity:
         """ln of the density of a board's own numbers as all boards but some teach them, not normalised.
 
-        Where they scatter, of a mixture of Student distributions that is fitted to draws of them: what is unknown of
-        the scatter gives it tails. Farther out than any of the draws it is zero.
+        Where they scatter, it is that of a mixture of Student distributions fitted to draws of them: the uncertainty of
+        the scatter gives it tails. It is zero beyond all of the draws.
         """
         if len(self.coordinates) == len(self.shared):
             return lambda z: self.log_density(z, without)
-        draws = self.taught_draws(np.random.default_rng(_LINE), _N_FITTED, without)
-        bounds = np.array([one.prior.standard_bounds[0] for one in self.shared])  # minus infinity where there is none
+        draws = self.taught_draws(np.random.default_rng(_LINE), _N_MIXTURE_DRAWS, without)
+        # minus infinity where there is none
+        bounds = np.array([parameter.prior.standard_bounds[0] for parameter in self.shared])
         for i in np.flatnonzero(np.isfinite(bounds)):  # their mirror image beside them, or the density would fall off
             mirrored = draws.copy()
             mirrored[:, i] = 2.0 * bounds[i] - mirrored[:, i]
             draws = np.concatenate([draws, mirrored])
         mixture = Mixture.fitted(np.random.default_rng(_LINE).permutation(draws))
-        whole = Mixture.one_fitted(draws)
-        reach = whole.squared_distances(draws).max()
+        envelope = Mixture.one_fitted(draws)
+        reach = envelope.squared_distances(draws).max()
 
         def log_density(z: Floats) -> Floats:
-            inside = (z >= bounds).all(axis=1) & (whole.squared_distances(z)[0] <= reach)
-            return np.where(inside, mixture.log_density(z), -np.inf)
+            is_inside = (z >= bounds).all(axis=1) & (envelope.squared_distances(z)[0] <= reach)
+            return np.where(is_inside, mixture.log_density(z), -np.inf)
 
         return log_density
 
     @cached_property
-    def _at_points(self) -> tuple[Floats, Floats]:
+    def _log_densities_at_points(self) -> tuple[Floats, Floats]:
         """ln likelihood of each board, and ln of the prior over the points' own density."""
         return self.log_likelihoods(self.points), self.log_prior(self.points) - self.log_spread
 
-    def _towards(self, without: Collection[int]) -> tuple[Floats, Floats]:
+    def _tempered_moments(self, without: Collection[int]) -> tuple[Floats, Floats]:
         """Moments of the posterior, tempered until enough of the points have a share in them."""
         log_weights = self._log_weights(without)
         low, high = 0.0, 1.0
-        if effective_draws(normalised(log_weights)) < FEWEST_POINTS:
+        if effective_draws(normalised_weights(log_weights)) < FEWEST_POINTS:
             for _ in range(_HALVINGS):
                 middle = 0.5 * (low + high)
-                is_enough = effective_draws(normalised(middle * log_weights)) >= FEWEST_POINTS
+                is_enough = effective_draws(normalised_weights(middle * log_weights)) >= FEWEST_POINTS
                 low, high = (middle, high) if is_enough else (low, middle)
             high = low
-        return moments(self.points, normalised(high * log_weights))
+        return moments(self.points, normalised_weights(high * log_weights))
 
     def _log_weights(self, without: Collection[int]) -> Floats:
-        boards, prior = self._at_points
-        kept = [i for i in range(len(boards)) if i not in without]
-        return np.asarray(boards[kept].sum(axis=0) + prior)
+        log_likelihoods, log_prior = self._log_densities_at_points
+        indices = [i for i in range(len(log_likelihoods)) if i not in without]
+        return np.asarray(log_likelihoods[indices].sum(axis=0) + log_prior)
 
 
-def walk(
-    together: Together, settings: SamplerSettings, progress: Callable[[Progress], None] | None = None
+def sample_shared(
+    together: CombinedBoards, settings: SamplerSettings, progress: Callable[[Progress], None] | None = None
 ) -> tuple[Chains, Convergence]:
     """Sample the shared numbers, then their scatters, in standard coordinates, from all boards."""
-    names = [one.name for one in together.coordinates]
+    names = [coordinate.name for coordinate in together.coordinates]
     return sample(together.log_density, *together.moments(), settings, names=names, progress=progress)
 
 
-def values_of(coordinates: Sequence[Shared | Scatter], z: Floats) -> dict[str, Floats]:
-    """What is learned by name, SI, from (..., n_coordinates) standard coordinates: (...) arrays."""
-    return {one.name: np.asarray(one.prior.value(z[..., i])) for i, one in enumerate(coordinates)}
+def shared_values(coordinates: Sequence[SharedParameter | Scatter], z: Floats) -> dict[str, Floats]:
+    """Shared numbers and scatters by name, SI, from (..., n_coordinates) standard coordinates: (...) arrays."""
+    return {coordinate.name: np.asarray(coordinate.prior.value(z[..., i])) for i, coordinate in enumerate(coordinates)}
 
 
-def _leaving_one(n: int) -> Iterator[list[int]]:
-    """All of n boards, then all but each; a single board is left in."""
+def _leave_one_out(n: int) -> Iterator[list[int]]:
+    """Indices of all of n boards, then of all but each; a single board is never left out."""
     yield list(range(n))
-    for left in range(n if n > 1 else 0):
-        yield [i for i in range(n) if i != left]
+    for left_out in range(n if n > 1 else 0):
+        yield [i for i in range(n) if i != left_out]
 
 
-def _beside(mean: Floats, covariance: Floats, scatters: Sequence[Scatter]) -> tuple[Floats, Floats]:
-    """Moments of the numbers with those of scatters beside them, of which no board said anything yet."""
+def _append_scatters(mean: Floats, covariance: Floats, scatters: Sequence[Scatter]) -> tuple[Floats, Floats]:
+    """Moments of the numbers followed by the prior moments of the scatters."""
     from scipy.linalg import block_diag
 
-    before = [moments_before(one.prior) for one in scatters]
-    return np.r_[mean, [middle for middle, _ in before]], block_diag(covariance, *(variance for _, variance in before))
+    scatter_moments = [prior_moments(scatter.prior) for scatter in scatters]
+    return np.r_[mean, [middle for middle, _ in scatter_moments]], block_diag(
+        covariance, *(variance for _, variance in scatter_moments)
+    )
 
 
-def _around(every: Sequence[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
+def _points_around(distributions: Sequence[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
     """Points around several normal distributions, and ln of their density.
 
-    One that stands apart from many is not averaged away: each direction is as wide as the widest of them.
+    Each direction is as wide as the widest distribution, so that a single one apart from the others is covered.
     """
-    means, covariances = [np.array(part) for part in zip(*every, strict=True)]
+    means, covariances = [np.array(arrays) for arrays in zip(*distributions, strict=True)]
     middle = means.mean(axis=0)
     apart = (means - middle)[:, :, None] * (means - middle)[:, None, :]
     spread = (covariances + apart).mean(axis=0)
     widest = np.diagonal(covariances + apart, axis1=1, axis2=2).max(axis=0)
     grow = np.clip(np.sqrt(widest / np.diagonal(spread)), 1.0, 2.0)
-    factor = np.asarray(_WIDER * np.linalg.cholesky(spread * np.outer(grow, grow)))
-    return spread_points(middle, factor, _N_POINTS.get(middle.size, _MOST_POINTS))
+    factor = np.asarray(_WIDENING * np.linalg.cholesky(spread * np.outer(grow, grow)))
+    return spread_points(middle, factor, _N_POINTS_BY_DIMENSION.get(middle.size, _MOST_POINTS))

@@ -17,22 +17,29 @@ from bayesplate.board.board import Board
 from bayesplate.board.campaign import CampaignCard
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.values import Complaint, Key, Refusal
-from bayesplate.board.words import EFFECT_NAMES, OTHER_EFFECT_NAMES, did_you_mean, effect_named, quoted, shown
-from bayesplate.commands.prepare import Prepared
+from bayesplate.board.words import (
+    EFFECT_NAMES,
+    OTHER_EFFECT_NAMES,
+    canonical_effect,
+    did_you_mean,
+    quote_text,
+    show_value,
+)
+from bayesplate.commands.prepare import PreparedBoard
 from bayesplate.errors import Fault, InputError
 
 P = ParamSpec("P")
 R = TypeVar("R")
-Read = Callable[[Any], Any]
-"""From what was given to the value; raises Refusal."""
+Reader = Callable[[Any], Any]
+"""Reads the value of an argument from what was given; raises Refusal."""
 Rule = Callable[[Mapping[str, Any]], Iterable[Fault]]
-"""What is wrong with arguments beside one another, from those that were given, by name."""
+"""Faults of arguments that contradict one another, from those that were given, by name."""
 
 
-def checked(*rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """A function whose arguments are read by the `Key` of their annotations, and which runs in one thread.
+def check_arguments(*rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """A decorator: arguments are read by the `Key` of their annotations, and linear algebra runs in one thread.
 
-    Thousands of small matrices in several threads of linear algebra would only wait for one another. A call raises
+    Several threads would only wait for one another, for the matrices are small and many. A call raises
     InputError with every argument that cannot be used, and with those that contradict each other by a rule.
     """
 
@@ -57,21 +64,26 @@ def checked(*rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
 def read_arguments(
     function: Callable[..., Any], given: Mapping[str, Any], rules: Iterable[Rule] = ()
 ) -> dict[str, Any]:
-    """The values of arguments of a function, by name; raises InputError with every fault."""
-    model, faults = _model_of(function), list[Fault]()
-    read = {}
+    """Read the arguments of a function, by name; raises InputError with every fault."""
+    model, faults = _argument_model(function), list[Fault]()
+    values = {}
     try:
-        read = dict(model.model_validate({name: given[name] for name in model.model_fields if name in given}))
+        values = dict(model.model_validate({name: given[name] for name in model.model_fields if name in given}))
     except ValidationError as error:
         for detail in error.errors(include_url=False):
             faults += [
-                Fault(_place(*detail["loc"], *one.inside), one.wanted, one.got, one.remedy)
-                for one in detail["ctx"]["error"].complaints
+                Fault(
+                    _argument_place(*detail["loc"], *complaint.inside),
+                    complaint.wanted,
+                    complaint.got,
+                    complaint.remedy,
+                )
+                for complaint in detail["ctx"]["error"].complaints
             ]
     faults += [fault for rule in rules for fault in rule(given)]
     if faults:
         raise InputError(faults)
-    return {name: value for name, value in read.items() if name in given}
+    return {name: value for name, value in values.items() if name in given}
 
 
 def annotations_of(function: Callable[..., Any]) -> dict[str, Any]:
@@ -80,17 +92,17 @@ def annotations_of(function: Callable[..., Any]) -> dict[str, Any]:
 
 
 @cache
-def _model_of(function: Callable[..., Any]) -> type[BaseModel]:
+def _argument_model(function: Callable[..., Any]) -> type[BaseModel]:
     fields: dict[str, Any] = {
-        name: (one, None)
-        for name, one in annotations_of(function).items()
-        if any(isinstance(part, Key) for part in getattr(one, "__metadata__", ()))
+        name: (annotation, None)
+        for name, annotation in annotations_of(function).items()
+        if any(isinstance(entry, Key) for entry in getattr(annotation, "__metadata__", ()))
     }
     return create_model("Arguments", __config__=ConfigDict(arbitrary_types_allowed=True), **fields)
 
 
-def _place(*inside: object) -> str:
-    return " ".join(str(part + 1 if isinstance(part, int) else part) for part in inside)
+def _argument_place(*location: object) -> str:
+    return " ".join(str(step + 1 if isinstance(step, int) else step) for step in location)
 
 
 def contradictions(given: Mapping[str, Any]) -> Iterator[Fault]:
@@ -103,26 +115,26 @@ def contradictions(given: Mapping[str, Any]) -> Iterator[Fault]:
         yield Fault("workers and dask", "one of them", "both", "workers are processes here, dask others")
 
 
-def refused(wanted: str, value: object, remedy: str = "") -> Refusal:
+def refusal_of(wanted: str, value: object, remedy: str = "") -> Refusal:
     """The refusal of an argument, to be raised."""
-    return Refusal(Complaint(wanted, value_shown(value), remedy))
+    return Refusal(Complaint(wanted, value_text(value), remedy))
 
 
-def value_shown(value: object) -> str:
+def value_text(value: object) -> str:
     """A value as Python writes it."""
-    return repr(value) if value is None or isinstance(value, bool) else shown(value)
+    return repr(value) if value is None or isinstance(value, bool) else show_value(value)
 
 
-def or_none(read: Read) -> Read:
+def optional_reader(read: Reader) -> Reader:
     return lambda value: None if value is None else read(value)
 
 
-def instance_of(kind: type) -> Read:
+def instance_reader(kind: type) -> Reader:
     """A reader of instances of a class."""
 
     def read(value: object) -> object:
         if not isinstance(value, kind):
-            raise refused(f"a {kind.__name__}", value)
+            raise refusal_of(f"a {kind.__name__}", value)
         return value
 
     return read
@@ -131,51 +143,51 @@ def instance_of(kind: type) -> Read:
 def read_path(value: object, wanted: str = "a name or a path") -> Any:
     """A name or a path, as it is."""
     if not isinstance(value, str | os.PathLike):
-        raise refused(wanted, value)
+        raise refusal_of(wanted, value)
     if not os.fspath(value):
         raise Refusal(Complaint(wanted, "an empty text"))
     if "\0" in str(value):
-        raise refused(wanted, str(value))
+        raise refusal_of(wanted, str(value))
     return value
 
 
 def read_card(value: object) -> object:
     """A name or a path, a Board, or a Problem or Campaign."""
-    is_made = isinstance(getattr(value, "prepared", None), Prepared) or isinstance(
+    is_problem = isinstance(getattr(value, "prepared", None), PreparedBoard) or isinstance(
         getattr(value, "card", None), CampaignCard
     )
-    return value if is_made or isinstance(value, Board) else read_path(value, "a name, a path, a Board or a Problem")
+    return value if is_problem or isinstance(value, Board) else read_path(value, "a name, a path, a Board or a Problem")
 
 
 def read_prior(value: object) -> object:
     return value if isinstance(value, PriorCard) else read_path(value, "a name, a path or a PriorCard")
 
 
-def whole(least: int) -> Read:
+def integer_reader(least: int) -> Reader:
     """A reader of whole numbers."""
 
     def read(value: object) -> int:
         if isinstance(value, bool | np.bool_) or not isinstance(value, Integral) or value < least:
-            raise refused(f"a whole number from {least} on", value)
+            raise refusal_of(f"a whole number from {least} on", value)
         return int(value)
 
     return read
 
 
-def read_switch(value: object) -> bool:
+def read_bool(value: object) -> bool:
     """True or False alone."""
     if not isinstance(value, bool):
-        raise refused("True or False", value)
+        raise refusal_of("True or False", value)
     return value
 
 
-def word(*words: str) -> Read:
+def word_reader(*words: str) -> Reader:
     """A reader of one word of several, or None."""
 
     def read(value: object) -> object:
         if value is not None and value not in words:
-            near = did_you_mean(value, words) if isinstance(value, str) else ""
-            raise refused(f"{', '.join(map(quoted, words))} or None", value, near)
+            hint = did_you_mean(value, words) if isinstance(value, str) else ""
+            raise refusal_of(f"{', '.join(map(quote_text, words))} or None", value, hint)
         return value
 
     return read
@@ -183,11 +195,11 @@ def word(*words: str) -> Read:
 
 def read_function(value: object) -> object:
     if value is not None and not callable(value):
-        raise refused("a function or None", value)
+        raise refusal_of("a function or None", value)
     return value
 
 
-def effect_list(name: str) -> Read:
+def effects_reader(name: str) -> Reader:
     """A reader of different names of effects, for the argument of that name, or of None."""
 
     def read(value: object) -> list[str] | None:
@@ -195,18 +207,18 @@ def effect_list(name: str) -> Read:
             return None
         if not isinstance(value, list | tuple):
             remedy = f'{name}=["{value}"]' if value in (*EFFECT_NAMES, *OTHER_EFFECT_NAMES) else ""
-            raise refused("a list of names of effects", value, remedy)
-        known = [effect_named(one) if isinstance(one, str) else one for one in value]
-        wrong = []
-        for at, effect in enumerate(known):
+            raise refusal_of("a list of names of effects", value, remedy)
+        effects = [canonical_effect(item) if isinstance(item, str) else item for item in value]
+        complaints = []
+        for index, effect in enumerate(effects):
             if effect not in EFFECT_NAMES:
-                near = did_you_mean(effect, EFFECT_NAMES) if isinstance(effect, str) else ""
-                wrong += refused(f"one of {', '.join(EFFECT_NAMES)}", effect, near).inside(at)
-            elif effect in known[:at]:
-                wrong += Refusal(Complaint("each name once", f"{quoted(effect)} again")).inside(at)
-        if wrong:
-            raise Refusal(*wrong)
-        return known
+                hint = did_you_mean(effect, EFFECT_NAMES) if isinstance(effect, str) else ""
+                complaints += refusal_of(f"one of {', '.join(EFFECT_NAMES)}", effect, hint).inside(index)
+            elif effect in effects[:index]:
+                complaints += Refusal(Complaint("each name once", f"{quote_text(effect)} again")).inside(index)
+        if complaints:
+            raise Refusal(*complaints)
+        return effects
 
     return read
 

@@ -14,37 +14,37 @@ from bayesplate.board.board import Board
 from bayesplate.effects.attached_items import fractions_of
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.estimates.wide_search import Guess
-from bayesplate.frequencies.model import SetupModel, setup_model, with_others
+from bayesplate.frequencies.model import SetupModel, setup_model, with_other_modes
 from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.solve import Modes, solve_up_to
-from bayesplate.posterior.first_labels import Way, guess_of
+from bayesplate.posterior.first_labels import Labelling, guess_of
 
 if TYPE_CHECKING:
     from bayesplate.recordings.signals import Place
 
 
-_ABOVE = 1.16
-"""Up to above the highest peak, somewhat more than the modes that a setup's model takes."""
+_FREQUENCY_MARGIN = 1.16
+"""Modes are solved up to the highest peak times this, somewhat more than a setup's model takes."""
 _GRID = np.linspace(0.0, 1.0, 41)
 
 
 @dataclass(frozen=True, eq=False)
-class MostlyKnown:
-    """The modes of a board with one setup of bare peaks, about the constants that one way to label them gives."""
+class PeakAssignment:
+    """The modes of a board with one setup of unlabelled peaks, at the constants that one labelling of them gives."""
 
     board: Board
     model: SetupModel
     guess: Guess
 
     @classmethod
-    def of(cls, way: Way, bare: Board) -> MostlyKnown:
-        """The modes about the constants of a way to label some peaks of `bare`."""
+    def of(cls, way: Labelling, bare: Board) -> PeakAssignment:
+        """The modes at the constants of a labelling of some peaks of `bare`."""
         estimate = weighted_least_squares(way.board)
-        model = with_others(setup_model(system_of(bare, bare.setups[0]), estimate.values), estimate.values)
+        model = with_other_modes(setup_model(system_of(bare, bare.setups[0]), estimate.values), estimate.values)
         return cls(bare, model, guess_of(bare, estimate))
 
-    def with_peaks(self, board: Board) -> MostlyKnown:
+    def with_peaks(self, board: Board) -> PeakAssignment:
         """The same with other peaks of the setup: signs joined to the same frequencies."""
         system = replace(self.model.system, setup=board.setups[0])
         return replace(self, board=board, model=replace(self.model, system=system))
@@ -57,14 +57,14 @@ class MostlyKnown:
     def probabilities(self, evidence: Floats | None) -> Floats:
         """Probability of each peak to be each mode, with further `evidence` in ln: (n_peaks, n_modes) array."""
         result = np.empty(self._likelihood.log_prior.shape)
-        result[self._likelihood.bare] = self._with(evidence).probabilities(*self._draws)
+        result[self._likelihood.bare] = self._likelihood_with(evidence).probabilities(*self._draws)
         return result
 
     def gain(self, evidence: Floats) -> float:
-        """ln of how much likelier all peaks are together with further evidence."""
+        """ln of the factor by which further evidence raises the likelihood of all peaks."""
         from scipy.special import logsumexp
 
-        after, before = (self._with(one).log_likelihood(*self._draws) for one in (evidence, None))
+        after, before = (self._likelihood_with(term).log_likelihood(*self._draws) for term in (evidence, None))
         return float(logsumexp(after) - logsumexp(before))
 
     @property
@@ -88,11 +88,11 @@ class MostlyKnown:
 
     @cached_property
     def _likelihood(self) -> PeakLikelihood:
-        found = PeakLikelihood.of(self.model)
-        assert found is not None
-        return found
+        likelihood = PeakLikelihood.of(self.model)
+        assert likelihood is not None
+        return likelihood
 
-    def _with(self, evidence: Floats | None) -> PeakLikelihood:
+    def _likelihood_with(self, evidence: Floats | None) -> PeakLikelihood:
         if evidence is None:
             return self._likelihood
         return replace(self._likelihood, log_prior=self._likelihood.log_prior + evidence[self._likelihood.bare])
@@ -101,19 +101,21 @@ class MostlyKnown:
     def _draws(self) -> tuple[Floats, Floats]:
         """ln f of all modes at every draw, and the noise there."""
         free, values = np.exp(self.guess.log_rigidities).T, self.guess.values
-        drawn = {**values, **self.board.symmetry.rigidities(free, values["poisson_xy"])}
-        every = self.model.every_log_frequency(drawn, "linear")
-        usable = np.isfinite(every).all(axis=1)
-        return every[usable], np.full(int(usable.sum()), self.guess.noise)
+        drawn_values = {**values, **self.board.symmetry.rigidities(free, values["poisson_xy"])}
+        log_frequencies = self.model.every_log_frequency(drawn_values, "linear")
+        usable = np.isfinite(log_frequencies).all(axis=1)
+        return log_frequencies[usable], np.full(int(usable.sum()), self.guess.noise)
 
     @cached_property
     def _modes(self) -> Modes:
-        highest = 2.0 * np.pi * _ABOVE * max(self.model.setup.unlabelled)
+        highest = 2.0 * np.pi * _FREQUENCY_MARGIN * max(self.model.setup.unlabelled)
         return solve_up_to(self.model.plate, self.model.system.weights(self.guess.values).at(0), highest**2)
 
     @cached_property
     def _columns(self) -> NDArray[np.intp]:
-        """Which of the solved modes each mode of the model is."""
+        """Index of each mode of the model among the solved modes: (n_modes,) array."""
         modes = self._modes
-        at = {(parity, int(rank)): i for i, (parity, rank) in enumerate(zip(modes.parities, modes.ranks, strict=True))}
-        return np.array([at[other.place.parity, other.place.rank] for other in self.model.others], dtype=np.intp)
+        indices = {
+            (parity, int(rank)): i for i, (parity, rank) in enumerate(zip(modes.parities, modes.ranks, strict=True))
+        }
+        return np.array([indices[mode.place.parity, mode.place.rank] for mode in self.model.others], dtype=np.intp)

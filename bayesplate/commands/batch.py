@@ -11,9 +11,16 @@ from typing import Annotated, get_args
 import click
 
 from bayesplate.board.values import Key
-from bayesplate.board.words import quoted
-from bayesplate.commands.arguments import checked, or_none, read_path, read_switch, refused, whole
-from bayesplate.commands.batch_boards import boards_of
+from bayesplate.board.words import quote_text
+from bayesplate.commands.arguments import (
+    check_arguments,
+    integer_reader,
+    optional_reader,
+    read_bool,
+    read_path,
+    refusal_of,
+)
+from bayesplate.commands.batch_boards import list_boards
 from bayesplate.commands.batch_grading import grading_request, read_grading
 from bayesplate.commands.batch_run import BatchRun
 from bayesplate.commands.fit_board import FitRequest
@@ -22,77 +29,77 @@ from bayesplate.commands.options import (
     Effects,
     FilePath,
     Force,
-    Joined,
     Law,
     OnProgress,
     Option,
+    OptionGroup,
     Report,
     Resume,
     Robust,
     Seed,
     path_option,
 )
-from bayesplate.commands.shown import Shown, show_batch
-from bayesplate.commands.workers import dask_cluster, processes
+from bayesplate.commands.shown import Printout, show_batch
+from bayesplate.commands.workers import dask_cluster, worker_processes
 from bayesplate.errors import BatchError, CheckpointError, RunInterrupted
 from bayesplate.files import write_text
-from bayesplate.grading.boards import FORMAT, BatchSummary, BoardRow, Doubt, Failure, with_copies_in_doubt
+from bayesplate.grading.boards import FORMAT, BatchSummary, BoardRow, DoubtfulBoard, FailedBoard, mark_copied_readings
 from bayesplate.grading.matching import Grading, GradingRequest, grade
 from bayesplate.grading.storage import Journal, TableKind, parquet_library, write_table
 from bayesplate.results.contract import json_text
-from bayesplate.results.folder import OutputFolder, run_of_its_own
+from bayesplate.results.folder import OutputFolder, hold_output_folders
 from bayesplate.results.summary import versions
 
-JOURNAL = "boards.jsonl"
-BATCH = "batch.json"
+JOURNAL_FILE = "boards.jsonl"
+BATCH_FILE = "batch.json"
 
 
 def default_batch_folder(source: str | os.PathLike[str]) -> Path:
-    """Where the command line writes a batch unless it is told: results/NAME, of the folder or the table."""
+    """Default folder of a batch on the command line: results/NAME, of the folder or the table."""
     path = Path(source).resolve()
     return Path("results") / ((path.name if os.path.isdir(path) else path.stem) or "batch")
 
 
-def _read_kind(value: object) -> object:
+def _read_table_format(value: object) -> object:
     if value not in get_args(TableKind):
-        raise refused(" or ".join(map(quoted, get_args(TableKind))), value)
+        raise refusal_of(" or ".join(map(quote_text, get_args(TableKind))), value)
     return value
 
 
-OutOfBatch = Annotated[
+BatchOut = Annotated[
     FilePath,
     ANY_PATH,
     path_option("--out", otherwise=default_batch_folder, help="Output folder (default results/NAME)."),
 ]
 Template = Annotated[
     FilePath | None,
-    Key(or_none(read_path)),
+    Key(optional_reader(read_path)),
     Option("--template", metavar="CARD", help="With a table: the card of what is common to its boards."),
 ]
 NumberOfWorkers = Annotated[
     int | None,
-    Key(or_none(whole(1))),
+    Key(optional_reader(integer_reader(1))),
     Option("--workers", type=click.IntRange(1), help="Processes (default: one for each core)."),
 ]
 Dask = Annotated[
     str | None,
-    Key(or_none(read_path)),
+    Key(optional_reader(read_path)),
     Option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster that computes in their place."),
 ]
 Folders = Annotated[
     bool,
-    Key(read_switch),
+    Key(read_bool),
     Option("--folders", is_flag=True, help="Write the files of fit for each board too, into boards/NAME."),
 ]
-Table = Annotated[
+TableFormat = Annotated[
     TableKind,
-    Key(_read_kind),
+    Key(_read_table_format),
     Option("--table", type=click.Choice(get_args(TableKind)), show_default=True),
 ]
 GradingOptions = Annotated[
     GradingRequest | None,
     Key(read_grading),
-    Joined(
+    OptionGroup(
         grading_request,
         match=Option("--match", metavar="PERCENT", help="Boards match within this: 10 (default), or E_x=10,E_y=15."),
         limit=Option(
@@ -110,7 +117,7 @@ GradingOptions = Annotated[
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BatchResult:
-    """What a batch leaves.
+    """Result of `batch`.
 
     Attributes
     ----------
@@ -120,7 +127,7 @@ class BatchResult:
     summary : BatchSummary
         What batch.json holds: how many boards were fitted, and why the others were not.
     grading : Grading
-        What the boards that were fitted are good for.
+        Matches, limits and thicknesses of the boards that were fitted.
     """
 
     folder: Path
@@ -133,7 +140,7 @@ class BatchResult:
         if self.summary.n_failed:
             raise BatchError(self.summary.failures_text(self.table.name))
 
-    def shown(self) -> Shown:
+    def shown(self) -> Printout:
         """Tables and sentences for a person."""
         return show_batch(self.summary, self.grading)
 
@@ -141,17 +148,17 @@ class BatchResult:
         return f"<BatchResult: {self.summary.n_fitted} of {self.summary.n_boards} boards fitted, {self.table}>"
 
 
-@run_of_its_own()
-@checked()
+@hold_output_folders()
+@check_arguments()
 def batch(
     source: Annotated[FilePath, ANY_PATH],
-    out: OutOfBatch,
+    out: BatchOut,
     *,
     template: Template = None,
     workers: NumberOfWorkers = None,
     dask: Dask = None,
     folders: Folders = False,
-    table: Table = "csv",
+    table: TableFormat = "csv",
     grading: GradingOptions = None,
     seed: Seed = 1,
     effects: Effects = None,
@@ -190,7 +197,7 @@ def batch(
     force, resume : bool
         Replace the results in the folder, or go on: boards whose card did not change are not fitted again.
     progress : callable, optional
-        Told as boards are done.
+        Called as boards are done.
 
     Returns
     -------
@@ -206,51 +213,53 @@ def batch(
     """
     if table == "parquet":
         parquet_library("--table parquet")
-    boards, aside = boards_of(source, template)
+    boards, other_cards = list_boards(source, template)
     folder = OutputFolder(Path(out))
     if not resume:
         folder.require_usable(force=force, resume=False)
-    elif not os.path.isfile(folder.path / JOURNAL):
-        raise CheckpointError(f"{folder.path}: wanted the {JOURNAL} of an earlier run, got none (--force runs it anew)")
+    elif not os.path.isfile(folder.path / JOURNAL_FILE):
+        raise CheckpointError(
+            f"{folder.path}: wanted the {JOURNAL_FILE} of an earlier run, got none (--force runs it anew)"
+        )
     request = FitRequest(seed, None if effects is None else tuple(effects), law, robust)
-    with processes(workers or os.cpu_count() or 1) if dask is None else dask_cluster(dask) as free:
+    with worker_processes(workers or os.cpu_count() or 1) if dask is None else dask_cluster(dask) as executors:
         folder.open(resume=resume)
-        journal = Journal(folder.path / JOURNAL)
+        journal = Journal(folder.path / JOURNAL_FILE)
         try:
-            keys = BatchRun(boards, request, folder.path, folders, report, journal).fitted(free, progress)
+            keys = BatchRun(boards, request, folder.path, folders, report, journal).fitted(executors, progress)
         except KeyboardInterrupt:
             raise RunInterrupted("interrupted; --resume goes on with the boards that are left") from None
         finally:
             journal.close()
     rows = [journal.rows[key] for key in keys]
-    rows = with_copies_in_doubt(
+    rows = mark_copied_readings(
         [
             row if row.is_fitted or not board.place else replace(row, message=f"{board.place} -> {row.message}")
             for row, board in zip(rows, boards, strict=True)
         ]
     )
-    written = write_table(folder.path, table, rows)
-    graded = grade(rows, grading or GradingRequest())
-    summary = _summary(rows, seed, aside)
+    table_path = write_table(folder.path, table, rows)
+    board_grading = grade(rows, grading or GradingRequest())
+    summary = _summary(rows, seed, other_cards)
     journal.keep(dict.fromkeys(keys))
-    write_text(folder.path / BATCH, json_text(summary))
-    _write_grading(folder.path, graded, summary, folders=folders and report, report=report)
+    write_text(folder.path / BATCH_FILE, json_text(summary))
+    _write_grading(folder.path, board_grading, summary, folders=folders and report, report=report)
     folder.close()
-    return BatchResult(folder.path, written, summary, graded)
+    return BatchResult(folder.path, table_path, summary, board_grading)
 
 
-def _summary(rows: Sequence[BoardRow], seed: int, aside: tuple[str, ...]) -> BatchSummary:
-    failed = tuple(Failure(row.name, row.outcome, row.message) for row in rows if not row.is_fitted)
-    doubts = tuple(Doubt(row.name, row.doubt) for row in rows if row.doubt)
-    n_fitted = len(rows) - len(failed)
-    return BatchSummary(FORMAT, seed, versions(), len(rows), n_fitted, len(failed), failed, doubts, aside)
+def _summary(rows: Sequence[BoardRow], seed: int, other_cards: tuple[str, ...]) -> BatchSummary:
+    failures = tuple(FailedBoard(row.name, row.outcome, row.message) for row in rows if not row.is_fitted)
+    doubts = tuple(DoubtfulBoard(row.name, row.doubt) for row in rows if row.doubt)
+    n_fitted = len(rows) - len(failures)
+    return BatchSummary(FORMAT, seed, versions(), len(rows), n_fitted, len(failures), failures, doubts, other_cards)
 
 
-def _write_grading(folder: Path, graded: Grading, summary: BatchSummary, *, folders: bool, report: bool) -> None:
+def _write_grading(folder: Path, grading: Grading, summary: BatchSummary, *, folders: bool, report: bool) -> None:
     from bayesplate.grading.tables import write_grading
 
-    write_grading(folder, graded)
+    write_grading(folder, grading)
     if report:
         from bayesplate.report.grading import write_grading_page
 
-        write_grading_page(folder, graded, summary, has_pages=folders)
+        write_grading_page(folder, grading, summary, has_pages=folders)

@@ -10,87 +10,89 @@ from pathlib import Path
 from typing import Any
 
 from bayesplate.board.board import Board
-from bayesplate.board.csv_table import csv_table
-from bayesplate.board.rows import Cell, Columns, is_empty
+from bayesplate.board.csv_table import read_csv_table
+from bayesplate.board.rows import CellValue, TableColumns, is_empty
 from bayesplate.board.shelf import CardFile
-from bayesplate.board.toml import read_file, read_table
-from bayesplate.errors import Fault, InputError, plain
+from bayesplate.board.toml import parse_toml, read_file
+from bayesplate.errors import Fault, InputError, printable
 from bayesplate.grading.storage import parquet_library
 
 LARGEST_TABLE = 100_000_000
 """Bytes; hundreds of thousands of boards, and ten times as much in memory."""
-_LONGEST = 1e9
-_WANTED = "a folder of cards, or a table (.csv or .parquet)"
-_OF_SHEETS = (".tsv", ".tab", ".txt", ".xlsx", ".xls", ".xlsm", ".ods", ".numbers")
-_OF_OTHER_CARDS = {"boards", "coefficients", "E_x", "D_x", "noise_percent"}
+_LONGEST_SIDE = 1e9
+_WANTED_SOURCE = "a folder of cards, or a table (.csv or .parquet)"
+_SPREADSHEET_SUFFIXES = (".tsv", ".tab", ".txt", ".xlsx", ".xls", ".xlsm", ".ods", ".numbers")
+_OTHER_CARD_KEYS = {"boards", "coefficients", "E_x", "D_x", "noise_percent"}
 """Keys that a campaign, a coefficient table and a prior card have and a board card has not."""
 
 
 @dataclass(frozen=True)
-class Entry:
+class BatchBoard:
     """A board of a batch that is read when its turn comes, for there may be very many."""
 
     name: str
     card: Callable[[], Board]  # raises InputError with all its faults
     place: str = ""  # where it stands, as messages show it; empty where its own file says so
-    alike: tuple[str, ...] = ()  # in common with boards that share its matrices, which are fitted one after another
+    alike: tuple[str, ...] = ()  # equal for boards that share matrices, which are fitted one after another
 
 
-def boards_of(
+def list_boards(
     source: str | os.PathLike[str], template: str | os.PathLike[str] | None
-) -> tuple[list[Entry], tuple[str, ...]]:
+) -> tuple[list[BatchBoard], tuple[str, ...]]:
     """The boards of a folder or a table by name, and files that are other cards; InputError if there are none."""
     path = Path(source)
     if os.path.isdir(path):
         if template is not None:
             raise InputError(Fault("--template", "a table of boards beside it", "a folder of cards"))
-        return _in_folder(path)
+        return _folder_boards(path)
     if not os.path.exists(path):
-        got, looked = "nothing there", f"looked in {plain(str(path.absolute().parent))}"
-        raise InputError(Fault(plain(str(path)), _WANTED, got, looked))
+        got, hint = "nothing there", f"looked in {printable(str(path.absolute().parent))}"
+        raise InputError(Fault(printable(str(path)), _WANTED_SOURCE, got, hint))
     ending = path.suffix.lower()
     if ending not in (".csv", ".parquet"):
-        remedy = "save the table as CSV" if ending in _OF_SHEETS else ""
-        raise InputError(Fault(plain(str(path)), _WANTED, "another file", remedy))
+        remedy = "save the table as CSV" if ending in _SPREADSHEET_SUFFIXES else ""
+        raise InputError(Fault(printable(str(path)), _WANTED_SOURCE, "another file", remedy))
     if template is None:
         remedy = "a board card with what all boards have in common"
         raise InputError(Fault("--template", "a card for the table", "none", remedy))
     header, rows = (_read_csv if ending == ".csv" else _read_parquet)(path)
-    return _of_rows(plain(path.name), Columns(os.fspath(template), header, plain(path.name)), rows), ()
+    return _table_boards(
+        printable(path.name), TableColumns(os.fspath(template), header, printable(path.name)), rows
+    ), ()
 
 
-def _in_folder(folder: Path) -> tuple[list[Entry], tuple[str, ...]]:
+def _folder_boards(folder: Path) -> tuple[list[BatchBoard], tuple[str, ...]]:
     """The board cards of a folder; priors, campaigns, coefficient tables and what `pick` writes are left aside."""
     try:
         files = sorted(name for name in os.listdir(folder) if name.endswith(".toml"))
     except OSError as error:
-        raise InputError(Fault(plain(str(folder)), "a readable folder", error.strerror or str(error))) from None
-    entries, aside = [], []
+        raise InputError(Fault(printable(str(folder)), "a readable folder", error.strerror or str(error))) from None
+    boards, other_cards = [], []
     for file in files:
-        content = _content_of(folder, file)
-        is_other = not {"plate", "setup"} & content.keys() and _OF_OTHER_CARDS & content.keys()
-        if is_other or content.keys() == {"setup"}:
-            aside.append(plain(file))
+        content = _card_content(folder, file)
+        is_other_card = not {"plate", "setup"} & content.keys() and _OTHER_CARD_KEYS & content.keys()
+        if is_other_card or content.keys() == {"setup"}:
+            other_cards.append(printable(file))
         else:
-            name = plain(file.removesuffix(".toml"))
-            entries.append(Entry(name, partial(_card_in, folder, file), alike=_alike(content)))
-    if not entries:
-        raise InputError(Fault(plain(str(folder)), "a folder with board cards (NAME.toml)", "none in it"))
-    return entries, tuple(aside)
+            name = printable(file.removesuffix(".toml"))
+            boards.append(BatchBoard(name, partial(_read_folder_card, folder, file), alike=_matrix_key(content)))
+    if not boards:
+        raise InputError(Fault(printable(str(folder)), "a folder with board cards (NAME.toml)", "none in it"))
+    return boards, tuple(other_cards)
 
 
-def _card_in(folder: Path, file: str) -> Board:
+def _read_folder_card(folder: Path, file: str) -> Board:
     """A card of the folder; raises InputError with all its faults, or if it is a link that leads elsewhere."""
     if not _is_inside(folder, file):
         wanted, remedy = "a card in the folder of the batch", "copy the card"
-        raise InputError(Fault(plain(file), wanted, "a link that leads out of it", remedy))
+        raise InputError(Fault(printable(file), wanted, "a link that leads out of it", remedy))
     return Board.from_card(CardFile.of(read_file(os.path.join(folder, file)), file, folder))
 
 
-def _content_of(folder: Path, file: str) -> Mapping[str, Any]:
+def _card_content(folder: Path, file: str) -> Mapping[str, Any]:
     """Content of a card; empty where it cannot be read, which is reported when the board's turn comes."""
     try:
-        return read_table(read_file(os.path.join(folder, file)), plain(file)) if _is_inside(folder, file) else {}
+        return parse_toml(read_file(os.path.join(folder, file)), printable(file)) if _is_inside(folder, file) else {}
     except InputError:
         return {}
 
@@ -99,51 +101,51 @@ def _is_inside(folder: Path, file: str) -> bool:
     return os.path.realpath(os.path.join(folder, file)).startswith(os.path.join(os.path.realpath(folder), ""))
 
 
-def _alike(content: Mapping[str, Any]) -> tuple[str, ...]:
+def _matrix_key(content: Mapping[str, Any]) -> tuple[str, ...]:
     """Edges and aspect ratio, as far as they can be seen without reading the card."""
     plate, setups = content.get("plate"), content.get("setup")
     sides = [plate.get(f"length_{side}_mm") for side in "xy"] if isinstance(plate, dict) else []
-    told = [side.get("mean") if isinstance(side, dict) else side for side in sides]
-    means = [float(side) for side in told if isinstance(side, int | float) and 0 < side <= _LONGEST]
-    listed = setups if isinstance(setups, list) else [setups]
-    edges = [repr(one.get("edges")) for one in listed if isinstance(one, dict)]
+    stated_sides = [side.get("mean") if isinstance(side, dict) else side for side in sides]
+    means = [float(side) for side in stated_sides if isinstance(side, int | float) and 0 < side <= _LONGEST_SIDE]
+    setup_tables = setups if isinstance(setups, list) else [setups]
+    edges = [repr(setup.get("edges")) for setup in setup_tables if isinstance(setup, dict)]
     return (*edges, f"{means[0] / means[1]:.3f}") if len(means) == 2 else tuple(edges)
 
 
-def _of_rows(file: str, columns: Columns, rows: Sequence[Sequence[Cell]]) -> list[Entry]:
-    """The boards of a table; its rows are counted from the first below the header, lines without a word too."""
+def _table_boards(file: str, columns: TableColumns, rows: Sequence[Sequence[CellValue]]) -> list[BatchBoard]:
+    """The boards of a table; its rows are counted from the first below the header, empty ones too."""
 
-    def entries() -> Iterator[Entry]:
+    def read_rows() -> Iterator[BatchBoard]:
         for i, row in enumerate(rows, start=1):
             if not all(map(is_empty, row)):
-                name = plain(columns.name_of(row)) or f"row-{i}"
-                yield Entry(name, partial(columns.board, row), f"{file} row {i}")
+                name = printable(columns.name_of(row)) or f"row-{i}"
+                yield BatchBoard(name, partial(columns.board, row), f"{file} row {i}")
 
-    found = sorted(entries(), key=lambda entry: entry.name)
-    if not found:
+    boards = sorted(read_rows(), key=lambda board: board.name)
+    if not boards:
         raise InputError(Fault(file, "a row for each board", "no row"))
-    return found
+    return boards
 
 
-def _read_csv(path: Path) -> tuple[Sequence[str], Sequence[Sequence[Cell]]]:
-    file = plain(path.name)
+def _read_csv(path: Path) -> tuple[Sequence[str], Sequence[Sequence[CellValue]]]:
+    file = printable(path.name)
     try:
         if not path.is_file():
             raise InputError(Fault(file, "a regular file", "another kind"))
         if path.stat().st_size > LARGEST_TABLE:
             raise InputError(Fault(file, f"a table of at most {LARGEST_TABLE:,} bytes", "a larger one"))
-        return csv_table(path.read_bytes(), file)
+        return read_csv_table(path.read_bytes(), file)
     except OSError as error:
-        raise InputError(Fault(plain(str(path)), "a readable table", error.strerror or str(error))) from None
+        raise InputError(Fault(printable(str(path)), "a readable table", error.strerror or str(error))) from None
 
 
-def _read_parquet(path: Path) -> tuple[Sequence[str], Sequence[Sequence[Cell]]]:
-    file = plain(path.name)
+def _read_parquet(path: Path) -> tuple[Sequence[str], Sequence[Sequence[CellValue]]]:
+    file = printable(path.name)
     arrow = parquet_library(file)
     try:
-        found = arrow.parquet.read_table(path)
+        table = arrow.parquet.read_table(path)
     except (OSError, arrow.ArrowException) as error:
-        raise InputError(Fault(file, "a Parquet table", plain(str(error)))) from None
-    rows = zip(*(column.to_pylist() for column in found.columns), strict=True)
-    # a number that is not one, which some programs write for an empty cell, is none
-    return list(found.column_names), [[None if cell != cell else cell for cell in row] for row in rows]
+        raise InputError(Fault(file, "a Parquet table", printable(str(error)))) from None
+    rows = zip(*(column.to_pylist() for column in table.columns), strict=True)
+    # NaN, which some programs write for an empty cell, is an empty cell
+    return list(table.column_names), [[None if cell != cell else cell for cell in row] for row in rows]

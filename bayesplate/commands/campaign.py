@@ -12,10 +12,10 @@ from bayesplate.board.campaign import CampaignCard, is_campaign, load_campaign
 from bayesplate.board.checks import readings_sha256
 from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.campaign.population import require_moduli
-from bayesplate.campaign.shared import Shared, shared_by
-from bayesplate.commands.arguments import checked
+from bayesplate.campaign.shared import SharedParameter, find_shared_parameters
+from bayesplate.commands.arguments import check_arguments
 from bayesplate.commands.options import CARD, Effects, Law, Robust
-from bayesplate.commands.prepare import Card, Prepared, prepare
+from bayesplate.commands.prepare import CardSource, PreparedBoard, prepare
 from bayesplate.commands.problem import Problem, as_problem, pose_all
 from bayesplate.errors import Fault, InputError
 from bayesplate.frequencies.laws import LawName
@@ -34,19 +34,19 @@ class Campaign:
     card : CampaignCard
     problems : tuple of Problem
         One per board, the shared effects declared.
-    shared : tuple of Shared
+    shared : tuple of SharedParameter
         What the boards have in common, none for boards that are fitted side by side.
     population : PriorCard or None
-        What is believed of the distribution of their constants, where they share one.
+        The prior of the distribution of their constants, where they share one.
     """
 
     card: CampaignCard
     problems: tuple[Problem, ...]
-    shared: tuple[Shared, ...]
+    shared: tuple[SharedParameter, ...]
     population: PriorCard | None
 
     @classmethod
-    @checked()
+    @check_arguments()
     def from_card(
         cls,
         card: Annotated[CampaignPath, CARD],
@@ -78,10 +78,12 @@ class Campaign:
             With every fault of the card; if there is none, with those of all boards; if there is none, with what cannot
             be shared.
         """
-        read = load_campaign(card)
-        prepared, population = _prepared(read, effects)
-        shared = shared_by(read, [one.board for one in prepared])
-        return cls(read, tuple(Problem(one, law, robust) for one in prepared), shared, population)
+        campaign_card = load_campaign(card)
+        prepared_boards, population = _prepare_boards(campaign_card, effects)
+        shared = find_shared_parameters(campaign_card, [prepared.board for prepared in prepared_boards])
+        return cls(
+            campaign_card, tuple(Problem(prepared, law, robust) for prepared in prepared_boards), shared, population
+        )
 
     @property
     def name(self) -> str:
@@ -99,12 +101,12 @@ class Campaign:
         pose_all(self.problems)
 
     def __repr__(self) -> str:
-        shared = ", ".join(one.name for one in self.shared) or "nothing shared"
+        shared = ", ".join(parameter.name for parameter in self.shared) or "nothing shared"
         return f"<Campaign {self.name}: {len(self.problems)} boards; {shared}>"
 
 
-def by_kind(
-    given: Problem | Card | Campaign,
+def dispatch_card(
+    given: Problem | CardSource | Campaign,
     of_board: Callable[[Problem], OfBoard],
     of_campaign: Callable[[Campaign], OfCampaign],
     *,
@@ -114,7 +116,7 @@ def by_kind(
     setup: str | os.PathLike[str] | None = None,
     may_lack_frequencies: bool = False,
 ) -> OfBoard | OfCampaign:
-    """What a command makes of a board or of a campaign: the one place that tells them apart; options as `as_problem`.
+    """Call the function for a board or that for a campaign, as the card is one or the other; options as `as_problem`.
 
     Raises InputError as `Problem.from_card` and `Campaign.from_card`; also for a Campaign beside what it states itself.
     """
@@ -134,35 +136,35 @@ def by_kind(
     )
 
 
-def _prepared(card: CampaignCard, effects: Sequence[str] | None) -> tuple[list[Prepared], PriorCard | None]:
+def _prepare_boards(card: CampaignCard, effects: Sequence[str] | None) -> tuple[list[PreparedBoard], PriorCard | None]:
     """Every board with the effects that the campaign declares or shares, and the prior of the population."""
     file = card.path.name
-    declared = [*(card.effects if effects is None else ()), *(one.effect for one in card.shared)]
+    declared = [*(card.effects if effects is None else ()), *(section.effect for section in card.shared)]
     faults: list[Fault] = []
-    boards: list[Prepared] = []
+    prepared_boards: list[PreparedBoard] = []
     for number, board in enumerate(card.boards, start=1):
         try:
-            alone = prepare(card.board_path(board), effects)
-            every = tuple(dict.fromkeys((*alone.board.effects, *declared)))
-            boards.append(alone.with_effects(every) if declared else alone)
+            prepared = prepare(card.board_path(board), effects)
+            all_effects = tuple(dict.fromkeys((*prepared.board.effects, *declared)))
+            prepared_boards.append(prepared.with_effects(all_effects) if declared else prepared)
         except InputError as error:
             faults += [replace(fault, place=f"{file} boards {number} -> {fault.place}") for fault in error.faults]
-    names = [one.board.name.casefold() for one in boards]
+    names = [prepared.board.name.casefold() for prepared in prepared_boards]
     faults += [
-        Fault(f"{file} boards", "boards with names of their own", f"{one.board.name} again")
-        for i, one in enumerate(boards)
-        if one.board.name.casefold() in names[:i]
+        Fault(f"{file} boards", "boards with names of their own", f"{prepared.board.name} again")
+        for i, prepared in enumerate(prepared_boards)
+        if prepared.board.name.casefold() in names[:i]
     ]
-    read = [readings_sha256(one.card) for one in boards]
+    hashes = [readings_sha256(prepared.card) for prepared in prepared_boards]
     faults += [
         Fault(
             f"{file} boards",
             "each board once",
-            f"{one.board.name} with every reading of {boards[read.index(read[i])].board.name}",
+            f"{prepared.board.name} with every reading of {prepared_boards[hashes.index(hashes[i])].board.name}",
             "a board and its copy would count twice",
         )
-        for i, one in enumerate(boards)
-        if read[i] in read[:i] and one.board.name.casefold() not in names[:i]
+        for i, prepared in enumerate(prepared_boards)
+        if hashes[i] in hashes[:i] and prepared.board.name.casefold() not in names[:i]
     ]
     population = None
     if card.population is not None:
@@ -170,15 +172,15 @@ def _prepared(card: CampaignCard, effects: Sequence[str] | None) -> tuple[list[P
         try:
             population = load_prior(card.population.prior, Path(card.path).parent)
             require_moduli(population, place)
-            alike = [one.board.name for one in boards if one.board.isotropic]
-            if alike:
+            isotropic = [prepared.board.name for prepared in prepared_boards if prepared.board.isotropic]
+            if isotropic:
                 remedy = "leave [population] out, or those boards"
-                got = f"{', '.join(alike)}, whose E_y and G_xy follow from E_x"
+                got = f"{', '.join(isotropic)}, whose E_y and G_xy follow from E_x"
                 raise InputError(Fault(place, "boards of three constants", got, remedy))
         except InputError as error:
-            known = [fault if fault.place == place else replace(fault, place=f"{place} -> {fault.place}")
+            placed_faults = [fault if fault.place == place else replace(fault, place=f"{place} -> {fault.place}")
                      for fault in error.faults]  # fmt: skip
-            faults += known
+            faults += placed_faults
     if faults:
         raise InputError(faults)
-    return boards, population
+    return prepared_boards, population

@@ -1,4 +1,4 @@
-"""`fit` of a campaign: its boards one after another, then what they share, then every board under what all teach."""
+"""`fit` of a campaign: each board alone, then the shared parameters, then each board given these."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ import numpy as np
 
 from bayesplate.board.board import Board
 from bayesplate.board.prior import PriorCard
-from bayesplate.campaign.boards import Member
-from bayesplate.campaign.claim import left_out
+from bayesplate.campaign.boards import FittedBoard
+from bayesplate.campaign.claim import judge_left_out_boards
 from bayesplate.campaign.common import common_residuals
 from bayesplate.campaign.diagnosis import CampaignDiagnosis
-from bayesplate.campaign.learning import Learnt, learn
-from bayesplate.campaign.population import BoardConstants, Population, find_population, prior_of
+from bayesplate.campaign.learning import SharedPosterior, learn_shared
+from bayesplate.campaign.population import BoardConstants, Population, find_population, next_board_prior
 from bayesplate.campaign.summary import (
     FORMAT,
     CampaignSummary,
@@ -30,27 +30,27 @@ from bayesplate.campaign.summary import (
     shared_tree,
 )
 from bayesplate.commands.campaign import Campaign
-from bayesplate.commands.fitting import FIT, FitResult, Run, Stages, not_converged
-from bayesplate.commands.shown import Shown, show_campaign_fit
+from bayesplate.commands.fitting import FIT_TIME, FitResult, Run, Stages, convergence_error
+from bayesplate.commands.shown import Printout, show_campaign_fit
 from bayesplate.errors import Fault, InputError, NotConvergedError
-from bayesplate.files import write_text, writing
+from bayesplate.files import catch_write_errors, write_text
 from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.report.plots import CampaignPlots
 from bayesplate.results.archive import to_arviz, write_tree
 from bayesplate.results.contract import as_json, json_text
-from bayesplate.results.folder import ARCHIVE, BOARDS, OF_POPULATION, PAGE, SUMMARY
+from bayesplate.results.folder import ARCHIVE_FILE, BOARDS_FOLDER, PAGE_FILE, POPULATION_SUFFIX, SUMMARY_FILE
 from bayesplate.results.summarise import sampler_health, summarise
 from bayesplate.results.summary import versions
 
-SHARED = 1.0
-"""How long what is shared takes beside a fit."""
-_BOARD_LINE = 17
+SHARED_TIME = 1.0
+"""Time of sampling the shared parameters, relative to FIT_TIME."""
+_BOARD_STREAM = 17
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CampaignFitResult:
-    """What a fit of a campaign leaves.
+    """Result of `fit` for a campaign.
 
     Attributes
     ----------
@@ -60,11 +60,11 @@ class CampaignFitResult:
     summary : CampaignSummary
         What summary.json holds.
     boards : dict of FitResult
-        By name: each board under what all teach.
+        By name: each board, given what all boards tell of the shared parameters.
     alone : dict of FitResult
-        The same of each board alone.
-    learnt : Learnt or None
-        What is shared; None where nothing is.
+        By name: each board by itself.
+    learnt : SharedPosterior or None
+        The posterior of the shared parameters; None where nothing is shared.
     population : Population or None
     """
 
@@ -73,17 +73,17 @@ class CampaignFitResult:
     summary: CampaignSummary
     boards: Mapping[str, FitResult]
     alone: Mapping[str, FitResult]
-    learnt: Learnt | None
+    learnt: SharedPosterior | None
     population: Population | None
 
     @cached_property
     def prior(self) -> PriorCard | None:
-        """What the boards teach of the next one, as a prior card; None where they share no population."""
+        """Prior card for the next board, from these ones; None where they share no population."""
         if self.population is None:
             return None
         source = f"{len(self.boards)} boards of the campaign {self.campaign.name}"
-        rng = np.random.default_rng([self.summary.seed, _BOARD_LINE])
-        return prior_of(self.population, f"{self.campaign.name}{OF_POPULATION}", source, rng)
+        rng = np.random.default_rng([self.summary.seed, _BOARD_STREAM])
+        return next_board_prior(self.population, f"{self.campaign.name}{POPULATION_SUFFIX}", source, rng)
 
     @cached_property
     def plot(self) -> CampaignPlots:
@@ -122,20 +122,20 @@ class CampaignFitResult:
         """
         from bayesplate.report.campaign import write_campaign_report
 
-        for name, one in self.boards.items():
-            one.write(folder / BOARDS / name)
+        for name, fit in self.boards.items():
+            fit.write(folder / BOARDS_FOLDER / name)
             if report:
-                one.write_page(folder / BOARDS / name)
+                fit.write_page(folder / BOARDS_FOLDER / name)
         if self.prior is not None:
             write_text(folder / f"{self.prior.name}.toml", self.prior.to_toml())
         if self.learnt is not None:
-            write_tree(folder / ARCHIVE, shared_tree(self.learnt, self._attributes))
-        write_text(folder / SUMMARY, json_text(self.summary))
+            write_tree(folder / ARCHIVE_FILE, shared_tree(self.learnt, self._attributes))
+        write_text(folder / SUMMARY_FILE, json_text(self.summary))
         if report:
-            with writing(folder / PAGE):
+            with catch_write_errors(folder / PAGE_FILE):
                 write_campaign_report(folder, self.campaign.card.title, self.summary, diagnosis)
 
-    def shown(self) -> Shown:
+    def shown(self) -> Printout:
         """Tables and sentences for a person."""
         return show_campaign_fit(self.summary)
 
@@ -148,8 +148,8 @@ class CampaignFitResult:
 
 def fit_campaign(campaign: Campaign, run: Run, *, report: bool) -> CampaignFitResult:
     """Fit a campaign; `bayesplate.fit` says what is raised."""
-    with campaign_run(campaign, run, len(campaign.problems) * FIT + SHARED):
-        result = replace(fitted_together(campaign, run), folder=run.path)
+    with campaign_run(campaign, run, len(campaign.problems) * FIT_TIME + SHARED_TIME):
+        result = replace(fit_together(campaign, run), folder=run.path)
     if run.folder is not None:
         result.write(run.folder.path, report=report)
         run.folder.close()
@@ -158,8 +158,8 @@ def fit_campaign(campaign: Campaign, run: Run, *, report: bool) -> CampaignFitRe
 
 @contextmanager
 def campaign_run(campaign: Campaign, run: Run, left: float, place: str = "") -> Iterator[None]:
-    """A run that begins with each board alone, at a place of the checkpoint; summary.json tells of a failure."""
-    run.open({f"{place}{BOARDS}/{one.board.name}": one for one in campaign.problems}, left)
+    """A run that begins with each board alone, at a place of the checkpoint; summary.json states a failure."""
+    run.open({f"{place}{BOARDS_FOLDER}/{problem.board.name}": problem for problem in campaign.problems}, left)
     try:
         yield
     except NotConvergedError as error:
@@ -173,32 +173,32 @@ def campaign_run(campaign: Campaign, run: Run, left: float, place: str = "") -> 
                 converged=False,
                 warnings=(str(error),),
             )
-            write_text(run.path / SUMMARY, json_text(summary))
+            write_text(run.path / SUMMARY_FILE, json_text(summary))
         raise
 
 
 def fit_boards(campaign: Campaign, run: Run, place: str = "") -> dict[str, FitResult]:
-    """Every board alone, one after another, each with a folder of its own at a place of the checkpoint."""
-    names = [one.board.name for one in campaign.problems]
+    """Fit every board alone, one after another, each with a folder of its own at a place of the checkpoint."""
+    names = [problem.board.name for problem in campaign.problems]
     return {
-        name: run.fit(one, f"{place}{BOARDS}/{name}", f"board {name}", of=f"board {name}")
-        for name, one in zip(names, campaign.problems, strict=True)
+        name: run.fit(problem, f"{place}{BOARDS_FOLDER}/{name}", f"board {name}", of=f"board {name}")
+        for name, problem in zip(names, campaign.problems, strict=True)
     }
 
 
-def fitted_together(campaign: Campaign, run: Run) -> CampaignFitResult:
-    """Fit boards and what they share; nothing is written but checkpoints."""
+def fit_together(campaign: Campaign, run: Run) -> CampaignFitResult:
+    """Fit boards and the parameters that they share; nothing is written but checkpoints."""
     alone = fit_boards(campaign, run)
-    run.stages.begin("what the boards share", SHARED)
-    learnt, boards, warnings = _together(campaign, alone, run.seed, run.stages)
-    return summed_up(campaign, alone, boards, learnt, warnings, run.seed)
+    run.stages.begin("what the boards share", SHARED_TIME)
+    learnt, boards, warnings = _fit_shared(campaign, alone, run.seed, run.stages)
+    return campaign_result(campaign, alone, boards, learnt, warnings, run.seed)
 
 
-def summed_up(
+def campaign_result(
     campaign: Campaign,
     alone: Mapping[str, FitResult],
     boards: Mapping[str, FitResult],
-    learnt: Learnt | None,
+    learnt: SharedPosterior | None,
     warnings: tuple[str, ...],
     seed: int,
 ) -> CampaignFitResult:
@@ -208,54 +208,56 @@ def summed_up(
     return CampaignFitResult(None, campaign, summary, boards, alone, learnt, population)
 
 
-def _together(
+def _fit_shared(
     campaign: Campaign, alone: Mapping[str, FitResult], seed: int, stages: Stages
-) -> tuple[Learnt | None, Mapping[str, FitResult], tuple[str, ...]]:
-    """What is shared, every board under what all boards teach, and warnings."""
+) -> tuple[SharedPosterior | None, Mapping[str, FitResult], tuple[str, ...]]:
+    """The shared parameters, every board given what all boards tell of them, and warnings."""
     if not campaign.shared:
         return None, alone, ()
-    members = [Member(one.inference, one.draws, campaign.shared) for one in alone.values()]
-    learnt = learn(members, SamplerSettings(seed=seed), stages.sampled)
+    members = [FittedBoard(fit.inference, fit.draws, campaign.shared) for fit in alone.values()]
+    learnt = learn_shared(members, SamplerSettings(seed=seed), stages.sampled)
     if not learnt.convergence.passed:
-        raise not_converged(learnt.convergence, of="what the boards share")
+        raise convergence_error(learnt.convergence, of="what the boards share")
     boards, effective = {}, {}
     for i, member in enumerate(learnt.members):
-        rng = np.random.default_rng([seed, _BOARD_LINE, i])
+        rng = np.random.default_rng([seed, _BOARD_STREAM, i])
         inference, draws, effective[member.name] = learnt.board(i, rng, seed)
-        before = alone[member.name]
+        fit_alone = alone[member.name]
         assessment = assess(inference, draws)
-        sha256 = before.problem.prepared.card.sha256
+        sha256 = fit_alone.problem.prepared.card.sha256
         summary = summarise(inference, draws, assessment, seed, versions(), sha256)
-        boards[member.name] = FitResult(before.problem, inference, draws, summary)
+        boards[member.name] = FitResult(fit_alone.problem, inference, draws, summary)
     return learnt, boards, learning_warnings(learnt, effective)
 
 
 def _population(
-    campaign: Campaign, boards: Mapping[str, FitResult], learnt: Learnt | None, seed: int
+    campaign: Campaign, boards: Mapping[str, FitResult], learnt: SharedPosterior | None, seed: int
 ) -> Population | None:
     if campaign.population is None:
         return None
-    same = [i for i, one in enumerate(campaign.shared) if not one.scatter]
+    unscattered = [i for i, parameter in enumerate(campaign.shared) if not parameter.scatter]
     common, z = np.zeros((0, 0)), dict.fromkeys(boards)
-    if learnt is not None and same:
-        common = learnt.together.moments()[1][np.ix_(same, same)]
-        z = {one.name: one.given.z_of(boards[one.name].draws.flat)[:, same] for one in learnt.members}
-    constants = [BoardConstants.of(one.inference, one.draws, z[name]) for name, one in boards.items()]
+    if learnt is not None and unscattered:
+        common = learnt.together.moments()[1][np.ix_(unscattered, unscattered)]
+        z = {
+            member.name: member.given.z_of(boards[member.name].draws.flat)[:, unscattered] for member in learnt.members
+        }
+    constants = [BoardConstants.of(fit.inference, fit.draws, z[name]) for name, fit in boards.items()]
     population = find_population(constants, campaign.population, SamplerSettings(seed=seed), common)
     if not population.convergence.passed:
-        raise not_converged(population.convergence, of="the population of the boards' constants")
+        raise convergence_error(population.convergence, of="the population of the boards' constants")
     return population
 
 
 def _summary(
     campaign: Campaign,
     boards: Mapping[str, FitResult],
-    learnt: Learnt | None,
+    learnt: SharedPosterior | None,
     population: Population | None,
     warnings: tuple[str, ...],
     seed: int,
 ) -> CampaignSummary:
-    summaries = {name: one.summary for name, one in boards.items()}
+    summaries = {name: fit.summary for name, fit in boards.items()}
     prior = campaign.population
     return CampaignSummary(
         format=FORMAT,
@@ -265,8 +267,8 @@ def _summary(
         card_sha256=campaign.card.sha256,
         converged=True,
         shared={} if learnt is None else shared_numbers(learnt, seed),
-        left_out_boards={} if learnt is None else left_out(learnt.together),
-        common_residual=common_residuals(summaries, boards_of(boards)),
+        left_out_boards={} if learnt is None else judge_left_out_boards(learnt.together),
+        common_residual=common_residuals(summaries, fitted_boards(boards)),
         population=None if population is None or prior is None else population_summary(population, prior.name, seed),
         boards=summaries,
         sampler=None if learnt is None else sampler_health(learnt.chains, learnt.convergence),
@@ -274,5 +276,5 @@ def _summary(
     )
 
 
-def boards_of(found: Mapping[str, FitResult]) -> dict[str, Board]:
-    return {name: one.inference.problem.board for name, one in found.items()}
+def fitted_boards(found: Mapping[str, FitResult]) -> dict[str, Board]:
+    return {name: fit.inference.problem.board for name, fit in found.items()}

@@ -9,20 +9,20 @@ from typing import Annotated
 import numpy as np
 
 from bayesplate.board.material import MODULI, moduli
-from bayesplate.campaign.given import GivenShared
-from bayesplate.campaign.pulls import Pull, moments_before
+from bayesplate.campaign.given import ConditionalPosterior
+from bayesplate.campaign.pulls import NormalLikelihood, prior_moments
 from bayesplate.campaign.scatter import expected_width
-from bayesplate.campaign.shared import Shared
-from bayesplate.campaign.summary import CampaignCheck, CheckedShared
-from bayesplate.commands.arguments import checked
-from bayesplate.commands.campaign import Campaign, by_kind
+from bayesplate.campaign.shared import SharedParameter
+from bayesplate.campaign.summary import CampaignCheck, SharedNumberCheck
+from bayesplate.commands.arguments import check_arguments
+from bayesplate.commands.campaign import Campaign, dispatch_card
 from bayesplate.commands.options import CARD, Effects, SetupFile
-from bayesplate.commands.prepare import Card
+from bayesplate.commands.prepare import CardSource
 from bayesplate.commands.problem import Problem
-from bayesplate.commands.shown import Shown, show_campaign_check, show_check
-from bayesplate.diagnosis.signatures import INVISIBLE, Signature, look_alikes, signatures
-from bayesplate.diagnosis.terms import normalised
-from bayesplate.estimates.identifiability import remarks
+from bayesplate.commands.shown import Printout, show_campaign_check, show_check
+from bayesplate.diagnosis.signatures import INVISIBLE_CHANGES, Signature, look_alikes, signatures
+from bayesplate.diagnosis.terms import normalised_weights
+from bayesplate.estimates.identifiability import identifiability_remarks
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.report.plots import CheckPlots
@@ -30,13 +30,13 @@ from bayesplate.results.checking import CheckedEffect, CheckedMode, CheckedSetup
 from bayesplate.results.contract import NOT_IN_JSON, Constants, Elastic
 
 _N_DRAWS = 4000
-_HARDLY_NARROWER = 0.9
-"""Uncertainty of nu after the readings over that before from which on they are said to tell nothing of it."""
+_UNINFORMATIVE_RATIO = 0.9
+"""Ratio of the sd of nu after the readings to that before, above which the readings tell nothing of it."""
 
 
 @dataclass(frozen=True, repr=False)
 class CheckResult(CheckReport):
-    """What a check leaves: all of `CheckReport`, and the problem behind it.
+    """Result of `check`: all of `CheckReport`, and the problem.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class CheckResult(CheckReport):
 
     @property
     def summary(self) -> CheckReport:
-        """What the check found: the report itself."""
+        """The report itself."""
         return self
 
     @property
@@ -59,7 +59,7 @@ class CheckResult(CheckReport):
     def __repr__(self) -> str:
         return super().__repr__().replace("<CheckReport", "<CheckResult", 1)
 
-    def shown(self) -> Shown:
+    def shown(self) -> Printout:
         """Tables and sentences for a person."""
         return show_check(self)
 
@@ -68,9 +68,9 @@ class CheckResult(CheckReport):
 
 
 class CampaignCheckResult(CampaignCheck):
-    """What a check of a campaign leaves: all of `CampaignCheck`."""
+    """Result of `check` for a campaign: all of `CampaignCheck`."""
 
-    def shown(self) -> Shown:
+    def shown(self) -> Printout:
         """Tables and sentences for a person."""
         return show_campaign_check(self)
 
@@ -78,9 +78,9 @@ class CampaignCheckResult(CampaignCheck):
         return self.shown().html(self.title or self.name)
 
 
-@checked()
+@check_arguments()
 def check(
-    card: Annotated[Problem | Card | Campaign, CARD],
+    card: Annotated[Problem | CardSource | Campaign, CARD],
     *,
     effects: Effects = None,
     setup: SetupFile = None,
@@ -105,83 +105,83 @@ def check(
     InputError, NotIdentifiableError
         As `fit` would.
     """
-    return by_kind(card, _check_board, _check_campaign, effects=effects, setup=setup)
+    return dispatch_card(card, _check_board, _check_campaign, effects=effects, setup=setup)
 
 
-def _check_board(given: Problem, *, candidates: bool = True) -> CheckResult:
-    """Check one board, without signatures of effects that are not declared if there are to be no candidates."""
-    problem = given.posed
-    board = problem.board
-    estimate, found = problem.estimate, problem.identifiability
+def _check_board(problem: Problem, *, candidates: bool = True) -> CheckResult:
+    """Check one board, with the signatures of effects that are not declared if `candidates`."""
+    posed = problem.posed
+    board = posed.board
+    estimate, identifiability = posed.estimate, posed.identifiability
     D_x, D_y, D_s = estimate.rigidities
     elastic = moduli(D_x, D_y, D_s, estimate.values["thickness"], estimate.values["poisson_xy"])
-    expected = expected_sd(problem)
+    expected = expected_sd(posed)
     rows = [(setup.name, reading) for setup in board.setups for reading in setup.readings]
     residuals = cents(estimate.residuals)
     correlations = [place.correlation for model in estimate.models for place in model.places]
     return CheckResult(
         name=board.name,
         title=board.title,
-        prior=problem.prior.name,
-        law=problem.posterior.law,
+        prior=posed.prior.name,
+        law=posed.posterior.law,
         setups=tuple(
             CheckedSetup(
                 setup.name, setup.edges, len(setup.readings), len(setup.unlabelled), 100.0 * setup.noise.median
             )
             for setup in board.setups
         ),
-        uncertain_inputs=tuple(one.name for one in board.uncertain if one.is_listed),
+        uncertain_inputs=tuple(parameter.name for parameter in board.uncertain if parameter.is_listed),
         estimate=Constants(*(float(value) for value in (*elastic, *estimate.rigidities))),
         expected_sd_percent=Elastic(**{name: 100.0 * value for name, value in expected.items()}),
-        condition_number=found.condition_number,
+        condition_number=identifiability.condition_number,
         modes=tuple(
             CheckedMode(
                 setup=setup,
                 label=str(reading.label),
                 measured_hz=reading.frequency.mean,
                 residual_cents=float(residuals[i]),
-                leverage=float(found.leverages[i]),
-                share_percent=tuple(round(100.0 * float(share), 1) for share in found.shares[i]),
+                leverage=float(identifiability.leverages[i]),
+                share_percent=tuple(round(100.0 * float(share), 1) for share in identifiability.shares[i]),
                 label_correlation=correlations[i],
             )
             for i, (setup, reading) in enumerate(rows)
         ),
         in_sample_rms_cents=float(np.sqrt(np.mean(residuals**2))),
-        signatures=tuple(_effects(signatures(problem))) if candidates else (),
-        invisible=INVISIBLE,
-        identifiability=(*remarks(board, found), *_of_poisson(problem)),
-        notes=(*problem.doubts, *board.notes),
-        n_doubts=len(problem.doubts),
-        problem=given,
+        signatures=tuple(_checked_effects(signatures(posed))) if candidates else (),
+        invisible=INVISIBLE_CHANGES,
+        identifiability=(*identifiability_remarks(board, identifiability), *_poisson_remarks(posed)),
+        notes=(*posed.doubts, *board.notes),
+        n_doubts=len(posed.doubts),
+        problem=problem,
     )
 
 
-def _of_poisson(problem: PosedProblem) -> list[str]:
+def _poisson_remarks(problem: PosedProblem) -> list[str]:
     """A sentence on how well the modes tell an uncertain Poisson ratio of an isotropic board."""
     names = problem.parameters.inputs
     if not problem.board.isotropic or "poisson_xy" not in names:
         return []
-    stated = problem.board.inputs["poisson_xy"]
+    poisson = problem.board.inputs["poisson_xy"]
     column = problem.parameters.first_input + names.index("poisson_xy")
     share = float(np.sqrt(problem.covariance[column, column]))
-    if share > _HARDLY_NARROWER:
-        return [f"the modes tell nothing of nu: it stays at {stated.mean:g} ± {stated.sd:.2g}, and E goes with it"]
-    return [f"the modes tell nu beside E: to ± {share * stated.sd:.2g}, from ± {stated.sd:.2g} before"]
+    if share > _UNINFORMATIVE_RATIO:
+        return [f"the modes tell nothing of nu: it stays at {poisson.mean:g} ± {poisson.sd:.2g}, and E goes with it"]
+    return [f"the modes tell nu beside E: to ± {share * poisson.sd:.2g}, from ± {poisson.sd:.2g} before"]
 
 
-def _effects(found: Sequence[Signature]) -> list[CheckedEffect]:
-    alike = look_alikes(found)
+def _checked_effects(effect_signatures: Sequence[Signature]) -> list[CheckedEffect]:
+    look_alike_effects = look_alikes(effect_signatures)
     return [
         CheckedEffect(
-            effect=one.effect,
-            size=dict(one.size),
-            raw_rms_cents=one.raw_rms,
-            visible_rms_cents=one.visible_rms,
-            below_detection_limit=one.is_below_detection_limit,
-            bias_percent=Elastic(**one.bias_percent),
-            look_alikes=alike[one.effect],
+            effect=signature.effect,
+            size=dict(signature.size),
+            raw_rms_cents=signature.raw_rms,
+            visible_rms_cents=signature.visible_rms,
+            below_detection_limit=signature.is_below_detection_limit,
+            bias_percent=Elastic(**signature.bias_percent),
+            look_alikes=look_alike_effects[signature.effect],
         )
-        for one in found
+        for signature in effect_signatures
     ]
 
 
@@ -194,47 +194,51 @@ def expected_sd(problem: PosedProblem) -> dict[str, float]:
 
 
 def _check_campaign(campaign: Campaign) -> CampaignCheckResult:
-    """Check each board, and what all together would tell of shared numbers."""
+    """Check each board, and how well all together would determine the shared parameters."""
     campaign.pose()
     population = campaign.population
     return CampaignCheckResult(
         name=campaign.name,
         title=campaign.card.title,
-        shared=_shared(campaign) if campaign.shared else {},
+        shared=_checked_shared(campaign) if campaign.shared else {},
         population=None if population is None else population.name,
         boards={problem.board.name: _check_board(problem, candidates=False) for problem in campaign.problems},
     )
 
 
-def _shared(campaign: Campaign) -> dict[str, CheckedShared]:
-    """Shared numbers by normal approximations of the boards' posteriors."""
-    pulls = {one.board.name: _pull(one.posed, campaign) for one in campaign.problems}
+def _checked_shared(campaign: Campaign) -> dict[str, SharedNumberCheck]:
+    """Shared parameters by normal approximations of the boards' posteriors."""
+    likelihoods = {problem.board.name: _normal_likelihood(problem.posed, campaign) for problem in campaign.problems}
     width = expected_width(campaign.shared)
-    alone = {name: expected_sds(campaign.shared, [pull]) for name, pull in pulls.items()}
-    every = expected_sds(campaign.shared, [one.scattered(width) for one in pulls.values()])
+    sds_alone = {name: expected_shared_sds(campaign.shared, [likelihood]) for name, likelihood in likelihoods.items()}
+    sds_together = expected_shared_sds(
+        campaign.shared, [likelihood.scattered(width) for likelihood in likelihoods.values()]
+    )
     return {
-        one.name: CheckedShared(
-            unit=one.unit,
-            prior_q05=float(one.prior.quantile(0.05)),
-            prior_q50=float(one.prior.quantile(0.5)),
-            prior_q95=float(one.prior.quantile(0.95)),
-            expected_sd=every[i],
-            boards={name: each[i] for name, each in alone.items()},
+        parameter.name: SharedNumberCheck(
+            unit=parameter.unit,
+            prior_q05=float(parameter.prior.quantile(0.05)),
+            prior_q50=float(parameter.prior.quantile(0.5)),
+            prior_q95=float(parameter.prior.quantile(0.95)),
+            expected_sd=sds_together[i],
+            boards={name: sds[i] for name, sds in sds_alone.items()},
         )
-        for i, one in enumerate(campaign.shared)
+        for i, parameter in enumerate(campaign.shared)
     }
 
 
-def expected_sds(shared: Sequence[Shared], pulls: Sequence[Pull]) -> list[float]:
-    """Expected sd of each shared number over that of its prior, from the pulls of some boards, bounds kept."""
-    before = np.array([moments_before(one.prior)[1] for one in shared])
-    precision = np.diag(1.0 / before) + np.sum([one.precision for one in pulls], axis=0)
-    return [float(sd) for sd in np.sqrt(np.diagonal(np.linalg.inv(precision)) / before)]
+def expected_shared_sds(shared: Sequence[SharedParameter], pulls: Sequence[NormalLikelihood]) -> list[float]:
+    """Expected sd of each shared parameter over that of its prior, from the likelihoods of some boards, bounds kept."""
+    prior_variances = np.array([prior_moments(parameter.prior)[1] for parameter in shared])
+    precision = np.diag(1.0 / prior_variances) + np.sum([likelihood.precision for likelihood in pulls], axis=0)
+    return [float(sd) for sd in np.sqrt(np.diagonal(np.linalg.inv(precision)) / prior_variances)]
 
 
-def _pull(posed: PosedProblem, campaign: Campaign) -> Pull:
+def _normal_likelihood(posed: PosedProblem, campaign: Campaign) -> NormalLikelihood:
     theta = np.random.default_rng(0).multivariate_normal(posed.centre, posed.covariance, _N_DRAWS)
-    given = GivenShared(posed.posterior, campaign.shared)
-    z, log_weights = given.z_of(theta), given.log_reweighting(theta)
-    kept = np.isfinite(z).all(axis=1) & np.isfinite(log_weights)
-    return Pull.of_draws(z[kept], normalised(log_weights[kept]), [one.prior for one in campaign.shared])
+    conditional = ConditionalPosterior(posed.posterior, campaign.shared)
+    z, log_weights = conditional.z_of(theta), conditional.log_reweighting(theta)
+    finite = np.isfinite(z).all(axis=1) & np.isfinite(log_weights)
+    return NormalLikelihood.of_draws(
+        z[finite], normalised_weights(log_weights[finite]), [parameter.prior for parameter in campaign.shared]
+    )

@@ -6,17 +6,17 @@ from collections.abc import Sequence
 from textwrap import fill
 from typing import Annotated
 
-from bayesplate.commands.arguments import checked
+from bayesplate.commands.arguments import check_arguments
 from bayesplate.commands.options import CARD, Effects
-from bayesplate.commands.prepare import Card
+from bayesplate.commands.prepare import CardSource
 from bayesplate.commands.problem import Problem, as_problem
-from bayesplate.results.references import Section, references
+from bayesplate.results.references import ReferenceSection, references
 
 _WIDTH = 80
 
 
-@checked()
-def cite(card: Annotated[Problem | Card, CARD], *, effects: Effects = None) -> tuple[Section, ...]:
+@check_arguments()
+def cite(card: Annotated[Problem | CardSource, CARD], *, effects: Effects = None) -> tuple[ReferenceSection, ...]:
     """References of a fit, by section.
 
     Parameters
@@ -28,7 +28,7 @@ def cite(card: Annotated[Problem | Card, CARD], *, effects: Effects = None) -> t
 
     Returns
     -------
-    tuple of Section
+    tuple of ReferenceSection
 
     Raises
     ------
@@ -39,10 +39,10 @@ def cite(card: Annotated[Problem | Card, CARD], *, effects: Effects = None) -> t
     return references(prepared.card, prepared.prior, prepared.board)
 
 
-def cite_text(sections: Sequence[Section]) -> str:
+def cite_text(sections: Sequence[ReferenceSection]) -> str:
     """The references as plain text: a heading a section, an indented paragraph a reference."""
-    parts = []
+    blocks = []
     for section in sections:
-        entries = [fill(e, _WIDTH, initial_indent="- ", subsequent_indent="  ") for e in section.entries]
-        parts.append("\n".join([section.title, *entries]))
-    return "\n\n".join(parts) + "\n"
+        entries = [fill(entry, _WIDTH, initial_indent="- ", subsequent_indent="  ") for entry in section.entries]
+        blocks.append("\n".join([section.title, *entries]))
+    return "\n\n".join(blocks) + "\n"

@@ -7,18 +7,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, get_args
 
-from bayesplate.commands.arguments import checked
+from bayesplate.commands.arguments import check_arguments
 from bayesplate.commands.check import expected_sd
-from bayesplate.commands.fitting import not_converged
-from bayesplate.commands.options import CARD, Coefficients, Effects, Force, OnProgress, OutOfComparison, Seed
-from bayesplate.commands.prepare import Card
+from bayesplate.commands.fitting import convergence_error
+from bayesplate.commands.options import CARD, CoefficientChoice, CompareOut, Effects, Force, OnProgress, Seed
+from bayesplate.commands.prepare import CardSource
 from bayesplate.commands.problem import Problem, as_problem
-from bayesplate.commands.shown import Shown, show_compare
+from bayesplate.commands.shown import Printout, show_compare
 from bayesplate.effects import EFFECTS
 from bayesplate.estimates.coefficients import named_table
-from bayesplate.estimates.leave_one_out import CarryingMode, united
+from bayesplate.estimates.leave_one_out import CarryingMode, unite_carrying_modes
 from bayesplate.estimates.paper import paper_system
-from bayesplate.files import make_folder, require_new, write_text
+from bayesplate.files import make_folder, require_new_files, write_text
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.assessment import carried_in_fit, mode_errors
 from bayesplate.posterior.draws import Draws
@@ -31,21 +31,28 @@ from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.posterior.statistics import effective_draws
 from bayesplate.report.plots import ComparePlots
 from bayesplate.results.archive import posterior_tree, to_arviz
-from bayesplate.results.comparison import FORMAT, Comparison, TheoryRow, better_theory, judged_alike, theory_row
+from bayesplate.results.comparison import (
+    FORMAT,
+    Comparison,
+    TheoryRow,
+    better_theory,
+    recompute_left_out_errors,
+    theory_row,
+)
 from bayesplate.results.contract import NOT_IN_JSON, json_text
 from bayesplate.results.summary import versions
 
-COMPARISON = "compare.json"
+COMPARISON_FILE = "compare.json"
 FEWEST_DRAWS = 1000
-"""With fewer effective draws left by the weights, the other law is sampled itself."""
+"""Effective draws after reweighting; with fewer of them the other law is sampled itself."""
 
-_SHEAR = tuple(name for name, effect in EFFECTS.items() if effect.theory == "shear-flexible")
+_SHEAR_EFFECTS = tuple(name for name, effect in EFFECTS.items() if effect.theory == "shear-flexible")
 """Effects that make the plate shear-flexible."""
 
 
 @dataclass(frozen=True, repr=False)
 class CompareResult(Comparison):
-    """What a comparison leaves: all of `Comparison`, and the draws behind it.
+    """Result of `compare`: all of `Comparison`, and the draws.
 
     Attributes
     ----------
@@ -81,7 +88,7 @@ class CompareResult(Comparison):
     def __repr__(self) -> str:
         return super().__repr__().replace("<Comparison", "<CompareResult", 1)
 
-    def shown(self) -> Shown:
+    def shown(self) -> Printout:
         """Tables and sentences for a person."""
         return show_compare(self)
 
@@ -89,14 +96,14 @@ class CompareResult(Comparison):
         return self.shown().html(f"{self.name}: every method side by side")
 
 
-@checked()
+@check_arguments()
 def compare(
-    card: Annotated[Problem | Card, CARD],
+    card: Annotated[Problem | CardSource, CARD],
     *,
-    coefficients: Coefficients = None,
+    coefficients: CoefficientChoice = None,
     seed: Seed = 1,
     effects: Effects = None,
-    out: OutOfComparison = None,
+    out: CompareOut = None,
     force: Force = False,
     progress: OnProgress = None,
 ) -> CompareResult:
@@ -120,7 +127,7 @@ def compare(
     force : bool
         Replace a compare.json that is there.
     progress : callable, optional
-        Told after every chunk of sampling.
+        Called after every chunk of sampling.
 
     Returns
     -------
@@ -135,20 +142,22 @@ def compare(
     NotConvergedError
         If the sampler fails its gate.
     """
-    files = require_new(Path(out), [COMPARISON], force=force) if out is not None else ()
-    given = as_problem(card, effects=effects)
-    others = [name for name in given.prepared.board.effects if name not in _SHEAR]
-    asked = [others, [*others, *_SHEAR]]
-    prepared = [given.prepared.with_effects(names) for names in asked]
+    files = require_new_files(Path(out), [COMPARISON_FILE], force=force) if out is not None else ()
+    base_problem = as_problem(card, effects=effects)
+    other_effects = [name for name in base_problem.prepared.board.effects if name not in _SHEAR_EFFECTS]
+    effect_sets = [other_effects, [*other_effects, *_SHEAR_EFFECTS]]
+    prepared_boards = [base_problem.prepared.with_effects(names) for names in effect_sets]
     if coefficients == "published":
-        board = prepared[0].board
+        board = prepared_boards[0].board
         for setup in board.setups:
             named_table(board.name, setup)
-    problems = [pose(one.board, one.prior, robust=given.robust).under("exact") for one in prepared]
-    for problem in problems:  # what cannot be used is told before anything is sampled
+    problems = [
+        pose(prepared.board, prepared.prior, robust=base_problem.robust).under("exact") for prepared in prepared_boards
+    ]
+    for problem in problems:  # what cannot be used is refused before anything is sampled
         paper_system(problem.board, problem.estimate, coefficients, compared=False)
     theories: list[TheoryRow] = []
-    carrying: list[CarryingMode] = []
+    carrying_modes: list[CarryingMode] = []
     sampled: dict[str, tuple[Inference, Draws]] = {}
     for problem in problems:
         posteriors, inference, draws = _posteriors(problem, SamplerSettings(seed=seed), progress)
@@ -157,20 +166,20 @@ def compare(
         methods = [*point_methods(labelled, system, expected_sd(labelled)), *posteriors]
         errors = mode_errors(inference, draws)
         theories.append(theory_row(labelled, system, methods, errors))
-        carrying += carried_in_fit(inference, errors)
+        carrying_modes += carried_in_fit(inference, errors)
         sampled[theories[-1].theory] = inference, draws
-    carrying_any = united(carrying)
-    alike = judged_alike(theories, carrying_any)
+    united_modes = unite_carrying_modes(carrying_modes)
+    compared_theories = recompute_left_out_errors(theories, united_modes)
     result = CompareResult(
         format=FORMAT,
         name=problems[0].board.name,
         seed=seed,
         versions=versions(),
-        card_sha256=prepared[0].card.sha256,
+        card_sha256=prepared_boards[0].card.sha256,
         prior=problems[0].prior.name,
-        theories=alike,
-        verdict=better_theory(*alike),
-        carrying_modes=carrying_any,
+        theories=compared_theories,
+        verdict=better_theory(*compared_theories),
+        carrying_modes=united_modes,
         sampled=sampled,
     )
     for path in files:
@@ -186,7 +195,7 @@ def _posteriors(
 
     The wider, exact one is sampled; the linear one has its draws by weights, where these leave enough.
     """
-    inference, draws = _sampled(problem, settings, progress)
+    inference, draws = _sample(problem, settings, progress)
     problem = inference.problem
     methods = []
     for law in get_args(LawName):
@@ -194,13 +203,15 @@ def _posteriors(
         if effective_draws(weights) >= FEWEST_DRAWS:
             methods.append(posterior_method(f"{law}_posterior", problem, draws, weights))
         else:
-            own, own_draws = _sampled(problem.under(law), settings, progress)
-            methods.append(posterior_method(f"{law}_posterior", problem, own_draws, law_weights(own, own_draws, law)))
+            law_inference, law_draws = _sample(problem.under(law), settings, progress)
+            methods.append(
+                posterior_method(f"{law}_posterior", problem, law_draws, law_weights(law_inference, law_draws, law))
+            )
     return methods, inference, draws
 
 
-def _sampled(problem: PosedProblem, settings: SamplerSettings, progress: OnProgress) -> tuple[Inference, Draws]:
+def _sample(problem: PosedProblem, settings: SamplerSettings, progress: OnProgress) -> tuple[Inference, Draws]:
     inference = infer(problem, settings, progress=progress)
     if not inference.convergence.passed:
-        raise not_converged(inference.convergence, problem.doubts, so="nothing is compared")
+        raise convergence_error(inference.convergence, problem.doubts, so="nothing is compared")
     return with_likely_labels(inference, settings.seed)

@@ -15,51 +15,51 @@ from numpy.typing import NDArray
 from bayesplate.board.material import MODULI
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.values import Key
-from bayesplate.commands.arguments import checked, whole
-from bayesplate.commands.campaign import Campaign, by_kind
+from bayesplate.commands.arguments import check_arguments, integer_reader
+from bayesplate.commands.campaign import Campaign, dispatch_card
 from bayesplate.commands.campaign_diagnose import CampaignDiagnoseResult, diagnose_campaign
-from bayesplate.commands.fitting import FIT, FitResult, Run, with_board
+from bayesplate.commands.fitting import FIT_TIME, FitResult, Run, with_board
 from bayesplate.commands.options import CARD, Effects, Force, OnProgress, Out, Report, Resume, Seed, SetupFile
-from bayesplate.commands.prepare import Card
+from bayesplate.commands.prepare import CardSource
 from bayesplate.commands.problem import Problem
-from bayesplate.commands.shown import Shown, show_diagnosis
+from bayesplate.commands.shown import Printout, show_diagnosis
 from bayesplate.diagnosis.baseline import baseline_of
-from bayesplate.diagnosis.claim import Claim, judge_claim, named_in_part, nested_of
-from bayesplate.diagnosis.findings import Case, Side, diagnosis_of
-from bayesplate.diagnosis.folds import carrying
+from bayesplate.diagnosis.claim import Claim, effects_named_in_part, judge_claim, nested_errors_of_board
+from bayesplate.diagnosis.findings import Case, FittedModel, diagnosis_of
+from bayesplate.diagnosis.folds import find_carrying_modes
 from bayesplate.diagnosis.joint import full_search
 from bayesplate.diagnosis.known import known_fits
-from bayesplate.diagnosis.null_control import BY_CHANCE, FALSE_ALARMS, N_SETS, made_to_choose, null_control
+from bayesplate.diagnosis.null_control import CHANCE_SHARE, FALSE_ALARMS, N_SETS, force_choices, null_control
 from bayesplate.diagnosis.readings import wrong_reading
 from bayesplate.diagnosis.result import Diagnosis, diagnosis_json
 from bayesplate.diagnosis.search import SearchResult
 from bayesplate.diagnosis.sizes import refit_board
 from bayesplate.diagnosis.stated import stated_claims
-from bayesplate.diagnosis.verdict import Answer, Verdict, answer_words, decide
+from bayesplate.diagnosis.verdict import Explanation, Verdict, decide_verdict, explanation_words
 from bayesplate.diagnosis.words import relabelled_sentence
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
-from bayesplate.estimates.leave_one_out import carrying_modes, indices_of, united
+from bayesplate.estimates.leave_one_out import carrying_modes, indices_of, unite_carrying_modes
 from bayesplate.files import write_text
-from bayesplate.planning.bench import first_of
-from bayesplate.planning.explained import believed, survivors
-from bayesplate.planning.proposals import BELIEFS, Planner
+from bayesplate.planning.bench import plan_first_line
+from bayesplate.planning.explained import search_beliefs, surviving_explanations
+from bayesplate.planning.proposals import BELIEFS_STREAM, Planner
 from bayesplate.report.plots import DiagnosePlots
 from bayesplate.results.contract import json_text
-from bayesplate.results.folder import BEFORE, DIAGNOSIS, run_of_its_own
+from bayesplate.results.folder import BEFORE_FOLDER, DIAGNOSIS_FILE, hold_output_folders
 from bayesplate.results.summary import Summary
-from bayesplate.streams import stream
+from bayesplate.streams import random_stream
 
-FEWEST_NULL = math.ceil(1.0 / min(BY_CHANCE, FALSE_ALARMS)) - 1
-"""Among n simulated boards the one at hand is first by chance in a share of 1 / (n + 1), which is to be that small."""
-_NULL_LINE = 7
+FEWEST_NULL_SETS = math.ceil(1.0 / min(CHANCE_SHARE, FALSE_ALARMS)) - 1
+"""Fewest simulated boards n with 1 / (n + 1), the chance of the board at hand to be first, within both levels."""
+_NULL_STREAM = 7
 _MOST_FINALISTS = 3
-_SEARCH, _KNOWN, _CONTROL, _CHOICE = 3.0, 0.5, 0.5, 0.5
-"""How long the parts take beside each other, for the time that is left."""
+_SEARCH_TIME, _KNOWN_TIME, _CONTROL_TIME, _CHOICE_TIME = 3.0, 0.5, 0.5, 0.5
+"""Times of the stages, relative to FIT_TIME, for the time that is left."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DiagnoseResult:
-    """What a diagnosis leaves.
+    """Result of `diagnose` for a board.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class DiagnoseResult:
         Where its files are; None if none were asked for.
     diagnosis : Diagnosis
     before, after : FitResult
-        The same where nothing was added.
+        The fits without the added effect and with it; the same where none was added.
     """
 
     folder: Path | None
@@ -82,7 +82,7 @@ class DiagnoseResult:
 
     @cached_property
     def plot(self) -> DiagnosePlots:
-        """The figures: `found.plot.signatures()`."""
+        """The figures: `result.plot.signatures()`."""
         after = self.after
         return DiagnosePlots(after.inference, after.draws, after.summary, self.diagnosis)
 
@@ -94,7 +94,7 @@ class DiagnoseResult:
         """The content of diagnosis.json."""
         return diagnosis_json(self.diagnosis)
 
-    def shown(self) -> Shown:
+    def shown(self) -> Printout:
         """Tables and sentences for a person."""
         return show_diagnosis(self.diagnosis)
 
@@ -105,10 +105,10 @@ class DiagnoseResult:
         return self.diagnosis._repr_html_()
 
 
-@run_of_its_own()
-@checked()
+@hold_output_folders()
+@check_arguments()
 def diagnose(
-    card: Annotated[Problem | Card | Campaign, CARD],
+    card: Annotated[Problem | CardSource | Campaign, CARD],
     *,
     out: Out = None,
     report: Report = True,
@@ -117,7 +117,7 @@ def diagnose(
     setup: SetupFile = None,
     force: Force = False,
     resume: Resume = False,
-    n_null: Annotated[int, Key(whole(FEWEST_NULL))] = N_SETS,
+    n_null: Annotated[int, Key(integer_reader(FEWEST_NULL_SETS))] = N_SETS,
     progress: OnProgress = None,
 ) -> DiagnoseResult | CampaignDiagnoseResult:
     """Trace the residual of a fit to an effect that the model lacks, add it, and report the error before and after.
@@ -144,7 +144,7 @@ def diagnose(
         Data sets of the null control at most; with fewer than 49 chance cannot be told from an effect at the two per
         cent that count as a false alarm.
     progress : callable, optional
-        Told when a part begins and after every chunk of sampling, with the share of the whole that is done.
+        Called when a stage begins and after every chunk of sampling, with the share of the run that is done.
 
     Returns
     -------
@@ -157,7 +157,7 @@ def diagnose(
         As `bayesplate.fit`, of the fit without further effects; also if a problem asks for robust noise.
     """
     run = Run(seed, out, force=force, resume=resume, progress=progress)
-    return by_kind(
+    return dispatch_card(
         card,
         lambda problem: _diagnose_board(problem, run, n_null, report=report),
         lambda campaign: diagnose_campaign(campaign, run, report=report),
@@ -167,102 +167,108 @@ def diagnose(
 
 
 def _diagnose_board(problem: Problem, run: Run, n_null: int, *, report: bool) -> DiagnoseResult:
-    """Fit one board, diagnose the fit, and write what was found."""
+    """Fit one board, diagnose the fit, and write the result."""
     if problem.robust:
         wanted = "a problem with normal noise, which the search for an effect assumes"
         raise InputError(Fault("robust", wanted, "Student's distribution"))
-    run.open({BEFORE: problem}, 2.0 * FIT + _SEARCH + _KNOWN + _CONTROL + _CHOICE)
-    before = run.fit(problem, BEFORE, "fit without further effects", tells_failure=True)
-    diagnosis, after = _diagnosed(problem, before, run, n_null)
+    run.open({BEFORE_FOLDER: problem}, 2.0 * FIT_TIME + _SEARCH_TIME + _KNOWN_TIME + _CONTROL_TIME + _CHOICE_TIME)
+    before = run.fit(problem, BEFORE_FOLDER, "fit without further effects", tells_failure=True)
+    diagnosis, after = _diagnose_fit(problem, before, run, n_null)
     if run.folder is not None:
         path = run.folder.path
         if after is not before:
-            before.write(path / BEFORE)
+            before.write(path / BEFORE_FOLDER)
         after.write(path)
-        write_text(path / DIAGNOSIS, json_text(diagnosis_json(diagnosis)))
+        write_text(path / DIAGNOSIS_FILE, json_text(diagnosis_json(diagnosis)))
         if report:
             after.write_page(path, diagnosis)
         run.folder.close()
     return DiagnoseResult(run.path, diagnosis, before, after)
 
 
-def _diagnosed(problem: Problem, before: FitResult, run: Run, n_null: int) -> tuple[Diagnosis, FitResult]:
+def _diagnose_fit(problem: Problem, before: FitResult, run: Run, n_null: int) -> tuple[Diagnosis, FitResult]:
     """Search, null control, verdict and refits of a fitted board; nothing is written but checkpoints."""
     posed, stages = before.inference.problem, run.stages
-    stages.begin("search for effects", _SEARCH)
-    ground, found = full_search(baseline_of(posed), tell=stages.reached)
-    stages.begin("effects that are known", _KNOWN)
-    known = known_fits(posed, stages.reached)
-    stages.begin("the same search on simulated boards", _CONTROL)
-    control = null_control(ground, np.random.default_rng([run.seed, _NULL_LINE]), n_null, found.against_none)
-    verdict = decide(found, control)
-    folded = nested_of(found, control, verdict.tried)
-    in_part = named_in_part(found, verdict, folded)
-    finals = verdict.fitted_again[:_MOST_FINALISTS]
-    stages.left = FIT * len(finals) + (_CHOICE if verdict.index else 0.0)
-    again, failures = _fitted_again(problem, run, found, finals)
-    fits = {0: before, **again}
-    last = verdict.tried if (verdict.index or in_part) and verdict.tried in fits else 0
-    after = fits[last]
-    known_carrying = (carrying_modes(posed.board, one.errors.leverages, MODULI) for one in known)
-    of_fits = (one.summary.carrying_modes for one in fits.values())
-    carrying_any = united(carrying(found, verdict.tried), *of_fits, *known_carrying)
-    folded = folded and folded.without(indices_of(carrying_any, posed.board))
-    if verdict.index and folded is not None and folded.counted.any():
-        stages.begin("the same search on simulated boards, made to choose", _CHOICE)
-        control = made_to_choose(ground, control, float(folded.ratio[0]), folded.carried)
-    notes = [*after.inference.problem.doubts, *failures]  # what an effect explains is no doubt any more
-    if last:
-        with_words = next(answer_words(found, one) for one in finals if one.index == last)
-        told = relabelled_sentence(posed.board, after.inference.problem.board, with_words)
-        notes += [told] if told else []
-    sides = {index: Side(index, one.summary, one.draws, _measured(one)) for index, one in fits.items()}
+    stages.begin("search for effects", _SEARCH_TIME)
+    ground, search = full_search(baseline_of(posed), tell=stages.reached)
+    stages.begin("effects that are known", _KNOWN_TIME)
+    known_effect_fits = known_fits(posed, stages.reached)
+    stages.begin("the same search on simulated boards", _CONTROL_TIME)
+    control = null_control(ground, np.random.default_rng([run.seed, _NULL_STREAM]), n_null, search.against_none)
+    verdict = decide_verdict(search, control)
+    folds = nested_errors_of_board(search, control, verdict.tried)
+    in_part = effects_named_in_part(search, verdict, folds)
+    finalists = verdict.fitted_again[:_MOST_FINALISTS]
+    stages.left = FIT_TIME * len(finalists) + (_CHOICE_TIME if verdict.index else 0.0)
+    refits, failures = _refit_finalists(problem, run, search, finalists)
+    fits = {0: before, **refits}
+    final_index = verdict.tried if (verdict.index or in_part) and verdict.tried in fits else 0
+    after = fits[final_index]
+    known_carrying = (carrying_modes(posed.board, fit.errors.leverages, MODULI) for fit in known_effect_fits)
+    fit_carrying = (fit.summary.carrying_modes for fit in fits.values())
+    united_modes = unite_carrying_modes(find_carrying_modes(search, verdict.tried), *fit_carrying, *known_carrying)
+    folds = folds and folds.without(indices_of(united_modes, posed.board))
+    if verdict.index and folds is not None and folds.counted.any():
+        stages.begin("the same search on simulated boards, made to choose", _CHOICE_TIME)
+        control = force_choices(ground, control, float(folds.ratio[0]), folds.carried)
+    notes = [*after.inference.problem.doubts, *failures]  # a doubt that an effect explains is none any more
+    if final_index:
+        effect_words = next(
+            explanation_words(search, finalist) for finalist in finalists if finalist.index == final_index
+        )
+        sentence = relabelled_sentence(posed.board, after.inference.problem.board, effect_words)
+        notes += [sentence] if sentence else []
+    fitted_models = {
+        index: FittedModel(index, fit.summary, fit.draws, _measured_frequencies(fit)) for index, fit in fits.items()
+    }
     diagnosis = diagnosis_of(
         Case(
-            found=found,
+            found=search,
             verdict=verdict,
             control=control,
-            folded=folded,
-            before=sides[0],
-            after=sides[last],
-            claim=judge_claim(found, verdict, control, folded) if last else Claim(),
-            recommendation=advice(found, verdict, before.problem.prior, run.seed),
-            known=known,
-            stated_claims=stated_claims(posed, known) if known else (),
-            finalists=[(one, sides[one.index]) for one in finals if one.index in sides],
+            folded=folds,
+            before=fitted_models[0],
+            after=fitted_models[final_index],
+            claim=judge_claim(search, verdict, control, folds) if final_index else Claim(),
+            recommendation=advice(search, verdict, before.problem.prior, run.seed),
+            known=known_effect_fits,
+            stated_claims=stated_claims(posed, known_effect_fits) if known_effect_fits else (),
+            finalists=[
+                (finalist, fitted_models[finalist.index]) for finalist in finalists if finalist.index in fitted_models
+            ],
             has_slip=bool(posed.slips),
             notes=tuple(notes),
             in_part=in_part,
-            carrying=carrying_any,
+            carrying=united_modes,
         )
     )
     return diagnosis, after
 
 
-def _fitted_again(
-    problem: Problem, run: Run, found: SearchResult, finals: Sequence[Answer]
+def _refit_finalists(
+    problem: Problem, run: Run, search: SearchResult, finalists: Sequence[Explanation]
 ) -> tuple[dict[int, FitResult], list[str]]:
-    """The fits with the finalists among the answers, by index, and a sentence for each that failed."""
+    """The fits with the finalists among the explanations, by index, and a sentence for each that failed."""
     fits, failures = {}, []
-    for answer in finals:
+    for explanation in finalists:
         try:
-            name = "-".join((*answer.members, str(answer.index)))
-            stage = f"fit with {answer_words(found, answer)}"
-            fits[answer.index] = run.fit(with_board(problem, refit_board(found, answer.index)), name, stage)
+            name = "-".join((*explanation.members, str(explanation.index)))
+            stage = f"fit with {explanation_words(search, explanation)}"
+            fits[explanation.index] = run.fit(with_board(problem, refit_board(search, explanation.index)), name, stage)
         except (NotIdentifiableError, NotConvergedError) as error:
-            failures.append(f"the model could not be fitted again with {' and '.join(answer.members)}: {error}")
+            failures.append(f"the model could not be fitted again with {' and '.join(explanation.members)}: {error}")
     return fits, failures
 
 
-def _measured(one: FitResult) -> NDArray[np.float64]:
+def _measured_frequencies(fit: FitResult) -> NDArray[np.float64]:
     """Frequencies of the readings that have a label in a fit: (n_modes,) array, Hz."""
-    return np.concatenate([setup.measured for setup in one.inference.problem.board.setups])
+    return np.concatenate([setup.measured for setup in fit.inference.problem.board.setups])
 
 
 def advice(found: SearchResult, verdict: Verdict, prior: PriorCard, seed: int) -> str:
     """What to do next: read a wrong reading again, or the first line of the plan; empty if nothing would help."""
     if verdict.word == "unexplained":
         return wrong_reading(found)
-    left = survivors(found, [one.members for one in verdict.stands_for])
-    planner = Planner(believed(found, prior, stream(seed, BELIEFS), left), seed)
-    return first_of(planner, planner.ranked())
+    survivors = surviving_explanations(found, [explanation.members for explanation in verdict.stands_for])
+    planner = Planner(search_beliefs(found, prior, random_stream(seed, BELIEFS_STREAM), survivors), seed)
+    return plan_first_line(planner, planner.ranked())

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from bayesplate.commands.arguments import checked
-from bayesplate.commands.campaign import Campaign, by_kind
+from bayesplate.commands.arguments import check_arguments
+from bayesplate.commands.campaign import Campaign, dispatch_card
 from bayesplate.commands.campaign_fit import CampaignFitResult, fit_campaign
 from bayesplate.commands.fitting import FitResult, Run, fit_problem
 from bayesplate.commands.options import (
@@ -21,15 +21,15 @@ from bayesplate.commands.options import (
     Seed,
     SetupFile,
 )
-from bayesplate.commands.prepare import Card
+from bayesplate.commands.prepare import CardSource
 from bayesplate.commands.problem import Problem
-from bayesplate.results.folder import run_of_its_own
+from bayesplate.results.folder import hold_output_folders
 
 
-@run_of_its_own()
-@checked()
+@hold_output_folders()
+@check_arguments()
 def fit(
-    card: Annotated[Problem | Card | Campaign, CARD],
+    card: Annotated[Problem | CardSource | Campaign, CARD],
     *,
     out: Out = None,
     report: Report = True,
@@ -66,7 +66,7 @@ def fit(
     force, resume : bool
         Replace the results in the folder, or continue an interrupted run.
     progress : callable, optional
-        Told after every chunk of sampling.
+        Called after every chunk of sampling.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def fit(
         If a run cannot be resumed.
     """
     run = Run(seed, out, force=force, resume=resume, progress=progress)
-    return by_kind(
+    return dispatch_card(
         card,
         lambda problem: fit_problem(problem, run, report=report),
         lambda campaign: fit_campaign(campaign, run, report=report),

@@ -11,11 +11,19 @@ from bayesplate.board.board import Board
 from bayesplate.board.coefficients import CoefficientCard
 from bayesplate.board.named import NamedCards
 from bayesplate.board.prior import PriorCard
-from bayesplate.board.values import Key, read_table
-from bayesplate.commands.arguments import checked, effect_list, instance_of, read_switch, refused, whole, word
+from bayesplate.board.values import Key, read_entries
+from bayesplate.commands.arguments import (
+    check_arguments,
+    effects_reader,
+    instance_reader,
+    integer_reader,
+    read_bool,
+    refusal_of,
+    word_reader,
+)
 from bayesplate.commands.fit import fit
-from bayesplate.commands.fitting import fitted
-from bayesplate.commands.prepare import prepare, prepared_card
+from bayesplate.commands.fitting import compute_fit
+from bayesplate.commands.prepare import prepare, prepare_card
 from bayesplate.commands.problem import Problem
 from bayesplate.errors import Fault
 from bayesplate.frequencies.laws import LawName
@@ -24,7 +32,7 @@ from bayesplate.results.summary import Summary
 
 @dataclass(frozen=True)
 class FitRequest:
-    """What is asked of a fit besides its board and its prior.
+    """Options of a fit, besides its board and its prior.
 
     Attributes
     ----------
@@ -47,22 +55,27 @@ class FitRequest:
     tables: Mapping[str, CoefficientCard] = field(default_factory=dict)
 
 
-_ASKED = {"seed": whole(0), "effects": effect_list("effects"), "law": word(*get_args(LawName)), "robust": read_switch}
+_REQUEST_READERS = {
+    "seed": integer_reader(0),
+    "effects": effects_reader("effects"),
+    "law": word_reader(*get_args(LawName)),
+    "robust": read_bool,
+}
 
 
 def _read_request(value: object) -> object:
     """A FitRequest, whose entries are read as the arguments of that name are."""
-    if value is not None and not all(hasattr(value, key) for key in _ASKED):
-        raise refused("a FitRequest", value)
+    if value is not None and not all(hasattr(value, key) for key in _REQUEST_READERS):
+        raise refusal_of("a FitRequest", value)
     if value is not None:
-        read_table({key: getattr(value, key) for key in _ASKED}, _ASKED)
+        read_entries({key: getattr(value, key) for key in _REQUEST_READERS}, _REQUEST_READERS)
     return value
 
 
-@checked()
+@check_arguments()
 def fit_board(
-    board: Annotated[Board, Key(instance_of(Board))],
-    prior: Annotated[PriorCard, Key(instance_of(PriorCard))],
+    board: Annotated[Board, Key(instance_reader(Board))],
+    prior: Annotated[PriorCard, Key(instance_reader(PriorCard))],
     request: Annotated[FitRequest | None, Key(_read_request)] = None,
 ) -> Summary:
     """Fit one board; nothing is read, written or remembered, and the same arguments give the same bytes anywhere.
@@ -86,19 +99,19 @@ def fit_board(
         As of `fit`.
     """
     request = FitRequest() if request is None else request
-    return fitted(_problem(board, prior, request), request.seed).summary
+    return compute_fit(_problem(board, prior, request), request.seed).summary
 
 
 def fit_board_into(folder: Path, report: bool, board: Board, prior: PriorCard, request: FitRequest) -> Summary:
     """`fit_board` with the files of a fit in a folder, in place of those that are there."""
-    done = fit(_problem(board, prior, request), out=folder, report=report, seed=request.seed, force=True)
-    return done.summary  # type: ignore[return-value]  # a problem is no campaign
+    result = fit(_problem(board, prior, request), out=folder, report=report, seed=request.seed, force=True)
+    return result.summary  # type: ignore[return-value]  # a problem is no campaign
 
 
 def _problem(board: Board, prior: PriorCard, request: FitRequest) -> Problem:
     if board.card is None or board != Board.from_card(board.card):
         return Problem(prepare(board, request.effects, prior=prior), request.law, request.robust)
-    lacking = tuple(
+    faults = tuple(
         Fault(
             f"request tables {setup.name}",
             "the published coefficients that the card names",
@@ -108,5 +121,5 @@ def _problem(board: Board, prior: PriorCard, request: FitRequest) -> Problem:
         for setup in board.setups
         if setup.table_name and setup.name not in request.tables
     )
-    named = NamedCards(prior, request.tables, lacking)
-    return Problem(prepared_card(board, named, request.effects), request.law, request.robust)
+    named_cards = NamedCards(prior, request.tables, faults)
+    return Problem(prepare_card(board, named_cards, request.effects), request.law, request.robust)

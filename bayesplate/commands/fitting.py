@@ -13,10 +13,10 @@ from typing import Any
 
 from bayesplate.board.board import Board
 from bayesplate.commands.problem import Problem, pose_all
-from bayesplate.commands.shown import Shown, show_fit
+from bayesplate.commands.shown import Printout, show_fit
 from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.errors import CheckpointError, NotConvergedError
-from bayesplate.files import make_folder, write_text, writing
+from bayesplate.files import catch_write_errors, make_folder, write_text
 from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.convergence import Convergence
@@ -27,14 +27,14 @@ from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.reweighting import linear_is_enough, linearisation
 from bayesplate.posterior.sampling import Progress, SamplerSettings
 from bayesplate.report.plots import FitPlots
-from bayesplate.results.archive import attributes_of, posterior_tree, to_arviz, write_tree
+from bayesplate.results.archive import archive_attributes, posterior_tree, to_arviz, write_tree
 from bayesplate.results.contract import json_text
-from bayesplate.results.folder import ARCHIVE, PAGE, SUMMARY, OutputFolder
+from bayesplate.results.folder import ARCHIVE_FILE, PAGE_FILE, SUMMARY_FILE, OutputFolder
 from bayesplate.results.summarise import summarise, unconverged_summary
 from bayesplate.results.summary import Summary, versions
 
-FIT = 3.0
-"""How long a fit takes beside the other parts of a run."""
+FIT_TIME = 3.0
+"""Time of a fit, relative to the other stages of a run."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,7 +68,7 @@ class FitResult:
     @cached_property
     def tree(self) -> Any:
         """The draws as posterior.nc holds them: an xarray.DataTree."""
-        attributes = attributes_of(self.inference, self.summary, self.problem.prepared.card.text)
+        attributes = archive_attributes(self.inference, self.summary, self.problem.prepared.card.text)
         return posterior_tree(self.inference, self.draws, attributes)
 
     def to_arviz(self) -> Any:
@@ -89,20 +89,20 @@ class FitResult:
             If the disk is full or the place is not ours.
         """
         make_folder(folder)
-        write_tree(folder / ARCHIVE, self.tree)
-        write_text(folder / SUMMARY, json_text(self.summary))
+        write_tree(folder / ARCHIVE_FILE, self.tree)
+        write_text(folder / SUMMARY_FILE, json_text(self.summary))
 
     def write_page(self, folder: Path, diagnosis: Diagnosis | None = None) -> None:
         """Write report.html, its figures and tables; with a diagnosis its verdict too. Raises as `write`."""
         from bayesplate.report.page import write_report
 
-        with writing(folder / PAGE):
+        with catch_write_errors(folder / PAGE_FILE):
             write_report(folder, self.problem.prepared.card, self.inference, self.draws, self.summary, diagnosis)
 
     def __repr__(self) -> str:
         return repr(self.summary).replace("<Summary", "<FitResult", 1)
 
-    def shown(self) -> Shown:
+    def shown(self) -> Printout:
         """Tables and sentences for a person."""
         return show_fit(self.summary)
 
@@ -112,30 +112,30 @@ class FitResult:
 
 @dataclass
 class Stages:
-    """The progress of a run of several parts: tells each part and the share of the whole, which never falls."""
+    """The progress of a run of several stages: reports each stage, and the share that is done, which never falls."""
 
     tell: Callable[[Progress], None] | None
-    left: float  # how long the parts to come take, begun ones not counted, in any unit of time
+    left: float  # relative time of the stages that have not begun
     _stage: str = ""
     _past: float = 0.0
     _length: float = 0.0
     _done: float = 0.0
 
     def begin(self, stage: str, length: float) -> None:
-        """Begin the next part, which takes so long beside the others."""
+        """Begin the next stage, of a relative length."""
         self._past += self._length
         self._stage, self._length = stage, length
         self.left = max(self.left - length, 0.0)
         self.reached(0.0)
 
     def sampled(self, progress: Progress) -> None:
-        """Tell of sampling within the part."""
+        """Report sampling within the stage."""
         self.reached(progress.sampled, progress)
 
     def reached(self, share: float, progress: Progress | None = None) -> None:
-        """Tell that a share of the part is done."""
-        whole = self._past + self._length + self.left
-        self._done = max(self._done, (self._past + share * self._length) / whole)
+        """Report that a share of the stage is done."""
+        total = self._past + self._length + self.left
+        self._done = max(self._done, (self._past + share * self._length) / total)
         if self.tell is not None:
             self.tell(replace(progress or Progress(0, 0), stage=self._stage, done=self._done))
 
@@ -162,9 +162,9 @@ class Run:
         return None if self.folder is None else self.folder.path
 
     def open(self, first: Mapping[str, Problem], left: float = 0.0) -> None:
-        """Pose what is fitted first, by its place in the checkpoint, and open the folder for parts that take `left`.
+        """Pose the problems fitted first, by place in the checkpoint, and open the folder; `left` as of `Stages`.
 
-        Raises InputError, NotIdentifiableError or CheckpointError; whatever is refused is so before a file is written.
+        Raises InputError, NotIdentifiableError or CheckpointError; every refusal comes before a file is written.
         """
         self.stages.left = left
         if self.folder is not None:
@@ -173,23 +173,23 @@ class Run:
         for problem in first.values():
             SamplerSettings(seed=self.seed).walkers(problem.posed.parameters.n_dim)
         if self.folder is not None:
-            (place, problem), *others = first.items()
-            saved = checkpoint_in(self.folder.checkpoint / place, problem, problem.posed)
-            if self._resume and not (self.folder.has_checkpoint if others else saved.exists()):
-                wanted = "a saved run" if others else f"a saved run under the {problem.posed.posterior.law} law"
+            (place, problem), *other_problems = first.items()
+            saved = law_checkpoint(self.folder.checkpoint / place, problem, problem.posed)
+            if self._resume and not (self.folder.has_checkpoint if other_problems else saved.exists()):
+                wanted = "a saved run" if other_problems else f"a saved run under the {problem.posed.posterior.law} law"
                 raise CheckpointError(f"{self.path}: wanted {wanted}, got none to resume (--force runs it anew)")
             self.folder.open(resume=self._resume)
 
     def fit(
         self, problem: Problem, place: str = "", stage: str = "", *, of: str = "", tells_failure: bool = False
     ) -> FitResult:
-        """Fit one problem of the run; see `fitted`. Without a `stage` the progress of the sampler alone is told."""
+        """Fit one problem; see `compute_fit`. Without a `stage` the progress of the sampler alone is reported."""
         if stage:
-            self.stages.begin(stage, FIT)
+            self.stages.begin(stage, FIT_TIME)
         checkpoints = None if self.folder is None else self.folder.checkpoint / place
         progress = self.stages.sampled if stage else self.stages.tell
         failure = self.path if tells_failure else None
-        return fitted(problem, self.seed, checkpoints, progress, of=of, failure=failure)
+        return compute_fit(problem, self.seed, checkpoints, progress, of=of, failure=failure)
 
 
 def fit_problem(problem: Problem, run: Run, *, report: bool) -> FitResult:
@@ -209,7 +209,7 @@ def with_board(problem: Problem, board: Board) -> Problem:
     return replace(problem, prepared=replace(problem.prepared, board=board))
 
 
-def fitted(
+def compute_fit(
     problem: Problem,
     seed: int,
     checkpoints: Path | None = None,  # one subfolder per law
@@ -220,41 +220,46 @@ def fitted(
 ) -> FitResult:
     """Sample a problem, and once more under the exact law if the draws show that the linear one does not serve."""
 
-    def sampled(under: PosedProblem) -> tuple[Inference, Draws]:
-        checkpoint = None if checkpoints is None else checkpoint_in(checkpoints, problem, under)
-        inference = infer(under, SamplerSettings(seed=seed), checkpoint=checkpoint, progress=progress)
+    def sample(posed: PosedProblem) -> tuple[Inference, Draws]:
+        checkpoint = None if checkpoints is None else law_checkpoint(checkpoints, problem, posed)
+        inference = infer(posed, SamplerSettings(seed=seed), checkpoint=checkpoint, progress=progress)
         convergence = inference.convergence
         if not convergence.passed:
             if failure is not None:
-                told = unconverged_summary(
-                    inference.problem, inference.chains, convergence, seed, versions(), problem.prepared.card.sha256
+                failed_summary = unconverged_summary(
+                    inference.problem,
+                    inference.chains,
+                    convergence,
+                    seed,
+                    versions(),
+                    problem.prepared.card.sha256,
                 )
-                write_text(failure / SUMMARY, json_text(told))
-            raise not_converged(convergence, inference.problem.doubts, of=of)
+                write_text(failure / SUMMARY_FILE, json_text(failed_summary))
+            raise convergence_error(convergence, inference.problem.doubts, of=of)
         return with_likely_labels(inference, seed)
 
-    inference, draws = sampled(problem.posed)
+    inference, draws = sample(problem.posed)
     errors = linearisation(inference, draws)
     is_linear = problem.law == "linear"
     if problem.asked_law is None and is_linear and not linear_is_enough(inference, draws, errors):
-        # The choice was made on a normal approximation; the draws know better.
-        inference, draws = sampled(problem.posed.under("exact"))
+        # The law was chosen by a normal approximation, which the draws correct.
+        inference, draws = sample(problem.posed.under("exact"))
         errors = linearisation(inference, draws)
     assessment = assess(inference, draws, errors)
     summary = summarise(inference, draws, assessment, seed, versions(), problem.prepared.card.sha256)
     return FitResult(problem, inference, draws, summary)
 
 
-def not_converged(
+def convergence_error(
     convergence: Convergence, doubts: Sequence[str] = (), *, of: str = "", so: str = "no constants are given"
 ) -> NotConvergedError:
-    """The error of draws that failed the gate, with what follows and the likeliest causes."""
-    what = f"the sampler did not converge{f' for {of}' if of else ''}, so {so}:"
-    return NotConvergedError("\n".join((what, *convergence.reasons, *(f"A likely cause: {doubt}" for doubt in doubts))))
+    """The error of draws that failed the gate, with its consequence and likely causes."""
+    head = f"the sampler did not converge{f' for {of}' if of else ''}, so {so}:"
+    return NotConvergedError("\n".join((head, *convergence.reasons, *(f"A likely cause: {doubt}" for doubt in doubts))))
 
 
-def checkpoint_in(folder: Path, problem: Problem, posed: PosedProblem) -> Checkpoint:
-    """Where the chunks of a problem under the law of that posing are kept."""
+def law_checkpoint(folder: Path, problem: Problem, posed: PosedProblem) -> Checkpoint:
+    """The checkpoint of a problem under the law of a posing."""
     return Checkpoint(folder / posed.posterior.law, fingerprint(problem, posed))
 
 

@@ -10,20 +10,20 @@ from typing import Annotated
 import numpy as np
 
 from bayesplate.board.board import Values
-from bayesplate.commands.arguments import checked
+from bayesplate.commands.arguments import check_arguments
 from bayesplate.commands.options import CARD, Effects, Force, Out, Seed, SetupFile
-from bayesplate.commands.prepare import Card, Prepared
+from bayesplate.commands.prepare import CardSource, PreparedBoard
 from bayesplate.commands.problem import Problem, as_problem
-from bayesplate.commands.shown import Shown, show_modes
+from bayesplate.commands.shown import Printout, show_modes
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.identifiability import identifiability, require_identifiable, require_labels
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.estimates.sheet import NUMBERS_OF_MODES, Precision, Sheet, sheet
-from bayesplate.files import make_folder, require_new
+from bayesplate.files import make_folder, require_new_files
 from bayesplate.frequencies.prior_bands import prior_bands, prior_medians
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
-from bayesplate.posterior.first_labels import probable_ways
+from bayesplate.posterior.first_labels import probable_labellings
 from bayesplate.posterior.laplace import noise_widenings
 from bayesplate.report.plots import ModesPlots
 from bayesplate.results.sheets import ModesReport, proposed_labels, sheet_report
@@ -35,7 +35,7 @@ _AT_PRIOR = "at the median of the prior"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ModesResult:
-    """What `modes` leaves.
+    """Result of `modes`.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class ModesResult:
     def __repr__(self) -> str:
         return repr(self.summary).replace("<ModesReport", "<ModesResult", 1)
 
-    def shown(self) -> Shown:
+    def shown(self) -> Printout:
         """Tables and sentences for a person."""
         return show_modes(self.summary)
 
@@ -67,9 +67,9 @@ class ModesResult:
         return self.shown().html(self.summary.title or self.summary.name)
 
 
-@checked()
+@check_arguments()
 def modes(
-    card: Annotated[Problem | Card, CARD],
+    card: Annotated[Problem | CardSource, CARD],
     *,
     out: Out = None,
     effects: Effects = None,
@@ -84,7 +84,7 @@ def modes(
     card : Problem, str, path or Board
         A problem, the name of a shipped board card, the path of a card, or a board made in Python. A card or a board
         may be without frequencies: then the modes are those of the prior's median, with the range in which the prior
-        expects each. Modes that were not measured have the range that the measured ones foretell. Peaks alone,
+        expects each. Modes that were not measured have the range that the measured ones predict. Peaks alone,
         without a label, are given the most probable labels.
     out : path, optional
         Folder of modes.png and modes.svg (modes-SETUP.png where there are several setups); nothing is written without
@@ -111,30 +111,30 @@ def modes(
     board = prepared.board
     stems = ["modes"] if len(board.setups) == 1 else [f"modes-{setup.name}" for setup in board.setups]
     names = [f"{stem}.{ending}" for stem in stems for ending in ("png", "svg")]
-    files = () if out is None else require_new(Path(out), names, force=force)
+    files = () if out is None else require_new_files(Path(out), names, force=force)
     rng = np.random.default_rng(seed)
-    ways = probable_ways(board, prepared.prior)
-    if ways:
-        prepared = replace(prepared, board=ways[0][0].board)
-    values, precision, why = _constants(prepared)
-    basis = _AT_PRIOR if precision is None else _AT_PROPOSED if ways else _AT_ESTIMATE
+    labellings = probable_labellings(board, prepared.prior)
+    if labellings:
+        prepared = replace(prepared, board=labellings[0][0].board)
+    values, precision, reasons = _constants(prepared)
+    basis = _AT_PRIOR if precision is None else _AT_PROPOSED if labellings else _AT_ESTIMATE
     sheets = tuple(_sheets(prepared, values, precision, rng, basis))
     if out is not None:
-        _draw(sheets, Path(out), files)
+        _save_sheets(sheets, Path(out), files)
     report = ModesReport(
         name=board.name,
         title=board.title,
         basis=basis,
-        setups=tuple(sheet_report(one) for one in sheets),
-        proposed=proposed_labels(board, ways),
-        notes=(*why, *board.notes),
+        setups=tuple(sheet_report(setup_sheet) for setup_sheet in sheets),
+        proposed=proposed_labels(board, labellings),
+        notes=(*reasons, *board.notes),
         files=tuple(str(path) for path in files),
     )
     return ModesResult(report, sheets, files)
 
 
-def _constants(prepared: Prepared) -> tuple[Values, Precision | None, list[str]]:
-    """Where to compute the modes, how well that is known, and why if not at the board's own estimate."""
+def _constants(prepared: PreparedBoard) -> tuple[Values, Precision | None, list[str]]:
+    """Constants of the modes, their precision, and the reason if they are not the board's own estimate."""
     board = prepared.board
     try:
         require_labels(board)
@@ -145,32 +145,32 @@ def _constants(prepared: Prepared) -> tuple[Values, Precision | None, list[str]]
     widenings = noise_widenings(board, estimate.residuals)
     scales = estimate.scales * np.repeat(widenings, [len(setup.readings) for setup in board.setups])
     noise = {setup.name: setup.noise.median * w for setup, w in zip(board.setups, widenings.tolist(), strict=True)}
-    found = identifiability(estimate.sensitivities, scales, board.symmetry)
-    return estimate.values, Precision(found.of_rigidities, noise), []
+    identification = identifiability(estimate.sensitivities, scales, board.symmetry)
+    return estimate.values, Precision(identification.of_rigidities, noise), []
 
 
 def _sheets(
-    prepared: Prepared, values: Values, precision: Precision | None, rng: np.random.Generator, basis: str
+    prepared: PreparedBoard, values: Values, precision: Precision | None, rng: np.random.Generator, basis: str
 ) -> list[Sheet]:
-    board, made = prepared.board, []
+    board, sheets = prepared.board, []
     for setup in board.setups:
         system = system_of(board, setup)
         bands = None
         if precision is None:
-            _, named = spectrum(system, values, NUMBERS_OF_MODES[-1])
-            labels = [mode.label for mode in named if mode.label is not None]
+            _, named_modes = spectrum(system, values, NUMBERS_OF_MODES[-1])
+            labels = [mode.label for mode in named_modes if mode.label is not None]
             bands = prior_bands(board, prepared.prior, setup, labels, rng)
-        made.append(sheet(board, system, values, basis, bands, precision))
-    return made
+        sheets.append(sheet(board, system, values, basis, bands, precision))
+    return sheets
 
 
-def _draw(sheets: Sequence[Sheet], folder: Path, files: Sequence[Path]) -> None:
+def _save_sheets(sheets: Sequence[Sheet], folder: Path, files: Sequence[Path]) -> None:
     from bayesplate.report.chladni import chladni_sheet
-    from bayesplate.report.saving import drawing, save_figure
+    from bayesplate.report.saving import matplotlib_defaults, save_figure
 
     make_folder(folder)
-    for i, one in enumerate(sheets):
-        with drawing():
-            figure = chladni_sheet(one)
+    for i, setup_sheet in enumerate(sheets):
+        with matplotlib_defaults():
+            figure = chladni_sheet(setup_sheet)
             for path in files[2 * i : 2 * i + 2]:
                 save_figure(figure, path)

@@ -12,14 +12,14 @@ import click
 from bayesplate.board.board import Board
 from bayesplate.board.checks import physical_faults
 from bayesplate.board.prior import load_prior
-from bayesplate.board.setup_keys import End, edge_words
+from bayesplate.board.setup_keys import EdgeCondition, edge_words
 from bayesplate.board.starter import HALF_TOP, starter_text
 from bayesplate.board.values import Complaint, Key, Number, Refusal
-from bayesplate.board.words import EDGES, did_you_mean, name_complaint, shown
-from bayesplate.commands.arguments import checked
-from bayesplate.commands.options import Joined, Option
-from bayesplate.errors import Fault, InputError, plain
-from bayesplate.files import write_text, writing
+from bayesplate.board.words import EDGES, did_you_mean, name_complaint, show_value
+from bayesplate.commands.arguments import check_arguments
+from bayesplate.commands.options import Option, OptionGroup
+from bayesplate.errors import Fault, InputError, printable
+from bayesplate.files import catch_write_errors, write_text
 from bayesplate.frequencies.labels import label_faults, lowest_labels
 from bayesplate.labels import Label
 
@@ -27,7 +27,7 @@ _EDGES_WANTED = (
     '"free", "cantilever", "clamped", "supported", or four letters of C, S and F for x0, y0, x1, y1, like "CFFF"'
 )
 _ARRANGEMENTS = {"cantilever": "CFFF"}
-_ANY = Number(-1e300, 1e300)
+_ANY_NUMBER = Number(-1e300, 1e300)
 _N_EXAMPLES = 8
 SIZES = (*HALF_TOP, "mass")
 
@@ -44,32 +44,32 @@ def _read_numbers(value: object) -> object:
     return value
 
 
-def _frequencies_from_text(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:
+def _frequencies_from_text(context: click.Context, option: click.Parameter, texts: tuple[str, ...]) -> dict[str, str]:
     """Frequencies "LABEL=HZ" by their label."""
-    found = {}
-    for text in given:
+    frequencies = {}
+    for text in texts:
         label, sign, hertz = text.rpartition("=")
         if not sign:
             raise click.UsageError(f'--frequency {text!r}: write a label and its frequency, "(1,1)=35".')
-        found[label.strip()] = hertz.strip()
-    return found
+        frequencies[label.strip()] = hertz.strip()
+    return frequencies
 
 
-def _sizes_given(**sizes: str | None) -> dict[str, str]:
+def _sizes_from_options(**sizes: str | None) -> dict[str, str]:
     return {name: size for name, size in sizes.items() if size}
 
 
-_TEXT, _NUMBERS = Key(_read_text), Key(_read_numbers)
-_OF_EDGES = "free, cantilever, clamped, supported, or letters like CFFF."
-_OF_PRIOR = "Prior card, spruce or weakly-informative."
-_OPTIONS_OF_SIZES = Joined(
-    _sizes_given,
+_TEXT_KEY, _NUMBERS_KEY = Key(_read_text), Key(_read_numbers)
+_EDGES_HELP = "free, cantilever, clamped, supported, or letters like CFFF."
+_PRIOR_HELP = "Prior card, spruce or weakly-informative."
+_SIZE_OPTIONS = OptionGroup(
+    _sizes_from_options,
     length_x=Option("--length-x", metavar="MM", help="Length along the grain."),
     length_y=Option("--length-y", metavar="MM", help="Length across the grain."),
     thickness=Option("--thickness", metavar="MM"),
     mass=Option("--mass", metavar="G"),
 )
-_OPTION_OF_FREQUENCIES = Option(
+_FREQUENCY_OPTION = Option(
     "--frequency",
     multiple=True,
     callback=_frequencies_from_text,
@@ -78,16 +78,16 @@ _OPTION_OF_FREQUENCIES = Option(
 )
 
 
-@checked()
+@check_arguments()
 def new(
     path: Annotated[str | os.PathLike[str], Option("path", required=False)],
     *,
-    sizes: Annotated[Mapping[str, float | str] | None, _NUMBERS, _OPTIONS_OF_SIZES] = None,
-    edges: Annotated[str, _TEXT, Option("--edges", metavar="WORD", help=_OF_EDGES)] = "free",
-    prior: Annotated[str, _TEXT, Option("--prior", metavar="NAME", help=_OF_PRIOR)] = "weakly-informative",
-    title: Annotated[str, _TEXT, Option("--title", help="A line for people.")] = "",
-    notes: Annotated[str, _TEXT, Option("--notes", help="Free text.")] = "",
-    frequencies: Annotated[Mapping[str, float | str] | None, _NUMBERS, _OPTION_OF_FREQUENCIES] = None,
+    sizes: Annotated[Mapping[str, float | str] | None, _NUMBERS_KEY, _SIZE_OPTIONS] = None,
+    edges: Annotated[str, _TEXT_KEY, Option("--edges", metavar="WORD", help=_EDGES_HELP)] = "free",
+    prior: Annotated[str, _TEXT_KEY, Option("--prior", metavar="NAME", help=_PRIOR_HELP)] = "weakly-informative",
+    title: Annotated[str, _TEXT_KEY, Option("--title", help="A line for people.")] = "",
+    notes: Annotated[str, _TEXT_KEY, Option("--notes", help="Free text.")] = "",
+    frequencies: Annotated[Mapping[str, float | str] | None, _NUMBERS_KEY, _FREQUENCY_OPTION] = None,
 ) -> Path:
     """Write a first card.
 
@@ -115,80 +115,83 @@ def new(
     InputError
         If there is a file of that name, or what was given cannot stand on a card; then nothing is written.
     """
-    card = _free_path(path)
+    card = _new_card_path(path)
     words = edge_words(_ARRANGEMENTS.get(edges, edges))
     faults = [
-        Fault(f"sizes {name}", f"one of {', '.join(SIZES)}", shown(name), did_you_mean(str(name), SIZES))
+        Fault(f"sizes {name}", f"one of {', '.join(SIZES)}", show_value(name), did_you_mean(str(name), SIZES))
         for name in sizes or {}
         if name not in SIZES
     ]
     if words is None:
-        faults.append(Fault("edges", _EDGES_WANTED, shown(edges)))
+        faults.append(Fault("edges", _EDGES_WANTED, show_value(edges)))
         words = dict.fromkeys(EDGES, "free")
-    known, read = _numbers(sizes or {}, faults), _numbers(frequencies or {}, faults)
-    text = starter_text(card.stem, known, words, prior, read, _examples(words), title=title, notes=notes)
-    faults += _faults(text, card.stem)
+    size_values, hertz = _to_numbers(sizes or {}, faults), _to_numbers(frequencies or {}, faults)
+    text = starter_text(card.stem, size_values, words, prior, hertz, _example_modes(words), title=title, notes=notes)
+    faults += _card_faults(text, card.stem)
     if faults:
         raise InputError(faults)
-    with writing(card):
+    with catch_write_errors(card):
         card.parent.mkdir(parents=True, exist_ok=True)
     write_text(card, text)
     return card
 
 
-def _free_path(path: str | os.PathLike[str]) -> Path:
+def _new_card_path(path: str | os.PathLike[str]) -> Path:
     card = Path(path)
     card = card if card.suffix == ".toml" else card.with_name(f"{card.name}.toml")
     if os.path.exists(card):
-        raise InputError(Fault(plain(str(card)), "a new file", "one that exists", "choose another name"))
+        raise InputError(Fault(printable(str(card)), "a new file", "one that exists", "choose another name"))
     return card
 
 
 def require_path(path: str | os.PathLike[str]) -> None:
     """Refuse what `new` would refuse of a path by itself: a file that exists, a name that no card can have."""
-    card = _free_path(path)
+    card = _new_card_path(path)
     if wanted := name_complaint(card.stem):
-        raise InputError(Fault("name", wanted, shown(card.stem), "choose another name"))
+        raise InputError(Fault("name", wanted, show_value(card.stem), "choose another name"))
 
 
 def require_edges(edges: str) -> None:
     """Refuse a text that does not say how four edges are held."""
     if edge_words(_ARRANGEMENTS.get(edges, edges)) is None:
-        raise InputError(Fault("edges", _EDGES_WANTED, shown(edges)))
+        raise InputError(Fault("edges", _EDGES_WANTED, show_value(edges)))
 
 
 def example_labels(edges: str) -> list[str]:
     """Labels of modes that a board held this way has; those of a free one where the arrangement is not known."""
     words = edge_words(_ARRANGEMENTS.get(edges, edges))
-    return [str(label) for label in _examples(words or dict.fromkeys(EDGES, "free"))]
+    return [str(label) for label in _example_modes(words or dict.fromkeys(EDGES, "free"))]
 
 
-def _examples(words: Mapping[str, End]) -> list[Label]:
+def _example_modes(words: Mapping[str, EdgeCondition]) -> list[Label]:
     return lowest_labels((words["x0"], words["x1"]), (words["y0"], words["y1"]))[:_N_EXAMPLES]
 
 
-def _numbers(given: Mapping[str, float | str], faults: list[Fault]) -> dict[str, float]:
-    """Numbers from texts, with the hints of a card where they are none."""
-    found = {}
-    for name, value in given.items():
+def _to_numbers(texts: Mapping[str, float | str], faults: list[Fault]) -> dict[str, float]:
+    """Numbers from texts, with the hints of a card for those that are not numbers."""
+    numbers = {}
+    for name, value in texts.items():
         try:
-            found[name] = _ANY(_number(value))
+            numbers[name] = _ANY_NUMBER(_to_number(value))
         except Refusal as refusal:
-            faults += [Fault(plain(str(name)), one.wanted, one.got, one.remedy) for one in refusal.complaints]
-    return found
+            faults += [
+                Fault(printable(str(name)), complaint.wanted, complaint.got, complaint.remedy)
+                for complaint in refusal.complaints
+            ]
+    return numbers
 
 
-def _number(value: float | str) -> float | str:
+def _to_number(value: float | str) -> float | str:
     try:
         return float(value)
     except (TypeError, ValueError):
         return value
 
 
-def _faults(text: str, name: str) -> list[Fault]:
-    """Everything that a card is held to."""
+def _card_faults(text: str, name: str) -> list[Fault]:
+    """Every fault of the text of a card."""
     try:
-        read = Board.from_text(text, name, may_lack_frequencies=True)
+        board = Board.from_text(text, name, may_lack_frequencies=True)
     except InputError as error:
         return list(error.faults)
-    return physical_faults(read) or label_faults(read.assuming(load_prior(read.prior)))
+    return physical_faults(board) or label_faults(board.assuming(load_prior(board.prior)))

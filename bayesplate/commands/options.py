@@ -13,16 +13,16 @@ from bayesplate.board.values import Key, Refusal
 from bayesplate.board.words import did_you_mean
 from bayesplate.commands.arguments import (
     annotations_of,
-    effect_list,
+    effects_reader,
+    integer_reader,
     is_positive,
-    or_none,
+    optional_reader,
+    read_bool,
     read_card,
     read_function,
     read_path,
-    read_switch,
-    refused,
-    whole,
-    word,
+    refusal_of,
+    word_reader,
 )
 from bayesplate.commands.prepare import default_folder
 from bayesplate.estimates.coefficients import CoefficientSource
@@ -47,34 +47,34 @@ class Option:
             yield click.Argument([name], **settings)
 
     def value(self, name: str, told: Mapping[str, Any], about: Any) -> Any:
-        """The argument, from all that was given; `otherwise` makes it of the command's first argument."""
+        """The argument, from all options that were given; `otherwise` derives it from the command's first argument."""
         return self.otherwise(about) if told[name] is None and self.otherwise is not None else told[name]
 
 
-class Joined:
+class OptionGroup:
     """Several options that give one argument; `join` raises click.UsageError where they exclude each other."""
 
     def __init__(self, join: Callable[..., Any], **options: Option) -> None:
         self.options, self.join = options, join
 
     def parameters(self, name: str, default: object) -> Iterator[click.Parameter]:
-        for own, option in self.options.items():
-            yield from option.parameters(own, None)
+        for option_name, option in self.options.items():
+            yield from option.parameters(option_name, None)
 
     def value(self, name: str, told: Mapping[str, Any], about: Any) -> Any:
-        return self.join(**{own: told[own] for own in self.options})
+        return self.join(**{option_name: told[option_name] for option_name in self.options})
 
 
-def options_of(function: Callable[..., Any]) -> dict[str, Option | Joined]:
+def options_of(function: Callable[..., Any]) -> dict[str, Option | OptionGroup]:
     """The options of a function, by argument; an argument without a default stands on the command line by itself."""
-    found: dict[str, Option | Joined] = {}
+    options: dict[str, Option | OptionGroup] = {}
     annotations = annotations_of(function)
     for name, parameter in inspect.signature(function).parameters.items():
-        parts = getattr(annotations[name], "__metadata__", ())
-        stated = [one for one in parts if isinstance(one, Option | Joined)]
-        if stated or parameter.default is parameter.empty:
-            found[name] = stated[0] if stated else Option(name)
-    return found
+        metadata = getattr(annotations[name], "__metadata__", ())
+        declared = [entry for entry in metadata if isinstance(entry, Option | OptionGroup)]
+        if declared or parameter.default is parameter.empty:
+            options[name] = declared[0] if declared else Option(name)
+    return options
 
 
 def path_option(*names: str, **settings: Any) -> Option:
@@ -97,62 +97,64 @@ def _effects_from_text(context: click.Context, option: click.Parameter, effects:
     return [] if "none" in names else names
 
 
-def _law(linear: bool, exact: bool) -> str | None:
+def _law_from_flags(linear: bool, exact: bool) -> str | None:
     refuse_both(linear, exact, "--linear and --exact force different laws")
     return "linear" if linear else "exact" if exact else None
 
 
 def _costs_from_text(context: click.Context, option: click.Parameter, costs: tuple[str, ...]) -> dict[str, Any] | None:
     """Minutes by class from CLASS=MINUTES, as often as there are classes."""
-    told: dict[str, Any] = {}
-    for one in costs:
-        name, _, minutes = one.partition("=")
+    minutes_by_class: dict[str, Any] = {}
+    for text in costs:
+        name, _, minutes = text.partition("=")
         try:
-            told[name.strip()] = float(minutes)
+            minutes_by_class[name.strip()] = float(minutes)
         except ValueError:
-            raise click.BadParameter(f"{one!r}: wanted CLASS=MINUTES, as reading=2", context, option) from None
-    return told or None
+            raise click.BadParameter(f"{text!r}: wanted CLASS=MINUTES, as reading=2", context, option) from None
+    return minutes_by_class or None
 
 
 def _read_costs(value: object) -> object:
     if not isinstance(value, Mapping):
-        raise refused(f"minutes by class: {', '.join(Costs.names())}", value)
-    wrong = []
+        raise refusal_of(f"minutes by class: {', '.join(Costs.names())}", value)
+    complaints = []
     for key, minutes in value.items():
         if key not in Costs.names():
-            near = did_you_mean(key, Costs.names()) if isinstance(key, str) else ""
-            wrong += refused(f"one of {', '.join(Costs.names())}", key, near).inside(str(key))
+            hint = did_you_mean(key, Costs.names()) if isinstance(key, str) else ""
+            complaints += refusal_of(f"one of {', '.join(Costs.names())}", key, hint).inside(str(key))
         elif not is_positive(minutes):
-            wrong += refused("a positive number of minutes", minutes).inside(key)
-    if wrong:
-        raise Refusal(*wrong)
+            complaints += refusal_of("a positive number of minutes", minutes).inside(key)
+    if complaints:
+        raise Refusal(*complaints)
     return value
 
 
-def _read_between(value: object) -> object:
+def _read_rival_effects(value: object) -> object:
     if isinstance(value, list | tuple) and not value:
-        raise refused("one name of an effect or more, or None", [])
-    return effect_list("between")(value)
+        raise refusal_of("one name of an effect or more, or None", [])
+    return effects_reader("between")(value)
 
 
 FilePath = str | os.PathLike[str]
 CARD = Key(read_card)
 ANY_PATH = Key(read_path)
-_PATH_OR_NONE = Key(or_none(read_path))
-_SWITCH = Key(read_switch)
+_PATH_OR_NONE = Key(optional_reader(read_path))
+_BOOL = Key(read_bool)
 
 Out = Annotated[
     FilePath | None,
     _PATH_OR_NONE,
     path_option("--out", otherwise=default_folder, help="Output folder (default results/NAME)."),
 ]
-OutOfComparison = Annotated[
+CompareOut = Annotated[
     FilePath | None, _PATH_OR_NONE, path_option("--out", help="Folder for compare.json (default: not written).")
 ]
-Seed = Annotated[int, Key(whole(0)), Option("--seed", type=click.IntRange(0), show_default=True, help="Random seed.")]
+Seed = Annotated[
+    int, Key(integer_reader(0)), Option("--seed", type=click.IntRange(0), show_default=True, help="Random seed.")
+]
 Effects = Annotated[
     Sequence[str] | None,
-    Key(effect_list("effects")),
+    Key(effects_reader("effects")),
     Option(
         "--effects",
         callback=_effects_from_text,
@@ -166,27 +168,25 @@ SetupFile = Annotated[
 ]
 Law = Annotated[
     LawName | None,
-    Key(word(*get_args(LawName))),
-    Joined(
-        _law,
+    Key(word_reader(*get_args(LawName))),
+    OptionGroup(
+        _law_from_flags,
         linear=Option("--linear", is_flag=True, help="Force the linear frequency law."),
         exact=Option("--exact", is_flag=True, help="Force the exact frequency law."),
     ),
 ]
-Robust = Annotated[
-    bool, _SWITCH, Option("--robust", is_flag=True, help="Student-t noise: one wrong mode has less say.")
-]
+Robust = Annotated[bool, _BOOL, Option("--robust", is_flag=True, help="Student-t noise: one wrong mode has less say.")]
 Report = Annotated[
     bool,
-    _SWITCH,
+    _BOOL,
     Option("--no-report", is_flag=True, default=True, flag_value=False, help="Write no page and no figures."),
 ]
-Force = Annotated[bool, _SWITCH, Option("--force", is_flag=True, help="Replace the results in the output folder.")]
-Resume = Annotated[bool, _SWITCH, Option("--resume", is_flag=True, help="Continue an interrupted run.")]
+Force = Annotated[bool, _BOOL, Option("--force", is_flag=True, help="Replace the results in the output folder.")]
+Resume = Annotated[bool, _BOOL, Option("--resume", is_flag=True, help="Continue an interrupted run.")]
 OnProgress = Annotated[Callable[[Progress], None] | None, Key(read_function)]
-Coefficients = Annotated[
+CoefficientChoice = Annotated[
     CoefficientSource | None,
-    Key(word(*get_args(CoefficientSource))),
+    Key(word_reader(*get_args(CoefficientSource))),
     Option(
         "--coefficients",
         type=click.Choice(get_args(CoefficientSource)),
@@ -195,12 +195,12 @@ Coefficients = Annotated[
 ]
 Goal = Annotated[
     str | None,
-    Key(word(*GOALS)),
+    Key(word_reader(*GOALS)),
     Option("--for", metavar="WHAT", help="E_x, E_y, G_xy, constants or explanations."),
 ]
 Minutes = Annotated[
     Mapping[str, float] | None,
-    Key(or_none(_read_costs)),
+    Key(optional_reader(_read_costs)),
     Option(
         "--cost",
         multiple=True,
@@ -209,8 +209,8 @@ Minutes = Annotated[
         help="Minutes that a reading (1), a new clamping (10) or another board (30) takes.",
     ),
 ]
-Between = Annotated[
+RivalEffects = Annotated[
     Sequence[str] | None,
-    Key(_read_between),
+    Key(_read_rival_effects),
     Option("--between", callback=_effects_from_text, help="Effects to be told apart, comma separated."),
 ]

@@ -8,78 +8,78 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bayesplate.commands.arguments import checked
+from bayesplate.commands.arguments import check_arguments
 from bayesplate.commands.fragment import fragment_text
 from bayesplate.commands.options import FilePath, Force
-from bayesplate.commands.pick_labels import label_peaks, pictures_of
+from bayesplate.commands.pick_labels import assign_pictures, label_peaks
 from bayesplate.commands.pick_options import (
-    CardOrNone,
     Channels,
     Files,
     Hammer,
     Highest,
     Lowest,
     MotionWord,
-    OutOfPick,
+    OptionalCard,
+    PickOut,
     Polarity,
     Rate,
     Sand,
     Sensor,
     SensorMass,
     SweepOption,
-    band,
-    given_places,
-    places_beside_files,
+    band_faults,
+    place_faults,
+    places_by_file,
     require_on_board,
 )
-from bayesplate.commands.pick_words import moved_between_hits, show_pick
-from bayesplate.commands.prepare import Prepared, prepare
-from bayesplate.commands.shown import Shown
-from bayesplate.errors import Fault, InputError, NotIdentifiableError, plain
-from bayesplate.files import make_folder, require_new, write_text
+from bayesplate.commands.pick_words import moved_hit_remarks, show_pick
+from bayesplate.commands.prepare import PreparedBoard, prepare
+from bayesplate.commands.shown import Printout
+from bayesplate.errors import Fault, InputError, NotIdentifiableError, printable
+from bayesplate.files import make_folder, require_new_files, write_text
 from bayesplate.recordings.contract import LabelChance, PickedRow, PickReport
-from bayesplate.recordings.picking import HIGHEST, LOWEST, Picked, pick_modes
+from bayesplate.recordings.picking import HIGHEST, LOWEST, PickedModes, pick_modes
 from bayesplate.recordings.reading import read_recordings
 from bayesplate.recordings.sand import read_picture
 from bayesplate.recordings.signals import Recording
-from bayesplate.recordings.sweeps import band_of, impulse_response, read_sweep
-from bayesplate.recordings.taking import Heard, take, take_impulses
+from bayesplate.recordings.sweeps import impulse_response, read_sweep, sweep_band
+from bayesplate.recordings.taking import TakenSpectra, take_impulses, take_spectra
 from bayesplate.results.contract import json_text
-from bayesplate.results.folder import FIGURES
+from bayesplate.results.folder import FIGURES_FOLDER
 
 if TYPE_CHECKING:
     from bayesplate.arrays import Floats
     from bayesplate.recordings.hits import Hit
-    from bayesplate.recordings.signals import Read
+    from bayesplate.recordings.signals import Signal
 
-FRAGMENT, PAGE, SUMMARY = "setup.toml", "recordings.html", "pick.json"
-_RATE_OFF = 1e-6
+FRAGMENT_FILE, PICK_PAGE_FILE, PICK_SUMMARY_FILE = "setup.toml", "recordings.html", "pick.json"
+_RATE_TOLERANCE = 1e-6
 _LEAST_LABEL, _MOST_LABELS = 0.005, 4
-"""Probability below which a label is not listed."""
+"""Least probability of a label that is listed, and the most labels of a peak."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PickResult:
-    """What `pick` leaves.
+    """Result of `pick`.
 
     Attributes
     ----------
     summary : PickReport
-    picked : Picked
+    picked : PickedModes
         With the spectra.
     folder : Path or None
         Where its files are; None if none were asked for.
     """
 
     summary: PickReport
-    picked: Picked
+    picked: PickedModes
     folder: Path | None
 
     def __repr__(self) -> str:
-        found = ", ".join(f"{peak.hz:.1f}" for peak in self.summary.likely[:8])
-        return f"<PickResult of {', '.join(self.summary.files[:3])}: {len(self.summary.likely)} modes, Hz: {found}>"
+        hertz = ", ".join(f"{peak.hz:.1f}" for peak in self.summary.likely[:8])
+        return f"<PickResult of {', '.join(self.summary.files[:3])}: {len(self.summary.likely)} modes, Hz: {hertz}>"
 
-    def shown(self) -> Shown:
+    def shown(self) -> Printout:
         """Tables and sentences for a person."""
         return show_pick(self.summary)
 
@@ -87,11 +87,11 @@ class PickResult:
         return self.shown().html("Picked modes")
 
 
-@checked(places_beside_files, lambda given: band(given, LOWEST, HIGHEST))
+@check_arguments(place_faults, lambda arguments: band_faults(arguments, LOWEST, HIGHEST))
 def pick(
     files: Files,
     *,
-    card: CardOrNone = None,
+    card: OptionalCard = None,
     rate: Rate = None,
     hammer: Hammer = (),
     sensor: Sensor = (),
@@ -103,7 +103,7 @@ def pick(
     sand: Sand = None,
     lowest: Lowest = LOWEST,
     highest: Highest = HIGHEST,
-    out: OutOfPick = None,
+    out: PickOut = None,
     force: Force = False,
 ) -> PickResult:
     """Pick the modes of a board from recordings of hits, taps or sweeps.
@@ -149,90 +149,112 @@ def pick(
     InputError
         With every fault of the arguments, then of all files, then of all hits; nothing is written then.
     """
-    targets = () if out is None else require_new(Path(out), (FRAGMENT, PAGE, SUMMARY), force=force)
-    prepared = None if card is None else _one_setup(prepare(card, may_lack_frequencies=True))
+    targets = (
+        ()
+        if out is None
+        else require_new_files(Path(out), (FRAGMENT_FILE, PICK_PAGE_FILE, PICK_SUMMARY_FILE), force=force)
+    )
+    prepared = None if card is None else _require_one_setup(prepare(card, may_lack_frequencies=True))
     if prepared is not None:
         # a microphone may be beside the board, and is nowhere on a card
         require_on_board(prepared.card, hammer, () if motion == "pressure" else sensor, sensor_mass)
     pictures = {hertz: read_picture(path) for hertz, path in (sand or {}).items()}
-    read = read_recordings(files, rate, channels, motion)
-    read = [
-        [replace(one, hammer=struck, sensor=listened) for one in own]
-        for own, (struck, listened) in zip(read, given_places(hammer, sensor, read), strict=True)
+    signals_by_file = read_recordings(files, rate, channels, motion)
+    signals_by_file = [
+        [replace(signal, hammer=hammer_place, sensor=sensor_place) for signal in file_signals]
+        for file_signals, (hammer_place, sensor_place) in zip(
+            signals_by_file, places_by_file(hammer, sensor, signals_by_file), strict=True
+        )
     ]
     if sweep is None:
-        heard = take(read, highest)
+        measured = take_spectra(signals_by_file, highest)
     else:
-        impulses, (first, last) = _impulses(read, sweep, highest)
-        lowest, highest = max(lowest, first), min(highest, last)
-        heard = take_impulses(impulses, highest)
-    picked = pick_modes(heard.spectra, lowest, highest)
-    summary = _summary(files, heard, picked, prepared, polarity, pictures, sensor_mass)
+        impulses, (sweep_lowest, sweep_highest) = _impulse_responses(signals_by_file, sweep, highest)
+        lowest, highest = max(lowest, sweep_lowest), min(highest, sweep_highest)
+        measured = take_impulses(impulses, highest)
+    picked = pick_modes(measured.spectra, lowest, highest)
+    summary = _summary(files, measured, picked, prepared, polarity, pictures, sensor_mass)
     if out is not None:
         _write(Path(out), targets, summary, picked)
     return PickResult(summary, picked, None if out is None else Path(out))
 
 
-def _one_setup(prepared: Prepared) -> Prepared:
-    """A card whose labels are meant without doubt: it has one setup."""
+def _require_one_setup(prepared: PreparedBoard) -> PreparedBoard:
+    """Refuse a card with several setups, of which the labels could be of any."""
     if len(prepared.board.setups) > 1:
         names = ", ".join(setup.name for setup in prepared.board.setups)
         raise InputError(Fault(prepared.board.name, "a card with one setup", names, "one card for the edges at hand"))
     return prepared
 
 
-def _impulses(
-    read: Sequence[Sequence[Read]], sweep: str, highest: float
+def _impulse_responses(
+    signals_by_file: Sequence[Sequence[Signal]], sweep: str, highest: float
 ) -> tuple[list[tuple[Recording, Hit]], tuple[float, float]]:
     """Impulse responses in place of recordings of a sweep, each as if the board had been hit once; and its band, Hz."""
-    recordings = [one for own in read for one in own if isinstance(one, Recording) and one.force is None]
-    wrong = [one.name for own in read for one in own if one not in recordings]
-    if wrong:
+    recordings = [
+        signal
+        for file_signals in signals_by_file
+        for signal in file_signals
+        if isinstance(signal, Recording) and signal.force is None
+    ]
+    wrong_files = [
+        signal.name for file_signals in signals_by_file for signal in file_signals if signal not in recordings
+    ]
+    if wrong_files:
         wanted = "one channel with the response to the sweep"
-        raise InputError([Fault(name, wanted, "another kind of file", "leave --sweep out for hits") for name in wrong])
-    played: list[Floats]
+        raise InputError(
+            [Fault(name, wanted, "another kind of file", "leave --sweep out for hits") for name in wrong_files]
+        )
+    sweep_signals: list[Floats]
     if not os.path.exists(sweep):
-        stated = read_sweep(sweep)
-        played = [stated.signal(one.rate) for one in recordings]
+        exponential_sweep = read_sweep(sweep)
+        sweep_signals = [exponential_sweep.signal(recording.rate) for recording in recordings]
     else:
-        ((itself, *_),) = read_recordings([sweep], was_played=True)
-        if not isinstance(itself, Recording):
-            raise InputError(Fault(plain(sweep), "a recording of the sweep", "a frequency response"))
-        off = [one for one in recordings if abs(one.rate / itself.rate - 1.0) > _RATE_OFF]
-        if off:
-            wanted = f"{itself.rate:g} Hz, as the sweep"
-            raise InputError([Fault(f"{one.name} rate", wanted, f"{one.rate:g} Hz") for one in off])
-        played = [itself.response] * len(recordings)
-    found, faults = [], list[Fault]()
-    for one, signal in zip(recordings, played, strict=True):
+        ((sweep_recording, *_),) = read_recordings([sweep], was_played=True)
+        if not isinstance(sweep_recording, Recording):
+            raise InputError(Fault(printable(sweep), "a recording of the sweep", "a frequency response"))
+        mismatched = [
+            recording for recording in recordings if abs(recording.rate / sweep_recording.rate - 1.0) > _RATE_TOLERANCE
+        ]
+        if mismatched:
+            wanted = f"{sweep_recording.rate:g} Hz, as the sweep"
+            raise InputError(
+                [Fault(f"{recording.name} rate", wanted, f"{recording.rate:g} Hz") for recording in mismatched]
+            )
+        sweep_signals = [sweep_recording.response] * len(recordings)
+    impulses, faults = [], list[Fault]()
+    for recording, sweep_signal in zip(recordings, sweep_signals, strict=True):
         try:
-            found.append(impulse_response(one, signal, highest))
+            impulses.append(impulse_response(recording, sweep_signal, highest))
         except InputError as error:
             faults += error.faults
     if faults:
         raise InputError(faults)
-    bands = [band_of(signal, one.rate) for one, signal in zip(recordings, played, strict=True)]
-    return found, (max(first for first, _ in bands), min(last for _, last in bands))
+    bands = [
+        sweep_band(sweep_signal, recording.rate)
+        for recording, sweep_signal in zip(recordings, sweep_signals, strict=True)
+    ]
+    return impulses, (max(low for low, _ in bands), min(high for _, high in bands))
 
 
 def _summary(
     files: Sequence[FilePath],
-    heard: Heard,
-    picked: Picked,
-    prepared: Prepared | None,
+    measured: TakenSpectra,
+    picked: PickedModes,
+    prepared: PreparedBoard | None,
     polarity: str | None,
     pictures: Mapping[float, Floats],
     sensor_mass: tuple[float, float] | None,
 ) -> PickReport:
-    names = tuple(plain(Path(one).name) for one in files)
+    names = tuple(printable(Path(path).name) for path in files)
     flips = None if polarity is None else polarity == "opposite"
-    remarks = [*heard.remarks, *picked.remarks]
+    remarks = [*measured.remarks, *picked.remarks]
     labels = None
     if prepared is not None:
-        shown, told = pictures_of(prepared.board, picked.likely, pictures)
-        remarks += told
+        straightened_pictures, picture_remarks = assign_pictures(prepared.board, picked.likely, pictures)
+        remarks += picture_remarks
         try:
-            labels = label_peaks(prepared.board, prepared.prior, picked, flips, shown)
+            labels = label_peaks(prepared.board, prepared.prior, picked, flips, straightened_pictures)
             flips, remarks = labels.flips, [*remarks, *labels.doubts]
         except NotIdentifiableError as error:
             remarks.append(f"no labels: {error}")
@@ -243,15 +265,15 @@ def _summary(
         replace(peak, sign=picked.sign(answer, flips))
         for peak, answer in zip(picked.peaks, picked.answers, strict=True)
     ]
-    named: dict[int, tuple[str, float]] = {}
+    stated_labels: dict[int, tuple[str, float]] = {}
     if labels is not None:
         for number, chances in zip(numbers, labels.probabilities, strict=True):
-            peaks[number] = _labelled(peaks[number], chances)
-        named = _each_once({number: labels.stated(i) for i, number in enumerate(numbers)})
-    remarks += moved_between_hits(peaks, picked.spectra.duration)
+            peaks[number] = _with_labels(peaks[number], chances)
+        stated_labels = _surest_labels({number: labels.stated(i) for i, number in enumerate(numbers)})
+    remarks += moved_hit_remarks(peaks, picked.spectra.duration)
     text = fragment_text(
         peaks,
-        named,
+        stated_labels,
         picked.spectra,
         files=names,
         name="" if prepared is None else prepared.board.setups[0].name,
@@ -273,23 +295,25 @@ def _summary(
     )
 
 
-def _labelled(peak: PickedRow, chances: Mapping[str, float]) -> PickedRow:
+def _with_labels(peak: PickedRow, chances: Mapping[str, float]) -> PickedRow:
     """A peak with its most probable labels."""
-    listed = [LabelChance(*one) for one in chances.items() if one[1] >= _LEAST_LABEL][:_MOST_LABELS]
-    return replace(peak, labels=tuple(listed), unlabelled_probability=max(1.0 - sum(chances.values()), 0.0))
+    label_chances = [LabelChance(*entry) for entry in chances.items() if entry[1] >= _LEAST_LABEL][:_MOST_LABELS]
+    return replace(peak, labels=tuple(label_chances), unlabelled_probability=max(1.0 - sum(chances.values()), 0.0))
 
 
-def _each_once(stated: Mapping[int, tuple[str, float] | None]) -> dict[int, tuple[str, float]]:
-    """Each label for the peak that it is surest of."""
-    named = {number: one for number, one in stated.items() if one is not None}
-    surest = {label: number for number, (label, _) in sorted(named.items(), key=lambda one: (one[1][1], -one[0]))}
-    return {number: one for number, one in named.items() if surest[one[0]] == number}
+def _surest_labels(stated_labels: Mapping[int, tuple[str, float] | None]) -> dict[int, tuple[str, float]]:
+    """Each label for the peak where its confidence is highest."""
+    labels = {number: label for number, label in stated_labels.items() if label is not None}
+    surest = {
+        label: number for number, (label, _) in sorted(labels.items(), key=lambda entry: (entry[1][1], -entry[0]))
+    }
+    return {number: label for number, label in labels.items() if surest[label[0]] == number}
 
 
-def _write(folder: Path, targets: Sequence[Path], summary: PickReport, picked: Picked) -> None:
+def _write(folder: Path, targets: Sequence[Path], summary: PickReport, picked: PickedModes) -> None:
     from bayesplate.report.recordings import write_recordings_page
 
-    make_folder(folder / FIGURES)
+    make_folder(folder / FIGURES_FOLDER)
     fragment, _, numbers = targets
     write_text(fragment, summary.fragment)
     write_text(numbers, json_text(summary))

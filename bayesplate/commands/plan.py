@@ -12,43 +12,43 @@ from typing import Annotated, Any
 from bayesplate.board.board import Board
 from bayesplate.board.campaign import CampaignCard
 from bayesplate.board.words import EFFECT_NAMES
-from bayesplate.campaign.shared import Shared
-from bayesplate.commands.arguments import checked
-from bayesplate.commands.campaign import Campaign, by_kind
+from bayesplate.campaign.shared import SharedParameter
+from bayesplate.commands.arguments import check_arguments
+from bayesplate.commands.campaign import Campaign, dispatch_card
 from bayesplate.commands.fitting import Stages
-from bayesplate.commands.options import CARD, Between, Effects, Force, Goal, Minutes, OnProgress, Out, Seed
-from bayesplate.commands.prepare import Card, Prepared
+from bayesplate.commands.options import CARD, Effects, Force, Goal, Minutes, OnProgress, Out, RivalEffects, Seed
+from bayesplate.commands.prepare import CardSource, PreparedBoard
 from bayesplate.commands.problem import Problem
-from bayesplate.commands.shown import Shown, show_plan
+from bayesplate.commands.shown import Printout, show_plan
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.hypotheses import RELABELLING
 from bayesplate.diagnosis.joint import full_search
-from bayesplate.diagnosis.verdict import WITHIN
+from bayesplate.diagnosis.verdict import ALTERNATIVE_FACTOR
 from bayesplate.effects import effect_faults
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
-from bayesplate.files import make_folder, require_new, write_text
+from bayesplate.files import make_folder, require_new_files, write_text
 from bayesplate.planning.beliefs import Beliefs, prior_beliefs
-from bayesplate.planning.bench import Bench, drawn_up
-from bayesplate.planning.explained import asked, believed, surviving
+from bayesplate.planning.bench import Bench, draw_up_plan
+from bayesplate.planning.explained import explanations_of_effects, search_beliefs, survivors_by_support
 from bayesplate.planning.gains import EXPLANATIONS
 from bayesplate.planning.plan import Plan
-from bayesplate.planning.proposals import BELIEFS, Costs, Planner
-from bayesplate.planning.together import beliefs_together
+from bayesplate.planning.proposals import BELIEFS_STREAM, Costs, Planner
+from bayesplate.planning.together import campaign_beliefs
 from bayesplate.report.plots import PlanPlots
 from bayesplate.results.contract import json_text
-from bayesplate.results.folder import DIAGNOSIS
-from bayesplate.streams import stream
+from bayesplate.results.folder import DIAGNOSIS_FILE
+from bayesplate.streams import random_stream
 
-PLAN = "plan.json"
-_GAINS, _BENCH = "plan", "plan-bench"
-_POSE, _SEARCH, _PLAN = 1.0, 12.0, 4.0
-"""How long the parts take beside each other."""
+PLAN_FILE = "plan.json"
+_GAINS_STEM, _BENCH_STEM = "plan", "plan-bench"
+_POSE_TIME, _SEARCH_TIME, _PLAN_TIME = 1.0, 12.0, 4.0
+"""Times of the stages, relative to each other."""
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PlanResult:
-    """What `plan` leaves.
+    """Result of `plan`.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class PlanResult:
     def __repr__(self) -> str:
         return repr(self.summary).replace("<Plan", "<PlanResult", 1)
 
-    def shown(self) -> Shown:
+    def shown(self) -> Printout:
         """Tables and sentences for a person."""
         return show_plan(self.summary)
 
@@ -80,13 +80,13 @@ class PlanResult:
         return self.shown().html(self.summary.title or self.summary.name)
 
 
-@checked()
+@check_arguments()
 def plan(
-    card: Annotated[Problem | Card | Campaign, CARD],
+    card: Annotated[Problem | CardSource | Campaign, CARD],
     *,
     goal: Goal = None,
     costs: Minutes = None,
-    between: Between = None,
+    between: RivalEffects = None,
     out: Out = None,
     effects: Effects = None,
     seed: Seed = 1,
@@ -118,7 +118,7 @@ def plan(
     force : bool
         Replace files that are there.
     progress : callable, optional
-        Told when a part begins.
+        Called when a stage begins.
 
     Returns
     -------
@@ -132,43 +132,51 @@ def plan(
         If explanations are to be told apart on a board whose frequencies do not even tell the constants.
     """
     folder = None if out is None else Path(out)
-    asked = by_kind(
+    request = dispatch_card(
         card,
-        lambda problem: _Asked(
-            problem.board, (problem,), (), partial(_of_board, problem, goal, between, seed, folder, progress)
+        lambda problem: _PlanRequest(
+            problem.board, (problem,), (), partial(_board_beliefs, problem, goal, between, seed, folder, progress)
         ),
-        lambda campaign: _Asked(
-            campaign.card, campaign.problems, campaign.shared, partial(_of_campaign, campaign, goal, between, progress)
+        lambda campaign: _PlanRequest(
+            campaign.card,
+            campaign.problems,
+            campaign.shared,
+            partial(_campaign_beliefs, campaign, goal, between, progress),
         ),
         effects=effects,
         may_lack_frequencies=True,
     )
-    files = () if folder is None else require_new(folder, _names(), force=force)
-    planner = Planner(asked.believed(), seed, goal, Costs(**(costs or {})))
-    named, priors = asked.card, [one.prior for one in asked.problems]
-    made, drawn = drawn_up(planner, named.name, named.title, named.sha256, priors, asked.shared)
+    files = () if folder is None else require_new_files(folder, _file_names(), force=force)
+    planner = Planner(request.believed(), seed, goal, Costs(**(costs or {})))
+    planned_card, priors = request.card, [problem.prior for problem in request.problems]
+    new_plan, benches = draw_up_plan(
+        planner, planned_card.name, planned_card.title, planned_card.sha256, priors, request.shared
+    )
     if folder is not None:
-        _write(made, drawn, folder, files)
-    return PlanResult(made, drawn, tuple(path for path in files if path.exists()))
+        _write(new_plan, benches, folder, files)
+    return PlanResult(new_plan, benches, tuple(path for path in files if path.exists()))
 
 
 @dataclass(frozen=True)
-class _Asked:
-    """A board or a campaign that is planned, and the function that makes its beliefs."""
+class _PlanRequest:
+    """A board or a campaign whose measurements are planned, and the function that computes its beliefs."""
 
     card: Board | CampaignCard
     problems: Sequence[Problem]
-    shared: Sequence[Shared]
+    shared: Sequence[SharedParameter]
     believed: Callable[[], Beliefs]
 
 
-def _names() -> list[str]:
+def _file_names() -> list[str]:
     """Files that a plan may write."""
-    return [PLAN, *(f"{stem}.{ending}" for stem in (_GAINS, _BENCH, f"{_BENCH}-2") for ending in ("png", "svg"))]
+    return [
+        PLAN_FILE,
+        *(f"{stem}.{ending}" for stem in (_GAINS_STEM, _BENCH_STEM, f"{_BENCH_STEM}-2") for ending in ("png", "svg")),
+    ]
 
 
-def _of_board(
-    given: Problem,
+def _board_beliefs(
+    problem: Problem,
     goal: str | None,
     between: Sequence[str] | None,
     seed: int,
@@ -176,68 +184,72 @@ def _of_board(
     progress: OnProgress,
 ) -> Beliefs:
     """Beliefs of a board: from a search, from a finished diagnosis, or from the prior."""
-    prepared, rng = given.prepared, stream(seed, BELIEFS)
+    prepared, rng = problem.prepared, random_stream(seed, BELIEFS_STREAM)
     board, prior = prepared.board, prepared.prior
     if between is not None:
-        _require_possible(board, between)
-    stages = Stages(progress, _POSE + _SEARCH + _PLAN)
-    stages.begin("estimate", _POSE)
-    asks_of_effects = between is not None or goal == EXPLANATIONS
+        _require_rivals(board, between)
+    stages = Stages(progress, _POSE_TIME + _SEARCH_TIME + _PLAN_TIME)
+    stages.begin("estimate", _POSE_TIME)
+    needs_frequencies = between is not None or goal == EXPLANATIONS
     if not any(setup.readings or setup.peaks for setup in board.setups):
-        if asks_of_effects:
-            raise InputError(_untold("between" if between else "goal", "a board without any"))
+        if needs_frequencies:
+            raise InputError(_frequencies_fault("between" if between else "goal", "a board without any"))
         return prior_beliefs(board, prior, rng)
     try:
         baseline = baseline_of(Problem(prepared).posed)
     except NotIdentifiableError as error:
-        if asks_of_effects:
+        if needs_frequencies:
             raise
         return prior_beliefs(board, prior, rng, (f"planned from the prior alone: {error}",))
-    finished = None if folder is None or between else _finished(folder, prepared)
-    tried = between or (None if finished is None else sorted({name for one in finished.support for name in one}))
-    stages.begin("search for effects", _SEARCH)
-    _, searched = full_search(baseline, tried, stages.reached)
-    stages.begin("gains of further readings", _PLAN)
-    among = None
+    finished = None if folder is None or between else _read_diagnosis(folder, prepared)
+    tried_effects = between or (
+        None if finished is None else sorted({name for members in finished.support for name in members})
+    )
+    stages.begin("search for effects", _SEARCH_TIME)
+    _, search = full_search(baseline, tried_effects, stages.reached)
+    stages.begin("gains of further readings", _PLAN_TIME)
+    hypotheses = None
     if between:
-        among = asked(searched, between)
+        hypotheses = explanations_of_effects(search, between)
     elif finished is not None:
-        among = surviving(searched, finished.support, finished.none, finished.rivals)
-    return believed(searched, prior, rng, among)
+        hypotheses = survivors_by_support(search, finished.support, finished.none, finished.rivals)
+    return search_beliefs(search, prior, rng, hypotheses)
 
 
-def _of_campaign(campaign: Campaign, goal: str | None, between: Sequence[str] | None, progress: OnProgress) -> Beliefs:
+def _campaign_beliefs(
+    campaign: Campaign, goal: str | None, between: Sequence[str] | None, progress: OnProgress
+) -> Beliefs:
     """Beliefs of several boards and of what they share: effects are not searched for."""
     if between is not None:
-        raise InputError(_untold("between", "a campaign"))
+        raise InputError(_frequencies_fault("between", "a campaign"))
     if goal == EXPLANATIONS:
         wanted = "E_x, E_y, G_xy or constants for a campaign, or none for what its boards share"
         raise InputError(Fault("goal", wanted, EXPLANATIONS, "plan one of its boards to tell explanations apart"))
-    stages = Stages(progress, _SEARCH + _PLAN)
-    stages.begin("boards of the campaign", _SEARCH)
-    boards = [one.prepared.board for one in campaign.problems]
-    priors = [one.prior for one in campaign.problems]
-    beliefs = beliefs_together(boards, priors, campaign.shared, stages.reached)
-    stages.begin("gains of further readings", _PLAN)
+    stages = Stages(progress, _SEARCH_TIME + _PLAN_TIME)
+    stages.begin("boards of the campaign", _SEARCH_TIME)
+    boards = [problem.prepared.board for problem in campaign.problems]
+    priors = [problem.prior for problem in campaign.problems]
+    beliefs = campaign_beliefs(boards, priors, campaign.shared, stages.reached)
+    stages.begin("gains of further readings", _PLAN_TIME)
     return beliefs
 
 
-def _untold(place: str, got: str) -> Fault:
+def _frequencies_fault(place: str, got: str) -> Fault:
     """The fault that explanations cannot be told apart."""
     return Fault(place, "the frequencies of a board, by which effects are told apart", got)
 
 
-def _require_possible(board: Board, between: Sequence[str]) -> None:
+def _require_rivals(board: Board, between: Sequence[str]) -> None:
     """Refuse effects that cannot be told apart: those that cannot act on the board, and those that it declares."""
     faults = [Fault("between", "effects that are not declared", name) for name in between if name in board.effects]
-    others = replace(board, effects=tuple(name for name in between if name not in board.effects))
-    faults += [Fault("between", one.wanted, one.got) for one in effect_faults(others)]
+    undeclared = replace(board, effects=tuple(name for name in between if name not in board.effects))
+    faults += [Fault("between", fault.wanted, fault.got) for fault in effect_faults(undeclared)]
     if faults:
         raise InputError(faults)
 
 
 @dataclass(frozen=True)
-class _Finished:
+class _FinishedDiagnosis:
     """Probabilities of the answers of a finished diagnosis that may survive, and that of no effect."""
 
     support: Mapping[tuple[str, ...], float]
@@ -245,36 +257,42 @@ class _Finished:
     rivals: frozenset[tuple[str, ...]]
 
 
-def _finished(folder: Path, prepared: Prepared) -> _Finished | None:
+def _read_diagnosis(folder: Path, prepared: PreparedBoard) -> _FinishedDiagnosis | None:
     """The diagnosis of the same card in a folder; None if there is none, or it explains nothing."""
     try:
-        told: dict[str, Any] = json.loads((folder / DIAGNOSIS).read_text(encoding="utf-8"))
-        same = told["card_sha256"] == prepared.card.sha256 and tuple(told["declared"]) == prepared.board.effects
-        if not same or told["verdict"] == "unexplained":
+        diagnosis: dict[str, Any] = json.loads((folder / DIAGNOSIS_FILE).read_text(encoding="utf-8"))
+        is_same = (
+            diagnosis["card_sha256"] == prepared.card.sha256 and tuple(diagnosis["declared"]) == prepared.board.effects
+        )
+        if not is_same or diagnosis["verdict"] == "unexplained":
             return None
-        support = {tuple(one["effects"]): float(one["probability"]) for one in told["answers"]}
-        none = float(told["probability_of_none"])
-        listed = told["effects"] if told["verdict"] == "indistinguishable group" else ()
-        named = {name for one in (*support, listed) for name in one}
+        support = {tuple(answer["effects"]): float(answer["probability"]) for answer in diagnosis["answers"]}
+        p_none = float(diagnosis["probability_of_none"])
+        listed_effects = diagnosis["effects"] if diagnosis["verdict"] == "indistinguishable group" else ()
+        effect_names = {name for members in (*support, listed_effects) for name in members}
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
-    is_altered = not all(0.0 <= one <= 1.0 + _ROUNDING for one in (*support.values(), none))
-    if is_altered or not named <= {*EFFECT_NAMES, RELABELLING}:
+    is_altered = not all(0.0 <= probability <= 1.0 + _ROUNDING for probability in (*support.values(), p_none))
+    if is_altered or not effect_names <= {*EFFECT_NAMES, RELABELLING}:
         return None
     highest = max(support.values(), default=0.0)
-    rivals = frozenset(members for members in support if members and set(members) <= set(listed))
-    near = {one: p for one, p in support.items() if one and p > 0.0 and (WITHIN * p >= highest or one in rivals)}
-    return _Finished(near, none, rivals) if near else None
+    rivals = frozenset(members for members in support if members and set(members) <= set(listed_effects))
+    survivors = {
+        members: p
+        for members, p in support.items()
+        if members and p > 0.0 and (ALTERNATIVE_FACTOR * p >= highest or members in rivals)
+    }
+    return _FinishedDiagnosis(survivors, p_none, rivals) if survivors else None
 
 
-def _write(made: Plan, drawn: Sequence[Bench], folder: Path, files: Sequence[Path]) -> None:
+def _write(new_plan: Plan, benches: Sequence[Bench], folder: Path, files: Sequence[Path]) -> None:
     from bayesplate.report.planning import bench_sheet, gains_picture
-    from bayesplate.report.saving import drawing, save_figure
+    from bayesplate.report.saving import matplotlib_defaults, save_figure
 
     make_folder(folder)
-    write_text(files[0], json_text(made))
-    with drawing():
-        figures = [gains_picture(made).figure, *(bench_sheet(one) for one in drawn)]
+    write_text(files[0], json_text(new_plan))
+    with matplotlib_defaults():
+        figures = [gains_picture(new_plan).figure, *(bench_sheet(bench) for bench in benches)]
         for i, figure in enumerate(figures):
             for path in files[1 + 2 * i : 3 + 2 * i]:
                 save_figure(figure, path)

@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.prior import PriorCard
-from bayesplate.board.sessions import sessions
+from bayesplate.board.sessions import session_groups
 from bayesplate.board.values import Key
-from bayesplate.commands.arguments import checked, or_none, read_prior
+from bayesplate.commands.arguments import check_arguments, optional_reader, read_prior
 from bayesplate.commands.options import CARD, Effects, Law, Robust, SetupFile
-from bayesplate.commands.prepare import Card, Prepared, prepare
+from bayesplate.commands.prepare import CardSource, PreparedBoard, prepare
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.parameters import Parameters
@@ -28,7 +28,7 @@ from bayesplate.posterior.target import Posterior
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Problem:
-    """What is to be inferred of a board: densities, frequencies and the prior, as any sampler asks for them.
+    """The inference of a board's constants: densities, frequencies and the prior, as any sampler asks for them.
 
     theta holds, in the order of `names`: ln D_x, ln D_y, ln D_s (N m), of an isotropic board ln D alone (D_x = D_y = D
     and D_s = 2 (1 - nu) D); ln of the relative noise, one per setup; and one standard coordinate z per uncertain input
@@ -39,7 +39,7 @@ class Problem:
 
     Attributes
     ----------
-    prepared : Prepared
+    prepared : PreparedBoard
         The card, the prior and the board.
     asked_law : "linear", "exact" or None
         None: the linear law where it is good enough.
@@ -54,17 +54,17 @@ class Problem:
     ('log_D_x', 'log_D_y', 'log_D_s', 'log_noise[clamped]')
     """
 
-    prepared: Prepared
+    prepared: PreparedBoard
     asked_law: LawName | None = None
     robust: bool = False
 
     @classmethod
-    @checked()
+    @check_arguments()
     def from_card(
         cls,
-        card: Annotated[Card, CARD],
+        card: Annotated[CardSource, CARD],
         effects: Effects = None,
-        prior: Annotated[str | os.PathLike[str] | PriorCard | None, Key(or_none(read_prior))] = None,
+        prior: Annotated[str | os.PathLike[str] | PriorCard | None, Key(optional_reader(read_prior))] = None,
         law: Law = None,
         robust: Robust = False,
         setup: SetupFile = None,
@@ -108,13 +108,13 @@ class Problem:
         return self.prepared.prior
 
     @cached_property
-    def _sampled(self) -> Board:
+    def _sampled_board(self) -> Board:
         """The board whose parameters are sampled; sessions share some by their labels, which posing may propose."""
-        return self.posed.board if sessions(self.prepared.board) else self.prepared.board
+        return self.posed.board if session_groups(self.prepared.board) else self.prepared.board
 
     @cached_property
     def _parameters(self) -> Parameters:
-        return Parameters(self._sampled)
+        return Parameters(self._sampled_board)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -148,9 +148,9 @@ class Problem:
         return self.posed.posterior.law
 
     @cached_property
-    def _prior(self) -> Posterior:
+    def _prior_density(self) -> Posterior:
         """The prior alone, for which no plate has to be solved but those of sessions."""
-        return Posterior(self._sampled, self.prior, (), self.asked_law or "exact", self.robust)
+        return Posterior(self._sampled_board, self.prior, (), self.asked_law or "exact", self.robust)
 
     def log_prob(self, theta: ArrayLike) -> Floats:
         """Log density of the posterior, up to a constant: `log_prior` plus `log_likelihood`.
@@ -164,7 +164,7 @@ class Problem:
         number or (n,) array
             -inf outside the prior.
         """
-        return self._by_point(self.posed.posterior, theta, ())
+        return self._evaluate(self.posed.posterior, theta, ())
 
     def log_prior(self, theta: ArrayLike) -> Floats:
         """Log density of the prior, of the columns of theta.
@@ -178,7 +178,7 @@ class Problem:
         number or (n,) array
             -inf outside the bounds, and where no material exists: nu_xy nu_yx >= 1.
         """
-        return self._by_point(self._prior.log_prior, theta, ())
+        return self._evaluate(self._prior_density.log_prior, theta, ())
 
     def log_likelihood(self, theta: ArrayLike) -> Floats:
         """Log probability of all readings.
@@ -193,7 +193,7 @@ class Problem:
             -inf where the prior is zero, never not-a-number.
         """
         posterior = self.posed.posterior
-        return self._by_point(lambda rows: posterior.log_likelihood(rows).sum(axis=1), theta, ())
+        return self._evaluate(lambda rows: posterior.log_likelihood(rows).sum(axis=1), theta, ())
 
     def predict(self, theta: ArrayLike) -> Floats:
         """Frequencies of the labelled modes, without noise, under the law of the problem.
@@ -213,10 +213,10 @@ class Problem:
         posterior = self.posed.posterior
 
         def hertz(rows: Floats) -> Floats:
-            stated = zip(posterior.log_frequencies(rows), self.board.setups, strict=True)
-            return np.exp(np.concatenate([part[:, : len(setup.readings)] for part, setup in stated], axis=1))
+            by_setup = zip(posterior.log_frequencies(rows), self.board.setups, strict=True)
+            return np.exp(np.concatenate([columns[:, : len(setup.readings)] for columns, setup in by_setup], axis=1))
 
-        return self._by_point(hertz, theta, (len(self.labels),), outside=np.nan)
+        return self._evaluate(hertz, theta, (len(self.labels),), outside=np.nan)
 
     def prior_transform(self, u: ArrayLike) -> Floats:
         """Points of the unit cube as points under the prior, as nested samplers ask for them.
@@ -235,13 +235,13 @@ class Problem:
             outside = rows[~((rows >= 0.0) & (rows <= 1.0))][0]
             raise InputError(Fault("u", "numbers from 0 to 1", f"{outside:g}"))
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            theta = self._prior.prior_transform(rows)
+            theta = self._prior_density.prior_transform(rows)
         return theta if np.ndim(u) == 2 else theta[0]
 
     def __repr__(self) -> str:
         setups = ", ".join(setup.name for setup in self.board.setups)
-        told = f"{len(self.labels)} readings ({setups}), {self.n_dim} parameters, prior {self.prior.name}"
-        return f"<Problem of {self.board.name}: {told}>"
+        description = f"{len(self.labels)} readings ({setups}), {self.n_dim} parameters, prior {self.prior.name}"
+        return f"<Problem of {self.board.name}: {description}>"
 
     def _rows(self, name: str, points: ArrayLike) -> Floats:
         """Points as rows: (n, n_dim) array."""
@@ -254,37 +254,37 @@ class Problem:
             raise InputError(Fault(name, wanted, f"one of shape {array.shape}"))
         return np.atleast_2d(array)
 
-    def _by_point(
-        self, of: Callable[[Floats], Floats], theta: ArrayLike, shape: tuple[int, ...], outside: float = -np.inf
+    def _evaluate(
+        self, function: Callable[[Floats], Floats], theta: ArrayLike, shape: tuple[int, ...], outside: float = -np.inf
     ) -> Floats:
-        """A function of the points where the prior is not zero, and what stands for it elsewhere."""
+        """The values of a function at the points where the prior is not zero, and `outside` elsewhere."""
         rows = self._rows("theta", theta)
-        found = np.full((len(rows), *shape), outside)
+        values = np.full((len(rows), *shape), outside)
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             inside: NDArray[np.bool_] = np.asarray(np.isfinite(rows).all(axis=1))
-            inside[inside] = np.isfinite(self._prior.log_prior(rows[inside]))
+            inside[inside] = np.isfinite(self._prior_density.log_prior(rows[inside]))
             if inside.any():
-                found[inside] = of(rows[inside])
-        found[np.isnan(found)] = outside
-        return found if np.ndim(theta) == 2 else found[0][()]
+                values[inside] = function(rows[inside])
+        values[np.isnan(values)] = outside
+        return values if np.ndim(theta) == 2 else values[0][()]
 
 
 def pose_all(problems: Sequence[Problem]) -> None:
     """Solve boards around their estimates before anything is sampled; NotIdentifiableError names all that fail."""
-    told = []
+    failures = []
     for problem in problems:
         try:
             _ = problem.posed
         except NotIdentifiableError as error:
             if len(problems) == 1:
                 raise
-            told.append(f"{problem.board.name}: {error}")
-    if told:
-        raise NotIdentifiableError("\n".join(told))
+            failures.append(f"{problem.board.name}: {error}")
+    if failures:
+        raise NotIdentifiableError("\n".join(failures))
 
 
 def as_problem(
-    given: Problem | Card,
+    given: Problem | CardSource,
     *,
     effects: Sequence[str] | None = None,
     law: LawName | None = None,
@@ -292,12 +292,12 @@ def as_problem(
     setup: str | os.PathLike[str] | None = None,
     may_lack_frequencies: bool = False,
 ) -> Problem:
-    """What a command was given, as a problem; raises InputError for a Problem beside what it states itself."""
+    """The card of a command as a problem; raises InputError for a Problem with options that it states itself."""
     if not isinstance(given, Problem):
         prepared = prepare(given, effects, setup=setup, may_lack_frequencies=may_lack_frequencies)
         return Problem(prepared, law, robust)
-    told = {"effects": effects is not None, "law": law is not None, "robust": robust, "setup": setup is not None}
-    if any(told.values()):
-        stated = ", ".join(name for name, is_told in told.items() if is_told)
-        raise InputError(Fault(stated, "nothing beside a Problem", "a value", "Problem.from_card takes it"))
+    is_stated = {"effects": effects is not None, "law": law is not None, "robust": robust, "setup": setup is not None}
+    if any(is_stated.values()):
+        names = ", ".join(name for name, is_given in is_stated.items() if is_given)
+        raise InputError(Fault(names, "nothing beside a Problem", "a value", "Problem.from_card takes it"))
     return given

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bayesplate.campaign.diagnosis import CampaignDiagnosis, claim_sentence
+from bayesplate.campaign.diagnosis import CampaignDiagnosis, campaign_claim_sentence
 from bayesplate.campaign.summary import CampaignCheck, CampaignSummary
 from bayesplate.campaign.tables import campaign_check_tables, campaign_tables, diagnosis_tables
 from bayesplate.diagnosis.result import Diagnosis
@@ -33,7 +33,7 @@ from bayesplate.results.contract import json_text as json_text
 from bayesplate.results.fit_tables import fitted_constants, modes_table, peaks_table
 from bayesplate.results.sheets import ModesReport
 from bayesplate.results.summary import Summary
-from bayesplate.results.tables import Table, notebook, render
+from bayesplate.results.tables import Table, notebook_html, render
 from bayesplate.results.words import percent, two_digits
 
 PLAN_REMARK = (
@@ -45,8 +45,8 @@ NOTHING_HELPS = "nothing that was looked at would help by a twentieth"
 
 
 @dataclass(frozen=True)
-class Shown:
-    """What is printed: tables, what the data tell weakly, warnings, and a closing sentence."""
+class Printout:
+    """What a command prints: tables, remarks, warnings, and a closing sentence."""
 
     tables: tuple[Table, ...]
     remarks: tuple[str, ...]
@@ -55,27 +55,27 @@ class Shown:
 
     def html(self, heading: str) -> str:
         """The same for a notebook, under a heading."""
-        return notebook(heading, (*self.remarks, *self.warnings, self.closing), self.tables)
+        return notebook_html(heading, (*self.remarks, *self.warnings, self.closing), self.tables)
 
     def printed(self, width: int, *, styled: bool) -> str:
-        """The same for a terminal of so many columns, which may know bold letters."""
+        """The same for a terminal of `width` columns, with bold letters where `styled`."""
         sentences = (*(f"- {text}" for text in self.remarks), *(f"! {text}" for text in self.warnings), self.closing)
-        parts: tuple[Table | str, ...] = (*self.tables, *sentences)
-        return "".join(render(one, "terminal", width=width, styled=styled) for one in parts)
+        blocks: tuple[Table | str, ...] = (*self.tables, *sentences)
+        return "".join(render(block, "terminal", width=width, styled=styled) for block in blocks)
 
 
-def show_campaign_check(report: CampaignCheck) -> Shown:
+def show_campaign_check(report: CampaignCheck) -> Printout:
     """What `check` finds of a campaign."""
-    notes = tuple(f"{name}: {note}" for name, one in report.boards.items() for note in one.notes)
-    n_doubts = sum(one.n_doubts for one in report.boards.values())
+    notes = tuple(f"{name}: {note}" for name, board in report.boards.items() for note in board.notes)
+    n_doubts = sum(board.n_doubts for board in report.boards.values())
     closing = f"nothing was sampled. bayesplate check tells more of each board. {_next_after_check(n_doubts)}"
-    return Shown(campaign_check_tables(report), (), notes, closing)
+    return Printout(campaign_check_tables(report), (), notes, closing)
 
 
-def show_check(report: CheckReport) -> Shown:
+def show_check(report: CheckReport) -> Printout:
     """What `check` finds of a board."""
     closing = f"{report.law} law; nothing was sampled. {_next_after_check(report.n_doubts)}"
-    return Shown(check_tables(report), (*report.identifiability, report.invisible), report.notes, closing)
+    return Printout(check_tables(report), (*report.identifiability, report.invisible), report.notes, closing)
 
 
 def _next_after_check(n_doubts: int) -> str:
@@ -84,14 +84,16 @@ def _next_after_check(n_doubts: int) -> str:
     return f"Next: settle what is in doubt above; then {fit}" if n_doubts else f"Next: {fit}"
 
 
-def show_fit(summary: Summary) -> Shown:
+def show_fit(summary: Summary) -> Printout:
     """The summary of a fitted board."""
     peaks = peaks_table(summary)
     tables = (fitted_constants(summary), modes_table(summary), *([peaks] if peaks else []))
     error, model = summary.error, summary.model
     left_out = error.leave_one_out_rms_cents
     several = len(summary.noise) > 1
-    noise = ", ".join(f"{percent(one.q50, 2)}" + f" in {setup}" * several for setup, one in summary.noise.items())
+    noise = ", ".join(
+        f"{percent(interval.q50, 2)}" + f" in {setup}" * several for setup, interval in summary.noise.items()
+    )
     effects = f" with {effect_names(model.effects)}" if model.effects else ""
     kind = "isotropic, " if model.isotropic else ""
     closing = (
@@ -100,85 +102,88 @@ def show_fit(summary: Summary) -> Shown:
         + (f"{left_out:.1f} left out" if left_out is not None else summary.why_no_left_out)
         + f"; noise {noise}; the linear law is off by {two_digits(error.linearisation_rms_cents)} cents."
     )
-    return Shown(tables, summary.identifiability, summary.warnings, closing)
+    return Printout(tables, summary.identifiability, summary.warnings, closing)
 
 
-def show_campaign_fit(summary: CampaignSummary) -> Shown:
+def show_campaign_fit(summary: CampaignSummary) -> Printout:
     """The summary of a fitted campaign."""
-    told = tuple(f"{name}: {note}" for name, one in summary.boards.items() for note in one.warnings)
-    errors = [one.error.in_sample_rms_cents for one in summary.boards.values()]
+    board_warnings = tuple(f"{name}: {note}" for name, board in summary.boards.items() for note in board.warnings)
+    errors = [board.error.in_sample_rms_cents for board in summary.boards.values()]
     pooled = (sum(error**2 for error in errors) / len(errors)) ** 0.5
     closing = f"{len(errors)} boards; error rms {pooled:.1f} cents in sample, each board counted once."
-    return Shown(campaign_tables(summary), (), (*summary.warnings, *told), closing)
+    return Printout(campaign_tables(summary), (), (*summary.warnings, *board_warnings), closing)
 
 
-def show_batch(summary: BatchSummary, grading: Grading) -> Shown:
+def show_batch(summary: BatchSummary, grading: Grading) -> Printout:
     """The result of `batch`."""
     aside = tuple(f"{file} is a card of another kind and was left aside" for file in summary.aside)
     closing = f"{summary.n_fitted} of {summary.n_boards} boards fitted."
     tables = tuple(table for name, table in grading_tables(grading, MOST_ON_TERMINAL).items() if name != "makers")
     in_doubt = doubts_sentence(grading)
-    return Shown(tables, aside, (in_doubt,) if in_doubt else (), closing)
+    return Printout(tables, aside, (in_doubt,) if in_doubt else (), closing)
 
 
-def show_compare(comparison: Comparison) -> Shown:
+def show_compare(comparison: Comparison) -> Printout:
     """The result of `compare`."""
     theories = comparison.theories
-    tables = [table for one in theories for table in (methods_table(comparison.name, one), forward_table(one))]
-    told: dict[str, list[str]] = {}
-    for one in theories:
-        for origin in one.coefficients:
-            setup = f", setup {origin.setup}" if len(one.coefficients) > 1 else ""
-            told.setdefault(origin.sentence, []).append(one.theory + setup)
-    remarks = [f"coefficients of paper and percentile ({', '.join(where)}): {text}" for text, where in told.items()]
+    tables = [table for theory in theories for table in (methods_table(comparison.name, theory), forward_table(theory))]
+    theories_by_source: dict[str, list[str]] = {}
+    for theory in theories:
+        for origin in theory.coefficients:
+            setup = f", setup {origin.setup}" if len(theory.coefficients) > 1 else ""
+            theories_by_source.setdefault(origin.sentence, []).append(theory.theory + setup)
+    remarks = [
+        f"coefficients of paper and percentile ({', '.join(theory_names)}): {source}"
+        for source, theory_names in theories_by_source.items()
+    ]
     carrying = carrying_sentence(comparison.carrying_modes)
-    told_last = (METHODS_REMARK, *([carrying] if carrying else []))
-    return Shown(tuple(tables), (*remarks, *told_last), (), comparison.verdict.sentence)
+    last_remarks = (METHODS_REMARK, *([carrying] if carrying else []))
+    return Printout(tuple(tables), (*remarks, *last_remarks), (), comparison.verdict.sentence)
 
 
-def show_campaign_diagnosis(diagnosis: CampaignDiagnosis) -> Shown:
+def show_campaign_diagnosis(diagnosis: CampaignDiagnosis) -> Printout:
     """The diagnosis of a campaign."""
-    told = tuple(one for one in (diagnosis.reason, diagnosis.recommendation) if one)
-    return Shown(diagnosis_tables(diagnosis), told, diagnosis.notes, claim_sentence(diagnosis))
+    remarks = tuple(sentence for sentence in (diagnosis.reason, diagnosis.recommendation) if sentence)
+    return Printout(diagnosis_tables(diagnosis), remarks, diagnosis.notes, campaign_claim_sentence(diagnosis))
 
 
-def show_diagnosis(diagnosis: Diagnosis) -> Shown:
+def show_diagnosis(diagnosis: Diagnosis) -> Printout:
     """The diagnosis of a board."""
-    told = (
+    sentences = (
         *known_sentences(diagnosis),
         carrying_words(diagnosis),
         *diagnosis.sentences,
         alike_sentence(diagnosis),
         diagnosis.recommendation,
     )
-    remarks = tuple(sentence for sentence in told if sentence)
-    return Shown(every_table(diagnosis), remarks, tuple(warnings(diagnosis)), verdict_sentence(diagnosis))
+    remarks = tuple(sentence for sentence in sentences if sentence)
+    return Printout(every_table(diagnosis), remarks, tuple(warnings(diagnosis)), verdict_sentence(diagnosis))
 
 
-def show_modes(report: ModesReport) -> Shown:
+def show_modes(report: ModesReport) -> Printout:
     """The report of `modes`."""
     files = f"; sheet to print: {', '.join(report.files)}" if report.files else ""
-    return Shown(sheet_tables(report), proposal_remarks(report), report.notes, f"Frequencies {report.basis}{files}")
+    return Printout(sheet_tables(report), proposal_remarks(report), report.notes, f"Frequencies {report.basis}{files}")
 
 
-def show_plan(plan: Plan) -> Shown:
+def show_plan(plan: Plan) -> Printout:
     """The result of `plan`."""
     remarks = (PLAN_REMARK, SEEN_REMARK) if plan.bench else (PLAN_REMARK,) if plan.proposals else ()
-    return Shown(plan_tables(plan), remarks, plan.notes, plan.first or NOTHING_HELPS)
+    return Printout(plan_tables(plan), remarks, plan.notes, plan.first or NOTHING_HELPS)
 
 
 def progress_text(progress: Progress, seconds: float = 0.0) -> str:
     """Where a run stands after so many seconds, in one line: the share done, the time left, and the sampling."""
     if not progress.stage:
         return _sampling_text(progress)
-    done = progress.done or 0.0
-    left = f", about {_time_words(seconds * (1.0 - done) / done)} left" if 0.0 < done < 1.0 else ""
+    share = progress.done or 0.0
+    time_left = f", about {_time_words(seconds * (1.0 - share) / share)} left" if 0.0 < share < 1.0 else ""
     sampling = f"; {_sampling_text(progress)}" if progress.n_steps else ""
-    return f"{100.0 * done:.0f} % done{left}: {progress.stage}{sampling}"
+    return f"{100.0 * share:.0f} % done{time_left}: {progress.stage}{sampling}"
 
 
 def _time_words(seconds: float) -> str:
-    """A time as people say it."""
+    """A duration in seconds or minutes."""
     return f"{max(round(seconds), 1)} s" if seconds < 90.0 else f"{seconds / 60.0:.0f} min"
 
 

@@ -1,4 +1,4 @@
-"""Who computes the boards of a batch: processes of this machine, or a Dask cluster; few boards wait at a time."""
+"""Executors for the boards of a batch: processes of this machine, or a Dask cluster; few boards wait at a time."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from typing import Any, TypeVar
 
 from bayesplate.errors import Fault, InputError
 
-_PATIENCE = "20s"
-_PRELOADED = ("bayesplate.commands.fit_board", "scipy.stats", "scipy.sparse.linalg", "emcee", "skfem")
+_DASK_TIMEOUT = "20s"
+_PRELOADED_MODULES = ("bayesplate.commands.fit_board", "scipy.stats", "scipy.sparse.linalg", "emcee", "skfem")
 """What every fit imports, loaded once for all workers."""
 
 Key = TypeVar("Key")
@@ -28,71 +28,71 @@ class WorkerDied(Exception):
     """A worker ended without an answer: it was killed, or ran out of memory."""
 
 
-def computed(free: list[Executor], calls: Iterable[tuple[Key, Call]]) -> Iterator[tuple[Key, Future[Any]]]:
-    """Compute calls, one at a time in each executor, each given with its key when done; a worker's death costs one."""
-    under_way: dict[Future[Any], tuple[Key, Executor]] = {}
+def compute_calls(free: list[Executor], calls: Iterable[tuple[Key, Call]]) -> Iterator[tuple[Key, Future[Any]]]:
+    """Compute calls, one at a time in each executor; yields each when done, by its key. A worker's death costs one."""
+    pending: dict[Future[Any], tuple[Key, Executor]] = {}
 
-    def answers() -> Iterator[tuple[Key, Future[Any]]]:
-        done, _ = wait(under_way, return_when=FIRST_COMPLETED)
+    def finished_calls() -> Iterator[tuple[Key, Future[Any]]]:
+        done, _ = wait(pending, return_when=FIRST_COMPLETED)
         for future in done:
-            key, executor = under_way.pop(future)
+            key, executor = pending.pop(future)
             if isinstance(future.exception(), BrokenExecutor):
-                executor, future = _process(), Future()
+                executor, future = _new_process(), Future()
                 future.set_exception(WorkerDied("the worker ended without an answer: killed, or out of memory"))
             free.append(executor)
             yield key, future
 
     for key, (function, arguments) in calls:
         while not free:
-            yield from answers()
+            yield from finished_calls()
         executor = free.pop()
-        with _without_script():
+        with _hide_script():
             try:
                 future = executor.submit(function, *arguments)
             except BrokenExecutor:  # it died since its last call
-                executor = _process()
+                executor = _new_process()
                 future = executor.submit(function, *arguments)
-        under_way[future] = key, executor
-    while under_way:
-        yield from answers()
+        pending[future] = key, executor
+    while pending:
+        yield from finished_calls()
 
 
 @contextmanager
-def processes(n: int) -> Iterator[list[Executor]]:
-    """Processes of this machine, which start with their first call and end with this one however it ends."""
-    known = set(multiprocessing.active_children())
+def worker_processes(n: int) -> Iterator[list[Executor]]:
+    """Processes of this machine, which start with their first call and end with the `with` block."""
+    earlier_processes = set(multiprocessing.active_children())
     try:
-        yield [_process() for _ in range(n)]
+        yield [_new_process() for _ in range(n)]
     finally:
-        for process in set(multiprocessing.active_children()) - known:
+        for process in set(multiprocessing.active_children()) - earlier_processes:
             process.terminate()
 
 
-def _process() -> Executor:
+def _new_process() -> Executor:
     """One process that begins clean: a fork would copy threads and locks in whatever state they are."""
     methods = multiprocessing.get_all_start_methods()
     context: Any = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
     if "forkserver" in methods:
-        context.set_forkserver_preload(list(_PRELOADED))
-    return ProcessPoolExecutor(1, mp_context=context, initializer=_begin)
+        context.set_forkserver_preload(list(_PRELOADED_MODULES))
+    return ProcessPoolExecutor(1, mp_context=context, initializer=_start_worker)
 
 
-def _begin() -> None:
-    """A worker leaves interruptions to its parent, and does not outlive it."""
+def _start_worker() -> None:
+    """Start a worker: it leaves interruptions to its parent, and does not outlive it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:
 
-        def follow() -> None:
+        def exit_with_parent() -> None:
             parent.join()
             os._exit(1)
 
-        threading.Thread(target=follow, daemon=True).start()
+        threading.Thread(target=exit_with_parent, daemon=True).start()
 
 
 @contextmanager
-def _without_script() -> Iterator[None]:
-    """Workers that start here do not run the user's script, which would begin the batch again in each of them."""
+def _hide_script() -> Iterator[None]:
+    """Keep workers that start here from running the user's script, which would begin the batch again in each."""
     script = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
     try:
@@ -111,7 +111,7 @@ def dask_cluster(address: str) -> Iterator[list[Executor]]:
         remedy = 'pip install "bayesplate[dask]", here and on the cluster'
         raise InputError(Fault(place, "Dask", "no such library", remedy)) from None
     try:
-        client = Client(address, timeout=_PATIENCE, set_as_default=False)
+        client = Client(address, timeout=_DASK_TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(Fault(place, "the address of a scheduler that answers", str(error) or "no answer")) from None
     try:

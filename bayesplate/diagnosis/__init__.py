@@ -1,14 +1,15 @@
-"""From the residual of a fit to the effect that may be behind it, in four steps; a file sees those of the steps before.
+"""From the residual of a fit to the effect that may cause it, in four steps; a module imports only earlier ones.
 
-The fit that is questioned (`baseline`), and what each effect would do to its frequencies: an effect has `forms`, each
-with a law (`laws`), from which come its `signatures` and the `shifts` over all its sizes.
+Shifts. The fit without a further effect (`baseline`), and what each effect would do to its frequencies: an effect has
+`forms`, each with a law (`laws`), which gives its `signatures` and its `shifts` over all sizes.
 
-How probable the readings are: `terms` at each level of noise make the evidence of `hypotheses`, the `search` weighs
-these; `draws` and `peaks` under each, `joint` solutions of pairs, the `sensitivity` to what was assumed, `folds`
-without one mode, the `null_control`; beside it what is `known` without a search.
+Evidence. Normal `terms` at each level of noise sum to the evidence of `hypotheses`, and the `search` computes their
+probabilities. `draws` and `peaks` belong to each hypothesis; `joint` solves pairs of effects together. `sensitivity`
+varies the assumptions, `folds` leave one mode out, `null_control` repeats the search on simulated readings. `known`
+computes effects of known size without a search.
 
-What is decided: the `sizes`, the `verdict`, the `claim` that an error is reduced, that of what is `stated`, `readings`
-that are wrong.
+Decisions. The `sizes`, the `verdict`, the `claim` that an error is reduced, the same claim for `stated` effects, and
+wrong `readings`.
 
-What is told: `findings` make the `result` of it, with its candidates' `entries`, in `words` and `tables`.
+Results. `findings` make the `result`, with an entry of each candidate (`entries`), in `words` and `tables`.
 """

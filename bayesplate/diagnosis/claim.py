@@ -1,4 +1,4 @@
-"""The claim that an error is reduced: five conditions, each of which must be met; and what explains it in part."""
+"""The claim that an error is reduced: five conditions, each of which must be met; and effects that explain a part."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Literal
 import numpy as np
 
 from bayesplate.arrays import Floats
-from bayesplate.diagnosis.folds import Nested, carrying, log_score_gains, nested
+from bayesplate.diagnosis.folds import NestedErrors, find_carrying_modes, log_score_gains, nested_leave_one_out
 from bayesplate.diagnosis.null_control import NullControl
-from bayesplate.diagnosis.search import PASSES, SearchResult
-from bayesplate.diagnosis.sensitivity import WIDTHS, variants, varied
-from bayesplate.diagnosis.sizes import at_limit
-from bayesplate.diagnosis.verdict import Verdict, answers, stands_out, turned
+from bayesplate.diagnosis.search import LEAST_P_VALUE, SearchResult
+from bayesplate.diagnosis.sensitivity import PRIOR_WIDTH_FACTORS, variant_searches, vary_priors
+from bayesplate.diagnosis.sizes import size_at_limit
+from bayesplate.diagnosis.verdict import Verdict, find_rivals, rank_explanations, stands_out
 from bayesplate.estimates.leave_one_out import indices_of
 
 ConditionName = Literal[
@@ -22,15 +22,15 @@ ConditionName = Literal[
 ]
 
 STANDARD_ERRORS = 2.0
-"""By how many of them the nested log score has to rise."""
-IMPROBABLE = 0.05
-"""What the probability of no effect has to stay below, and that of one that is not told."""
-_FEWEST_GAINS = 2
-"""Modes that count without which their gains have no scatter."""
-SURELY = 1e-4
-"""What the probability of no effect has to stay below where something explains the readings in part."""
-FALLS_TO = 2.0 / 3.0
-"""Nested left-out error after over before, at most: it falls by at least a third."""
+"""Standard errors by which the nested log score has to rise."""
+IMPROBABLE_BELOW = 0.05
+"""Bound on the probability of no effect, and on that of an effect that the verdict does not name."""
+_FEWEST_SCORED_MODES = 2
+"""Modes that must have a gain in log score, for the gains to have a scatter."""
+IMPROBABLE_IN_PART_BELOW = 1e-4
+"""Bound on the probability of no effect where an effect is named in part."""
+LARGEST_ERROR_RATIO = 2.0 / 3.0
+"""Nested left-out error after over before, at most, where an effect is named in part."""
 
 
 @dataclass(frozen=True)
@@ -58,58 +58,67 @@ class Claim:
     @property
     def holds(self) -> bool:
         """Whether there is something to claim and every condition is met."""
-        return bool(self.conditions) and all(one.is_met for one in self.conditions)
+        return bool(self.conditions) and all(condition.is_met for condition in self.conditions)
 
 
-def judge_claim(found: SearchResult, verdict: Verdict, control: NullControl, folded: Nested | None) -> Claim:
-    """Judge the five conditions; `folded` and the control do not count readings whose modes alone carry something."""
+def judge_claim(found: SearchResult, verdict: Verdict, control: NullControl, folded: NestedErrors | None) -> Claim:
+    """Judge the five conditions.
+
+    `folded` and the control do not count readings whose modes alone carry a constant or a size.
+    """
     if not verdict.index:
         return Claim()
-    searches = [found, *(varied(found, width=factor) for factor in WIDTHS.values())]
-    told, p_value = {one.index for one in verdict.stands_for}, found.p_value(verdict.index)
-    others = [sum(each.support for each in answers(one) if each.index not in told) for one in searches]
+    searches = [found, *(vary_priors(found, width=factor) for factor in PRIOR_WIDTH_FACTORS.values())]
+    named_indices, p_value = {explanation.index for explanation in verdict.stands_for}, found.p_value(verdict.index)
+    other_probabilities = [
+        sum(explanation.support for explanation in rank_explanations(search) if explanation.index not in named_indices)
+        for search in searches
+    ]
     return Claim(
         (
-            _beyond_chance(folded, control),
-            _better_score(found, folded),
-            _below("probability of none", [one.none for one in searches]),
-            _below("probability of another", others),
-            Condition("prior predictive", p_value, PASSES, p_value >= PASSES),
+            _chance_condition(folded, control),
+            _score_condition(found, folded),
+            _probability_condition("probability of none", [search.none for search in searches]),
+            _probability_condition("probability of another", other_probabilities),
+            Condition("prior predictive", p_value, LEAST_P_VALUE, p_value >= LEAST_P_VALUE),
         )
     )
 
 
-def named_in_part(
+def effects_named_in_part(
     found: SearchResult,
     verdict: Verdict,
-    folded: Nested | None,
+    folded: NestedErrors | None,
     others: Iterable[tuple[str, SearchResult]] | None = None,
 ) -> tuple[str, ...]:
-    """Effects that explain readings in part though something else remains; none where that cannot be said.
+    """Effects that explain the readings in part though something else remains; empty where that cannot be said.
 
-    The members of what comes nearest, if it fails the gate and not the limits of its sizes, no effect is less probable
-    than `SURELY`, the name survives every other assumption, and the nested left-out error falls to `FALLS_TO` or
-    further. The verdict stays what it is, nothing is claimed, and the constants are not to be trusted.
+    These are the effects of the nearest explanation, if its p-value is too small and none of its sizes is at a limit,
+    the probability of no effect is below `IMPROBABLE_IN_PART_BELOW`, it stands out under every other assumption, and
+    the nested left-out error falls to `LARGEST_ERROR_RATIO` or further. The verdict stays what it is, nothing is
+    claimed, and the constants are not to be trusted.
     """
     nearest = verdict.nearest
-    if nearest is None or found.none >= SURELY:
+    if nearest is None or found.none >= IMPROBABLE_IN_PART_BELOW:
         return ()
-    if found.p_value(nearest.index) >= PASSES or at_limit(found, nearest.index):
+    if found.p_value(nearest.index) >= LEAST_P_VALUE or size_at_limit(found, nearest.index):
         return ()
-    if folded is None or not folded.ratio[0] <= FALLS_TO:  # not a number where no mode is left to judge by
+    if folded is None or not folded.ratio[0] <= LARGEST_ERROR_RATIO:  # not a number where no mode is left to judge by
         return ()
-    if not stands_out(nearest, answers(found)) or turned(found, nearest, variants(found) if others is None else others):
+    if not stands_out(nearest, rank_explanations(found)) or find_rivals(
+        found, nearest, variant_searches(found) if others is None else others
+    ):
         return ()
     return nearest.members
 
 
-def nested_of(found: SearchResult, control: NullControl, index: int = 0) -> Nested | None:
-    """The board's own readings left out one by one, an effect added where a fold calls for one.
+def nested_errors_of_board(found: SearchResult, control: NullControl, index: int = 0) -> NestedErrors | None:
+    """Nested errors of the board's own readings, an effect added in each fold whose odds call for one.
 
-    Not counted are those whose modes alone carry a constant or a size, without any effect or under a hypothesis.
+    Readings whose modes alone carry a constant or a size, without any effect or under a hypothesis, do not count.
     """
-    folded = nested(found.ground, found.residual[None, :], control.needed_from)
-    return folded and folded.without(indices_of(carrying(found, index), found.ground.baseline.board))
+    errors = nested_leave_one_out(found.ground, found.residual[None, :], control.needed_from)
+    return errors and errors.without(indices_of(find_carrying_modes(found, index), found.ground.baseline.board))
 
 
 def score_gain(gains: Floats | Sequence[float]) -> tuple[float, float]:
@@ -118,24 +127,24 @@ def score_gain(gains: Floats | Sequence[float]) -> tuple[float, float]:
     return float(values.sum()), float(np.sqrt(values.size) * values.std(ddof=1))
 
 
-def _beyond_chance(folded: Nested | None, control: NullControl) -> Condition:
+def _chance_condition(errors: NestedErrors | None, control: NullControl) -> Condition:
     limit = control.ratio_to_beat
-    if folded is None or limit is None or not folded.counted.any():
+    if errors is None or limit is None or not errors.counted.any():
         return Condition("chance selection", None, limit, False)
-    ratio = float(folded.ratio[0])
+    ratio = float(errors.ratio[0])
     return Condition("chance selection", ratio, limit, ratio < limit)
 
 
-def _better_score(found: SearchResult, folded: Nested | None) -> Condition:
-    if folded is None:
+def _score_condition(result: SearchResult, errors: NestedErrors | None) -> Condition:
+    if errors is None:
         return Condition("log score", None, None, False)
-    gains = log_score_gains(found.ground, found.residual, folded.chosen[0], folded.carried)
-    if gains.size < _FEWEST_GAINS:
+    gains = log_score_gains(result.ground, result.residual, errors.chosen[0], errors.carried)
+    if gains.size < _FEWEST_SCORED_MODES:
         return Condition("log score", None, None, False)
     gain, error = score_gain(gains)
     return Condition("log score", gain, STANDARD_ERRORS * error, gain > STANDARD_ERRORS * error)
 
 
-def _below(name: ConditionName, probabilities: Sequence[float]) -> Condition:
+def _probability_condition(name: ConditionName, probabilities: Sequence[float]) -> Condition:
     largest = float(max(probabilities))
-    return Condition(name, largest, IMPROBABLE, largest < IMPROBABLE)
+    return Condition(name, largest, IMPROBABLE_BELOW, largest < IMPROBABLE_BELOW)

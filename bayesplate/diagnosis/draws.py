@@ -7,15 +7,15 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from bayesplate.arrays import Floats
-from bayesplate.diagnosis.baseline import Baseline, Rows
+from bayesplate.arrays import Floats, Indices
+from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.laws import FormLaw
 from bayesplate.diagnosis.search import SearchResult
-from bayesplate.diagnosis.terms import normalised
+from bayesplate.diagnosis.terms import normalised_weights
 
-OfForms = Iterator[tuple[int, FormLaw, Rows, Floats]]
-"""Form by form: its index, its law, the draws that it has, and their sizes."""
+FormSizes = Iterator[tuple[int, FormLaw, Indices, Floats]]
+"""For each form: its index, its law, the indices of its draws, and their sizes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,20 +24,19 @@ class TermDraws:
 
     log_rigidities: Floats  # (n_draws, n_constants) array: ln D_x, ln D_y, ln D_s
     inputs: Floats  # (n_draws, n_inputs) array: standard coordinates of the board's uncertain inputs
-    cells: Rows  # (n_draws,) array of int: of the hypothesis' table
+    cells: Indices  # (n_draws,) array of int: indices of cells of the hypothesis' table
     within: Floats  # (n_draws, n_tangents) array: place within the cell, standard deviations
-    # (n_draws, n_every) array: ln f (Hz) of all modes as the terms have it, with the inputs at the middle of their
-    # priors where they are zero
+    # (n_draws, n_every) array: ln f (Hz) of all modes by the linear terms; zero `inputs` are the middle of their priors
     predicted: Floats
-    variance: Floats  # (n_draws, n_modes) array: of each reading, relative; infinite where it is no mode
-    noise: Floats  # (n_draws, n_setups) array: relative
+    variance: Floats  # (n_draws, n_modes) array: relative variance of each reading; infinite where it is no mode
+    noise: Floats  # (n_draws, n_setups) array: relative noise
 
     @property
     def n_draws(self) -> int:
         return len(self.log_rigidities)
 
-    def at(self, picked: Rows) -> TermDraws:
-        return TermDraws(*(getattr(self, one.name)[picked] for one in fields(self)))
+    def at(self, picked: Indices) -> TermDraws:
+        return TermDraws(*(getattr(self, field.name)[picked] for field in fields(self)))
 
 
 def draw_terms(found: SearchResult, index: int, rng: np.random.Generator, n_draws: int) -> TermDraws:
@@ -49,44 +48,47 @@ def draw_hypothesis(
     of: Baseline, hypothesis: Hypothesis, residual: Floats, rng: np.random.Generator, n_draws: int
 ) -> TermDraws:
     """Draw from the posterior under a hypothesis, given the residual of a baseline, which may have other labels."""
-    terms, table, every = hypothesis.terms, hypothesis.table, of.every
-    baseline, own = terms.baseline, terms.table
-    seen = hypothesis.seen(of, residual[None, :])[0]
-    log_density = terms.log_densities(seen[None, :])[:, 0]
-    picked = np.sort(rng.choice(log_density.size, size=n_draws, p=normalised(log_density)))
-    levels, cells = np.divmod(picked, table.n_cells)
+    terms, table, modes = hypothesis.terms, hypothesis.table, of.every
+    baseline, labelled_table = terms.baseline, terms.table
+    own_residual = hypothesis.seen(of, residual[None, :])[0]
+    log_density = terms.log_densities(own_residual[None, :])[:, 0]
+    picked_terms = np.sort(rng.choice(log_density.size, size=n_draws, p=normalised_weights(log_density)))
+    levels, cells = np.divmod(picked_terms, table.n_cells)
     n = baseline.log_rigidities.size
     first_input = n + table.slopes.shape[2]
     noise = terms.noise.sd[levels]
     variance = noise[:, baseline.setup_index] ** 2 + baseline.own_variance
     variance[:, ~baseline.is_mode] = np.inf
-    columns = _columns(baseline.slopes, own.slopes[cells], baseline.input_slopes)
-    joint = _regressed(columns, variance, seen - own.shift[cells], rng, n)
-    inside = joint[:, n:first_input]
-    moving = _columns(every.slopes, table.slopes[cells], every.input_slopes)
+    columns = _regression_columns(baseline.slopes, labelled_table.slopes[cells], baseline.input_slopes)
+    joint = _draw_coefficients(columns, variance, own_residual - labelled_table.shift[cells], rng, n)
+    within = joint[:, n:first_input]
+    every_column = _regression_columns(modes.slopes, table.slopes[cells], modes.input_slopes)
     return TermDraws(
         log_rigidities=baseline.log_rigidities
         + joint[:, :n]
         + table.moved[cells]
-        + np.einsum("nkp,np->nk", table.moved_slopes[cells], inside),
+        + np.einsum("nkp,np->nk", table.moved_slopes[cells], within),
         inputs=joint[:, first_input:],
         cells=cells,
-        within=inside,
-        predicted=every.middle + table.shift[cells] + np.einsum("nmp,np->nm", moving, joint),
+        within=within,
+        predicted=modes.middle + table.shift[cells] + np.einsum("nmp,np->nm", every_column, joint),
         variance=variance,
         noise=noise,
     )
 
 
-def _columns(slopes: Floats, of_sizes: Floats, of_inputs: Floats) -> Floats:
-    """What constants, sizes and inputs do to ln f at each draw: (n, n_modes, n_coefficients) array."""
-    n = len(of_sizes)
-    fixed = [np.broadcast_to(part, (n, *part.shape)) for part in (slopes, of_inputs)]
-    return np.concatenate([fixed[0], of_sizes, fixed[1]], axis=2)
+def _regression_columns(slopes: Floats, size_slopes: Floats, input_slopes: Floats) -> Floats:
+    """Change of ln f with constants, sizes and inputs at each draw: (n, n_modes, n_coefficients) array."""
+    n = len(size_slopes)
+    fixed = [np.broadcast_to(block, (n, *block.shape)) for block in (slopes, input_slopes)]
+    return np.concatenate([fixed[0], size_slopes, fixed[1]], axis=2)
 
 
-def _regressed(columns: Floats, variance: Floats, target: Floats, rng: np.random.Generator, n_constants: int) -> Floats:
-    """(n, n_coefficients) draws, one for each target: flat on the constants, standard normal on all others."""
+def _draw_coefficients(
+    columns: Floats, variance: Floats, target: Floats, rng: np.random.Generator, n_constants: int
+) -> Floats:
+    """One draw of the coefficients per target, (n, n_coefficients): flat prior on constants, standard normal on the
+    others."""
     weighted = np.swapaxes(columns / variance[:, :, None], 1, 2)
     prior = np.r_[np.zeros(n_constants), np.ones(columns.shape[2] - n_constants)]
     precision = weighted @ columns + np.diag(prior)
@@ -96,14 +98,14 @@ def _regressed(columns: Floats, variance: Floats, target: Floats, rng: np.random
     return np.asarray((mean + np.linalg.solve(np.swapaxes(factor, 1, 2), normal))[:, :, 0])
 
 
-def standard_sizes_of(found: SearchResult, index: int, drawn: TermDraws, which: int) -> OfForms:
+def standard_sizes_of(found: SearchResult, index: int, drawn: TermDraws, which: int) -> FormSizes:
     """Sizes of one effect of a hypothesis at each draw, in standard coordinates: (n, n_parameters) arrays.
 
-    A cell that ends at a bound reaches beyond it.
+    They may lie beyond a bound of the prior, for a cell that ends there is normal.
     """
-    whole = found.ground.hypotheses[index].table
-    table, cells = whole.member(which, drawn.cells)
-    within = drawn.within[:, whole.tangents(which)]
+    hypothesis_table = found.ground.hypotheses[index].table
+    table, cells = hypothesis_table.member(which, drawn.cells)
+    within = drawn.within[:, hypothesis_table.tangents(which)]
     for i, law in enumerate(found.ground.members(index)[which].laws):
         rows = np.flatnonzero(table.form[cells] == i)
         if rows.size:
@@ -113,7 +115,7 @@ def standard_sizes_of(found: SearchResult, index: int, drawn: TermDraws, which: 
 
 def sizes_of(
     found: SearchResult, index: int, drawn: TermDraws, which: int
-) -> Iterator[tuple[int, FormLaw, Rows, dict[str, Floats]]]:
+) -> Iterator[tuple[int, FormLaw, Indices, dict[str, Floats]]]:
     """Sizes of one effect at each draw in SI units, by parameter, within the bounds of their priors."""
     for i, law, rows, z in standard_sizes_of(found, index, drawn, which):
         values = {}
@@ -124,8 +126,8 @@ def sizes_of(
 
 def joint_sizes_of(
     found: SearchResult, index: int, drawn: TermDraws
-) -> Iterator[tuple[FormLaw, Rows, dict[str, Floats]]]:
-    """Sizes of both effects of a pair at once, at those draws for which there is a law of both."""
+) -> Iterator[tuple[FormLaw, Indices, dict[str, Floats]]]:
+    """Sizes of both effects of a pair, at the draws of forms that have a joint law."""
     laws = found.ground.hypotheses[index].joint
     if not laws:
         return

@@ -13,7 +13,7 @@ from bayesplate.effects.base import EffectForm
 
 @dataclass(frozen=True, eq=False)
 class Form:
-    """One way in which an effect may be present."""
+    """One form in which an effect may be present."""
 
     effect: str
     detail: str  # what tells it from the effect's other forms; empty if there are none
@@ -27,14 +27,23 @@ class Form:
 
 def forms(board: Board) -> dict[str, tuple[Form, ...]]:
     """Forms of each effect that is not declared and can act, by effect; they share its prior probability equally."""
-    tried = {name: effect.forms(board) for name, effect in EFFECTS.items() if name not in board.effects}
-    return {name: tuple(_form(board, name, one) for one in found) for name, found in tried.items() if found}
+    forms_by_effect = {name: effect.forms(board) for name, effect in EFFECTS.items() if name not in board.effects}
+    return {
+        name: tuple(_form(board, name, form) for form in effect_forms)
+        for name, effect_forms in forms_by_effect.items()
+        if effect_forms
+    }
 
 
 def _form(board: Board, name: str, form: EffectForm) -> Form:
-    declared = declare(replace(board, effects=(*board.effects, name), chosen=(*board.chosen, *form.effects)))
-    every = {one.name: one for effect in form.effects for one in effect.parameters()}
-    return Form(name, form.detail, declared, tuple(one for one in every.values() if not one.prior.is_exact))
+    declared_board = declare(replace(board, effects=(*board.effects, name), chosen=(*board.chosen, *form.effects)))
+    parameters = {parameter.name: parameter for effect in form.effects for parameter in effect.parameters()}
+    return Form(
+        name,
+        form.detail,
+        declared_board,
+        tuple(parameter for parameter in parameters.values() if not parameter.prior.is_exact),
+    )
 
 
 def with_forms(board: Board, added: Sequence[Form]) -> Board:
@@ -56,9 +65,9 @@ def with_labels_exchanged(board: Board, first: int, second: int) -> Board:
         readings = list(setup.readings)
         i, j = first - start, second - start
         if 0 <= i < len(readings) and 0 <= j < len(readings):
-            one, other = readings[i], readings[j]
-            readings[i] = replace(one, label=other.label, beams=other.beams)
-            readings[j] = replace(other, label=one.label, beams=one.beams)
+            first_reading, second_reading = readings[i], readings[j]
+            readings[i] = replace(first_reading, label=second_reading.label, beams=second_reading.beams)
+            readings[j] = replace(second_reading, label=first_reading.label, beams=first_reading.beams)
         start += len(readings)
         setups.append(replace(setup, readings=tuple(readings)))
     return replace(board, setups=tuple(setups))

@@ -1,4 +1,4 @@
-"""What may be the case: nothing, one effect, two, or two labels exchanged; and how probable each is beforehand."""
+"""The hypotheses about a board and their priors: no effect, one effect, two effects, or two labels exchanged."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
-from bayesplate.diagnosis.baseline import Baseline, Rows
-from bayesplate.diagnosis.shifts import Cells, JointLaws, nothing, together
-from bayesplate.diagnosis.terms import NoiseGrid, Terms, log_sum, noise_grid, normalised, reach_of
+from bayesplate.diagnosis.baseline import Baseline, ModeIndices
+from bayesplate.diagnosis.shifts import Cells, JointLaws, combine_cells, no_effect_cells
+from bayesplate.diagnosis.terms import NoiseGrid, NormalTerms, log_sum, noise_grid, noise_reach, normalised_weights
 from bayesplate.effects import EFFECTS
 
-NONE, ONE, TWO = 0.5, 0.4, 0.1
-"""Prior probability that nothing, one effect, or two are behind a residual; each shared equally by those tried."""
+PRIOR_OF_NONE, PRIOR_OF_ONE, PRIOR_OF_TWO = 0.5, 0.4, 0.1
+"""Prior probability that no effect, one or two cause a residual; shared equally by the hypotheses of each kind."""
 
 RELABELLING = "relabelling"
-CLOSE = 0.12
+CLOSE_LOG_RATIO = 0.12
 """ln of a frequency ratio up to which neighbouring readings of different symmetry may have been confused."""
 
 
@@ -41,79 +41,84 @@ class Swap:
         """Which labels: "(2,0) and (1,2)", with the setup where there are several."""
         setups = baseline.board.setups
         labels = [str(label) for setup in setups for label in setup.labels]
-        where = f" in setup {setups[baseline.setup_index[self.first]].name}" if len(setups) > 1 else ""
-        return f"{labels[self.first]} and {labels[self.second]}{where}"
+        setup_words = f" in setup {setups[baseline.setup_index[self.first]].name}" if len(setups) > 1 else ""
+        return f"{labels[self.first]} and {labels[self.second]}{setup_words}"
 
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """One thing that may be the case."""
+    """One hypothesis about a board: the effects that act, or two labels exchanged."""
 
     members: tuple[str, ...]  # effects that are present; empty for none
     prior: float
     table: Cells  # of all modes that readings may be
     noise: NoiseGrid
-    own: Baseline  # the baseline with the labels that readings have if it is the case
+    own: Baseline  # the baseline with the labels that readings have under this hypothesis
     swap: Swap | None = None  # the two labels that it exchanges
-    # ln of the likelihood summed over all ways to take the peaks for modes, over that of the labels at hand
+    # ln of the likelihood summed over all assignments of peaks to modes, over that of the labels of `own`
     log_labels: float = 0.0
-    joint: JointLaws = field(default_factory=dict)  # of a pair whose table is not that of shifts that add
+    joint: JointLaws = field(default_factory=dict)  # joint laws of a pair, where its shifts are not just added
 
     @cached_property
-    def terms(self) -> Terms:
+    def terms(self) -> NormalTerms:
         """Its normal terms for the readings under its labels."""
-        return Terms(self.table.of(self.own.rows), self.own, self.noise)
+        return NormalTerms(self.table.of(self.own.rows), self.own, self.noise)
 
     def seen(self, baseline: Baseline, residuals: Floats) -> Floats:
-        """Residuals of a baseline with other labels as this hypothesis reads them: (n_sets, n_modes) arrays."""
+        """Residuals of a baseline, which may have other labels, under the labels of this hypothesis: (n_sets, n_modes)
+        arrays."""
         return residuals + (baseline.middle - self.own.middle)
 
-    def labelled(self, baseline: Baseline, rows: Rows) -> Hypothesis:
-        """The same hypothesis, the readings of a baseline taken for other modes of its spectrum."""
+    def labelled(self, baseline: Baseline, rows: ModeIndices) -> Hypothesis:
+        """The same hypothesis with other labels of the readings, by indices of modes."""
         return replace(self, own=baseline.labelled(rows))
 
     def log_by_cell(self, baseline: Baseline, residual: Floats) -> Floats:
-        """ln of prior times density of each cell of its table, noise averaged, without volume: (n_cells,) array."""
+        """ln of prior times density of each cell of its table, noise averaged, without `half_log_det`: (n_cells,)
+        array."""
         log_densities = self.terms.log_densities(self.seen(baseline, residual[None, :]))[:, 0]
         return log_sum(log_densities.reshape(-1, self.table.n_cells))
 
     def cells(self, baseline: Baseline, residual: Floats) -> Floats:
         """Posterior probability of each cell of its table: (n_cells,) array from an (n_modes,) residual."""
         log_densities = self.terms.log_densities(self.seen(baseline, residual[None, :]))[:, 0]
-        return np.asarray(normalised(log_densities).reshape(-1, self.table.n_cells).sum(axis=0))
+        return np.asarray(normalised_weights(log_densities).reshape(-1, self.table.n_cells).sum(axis=0))
 
 
-def hypotheses(
+def make_hypotheses(
     baseline: Baseline, fine: Mapping[str, Cells], coarse: Mapping[str, Cells], paired: Sequence[str]
 ) -> tuple[Hypothesis, ...]:
-    """Every hypothesis about a board: none first, then single effects, exchanged labels, and pairs of those `paired`.
+    """All hypotheses about a board: no effect first, then single effects, exchanged labels, and pairs of effects.
 
-    These could be seen: a pair costs nothing for a member that cannot, and every effect would seem to come with one.
-    Pairs combine coarse tables.
+    Pairs are of the effects `paired`, which are visible: an effect that cannot be seen would cost a pair nothing, and
+    every effect would seem to come with one. Pairs combine coarse tables.
     """
     board = baseline.board
-    reach = reach_of(board, baseline.setup_index, np.where(baseline.is_mode, baseline.residual, np.nan))
-    levels, few = (noise_grid(board, few=are_few, reach=reach) for are_few in (False, True))
-    empty = nothing(baseline.every.log_frequency.size, baseline.log_rigidities.size)
-    swaps = confusable(baseline)
+    reach = noise_reach(board, baseline.setup_index, np.where(baseline.is_mode, baseline.residual, np.nan))
+    levels, few_levels = (noise_grid(board, few=are_few, reach=reach) for are_few in (False, True))
+    empty = no_effect_cells(baseline.every.log_frequency.size, baseline.log_rigidities.size)
+    swaps = confusable_labels(baseline)
     pairs = list(combinations([name for name in fine if name in paired], 2))
-    each = ONE / max(len(fine) + bool(swaps), 1)
-    found = [Hypothesis((), NONE, empty, levels, baseline)]
-    found += [Hypothesis((name,), each, table, levels, baseline) for name, table in fine.items()]
-    found += [
-        Hypothesis((RELABELLING,), each / len(swaps), empty, levels, swap.applied(baseline), swap) for swap in swaps
+    single_prior = PRIOR_OF_ONE / max(len(fine) + bool(swaps), 1)
+    all_hypotheses = [Hypothesis((), PRIOR_OF_NONE, empty, levels, baseline)]
+    all_hypotheses += [Hypothesis((name,), single_prior, table, levels, baseline) for name, table in fine.items()]
+    all_hypotheses += [
+        Hypothesis((RELABELLING,), single_prior / len(swaps), empty, levels, swap.applied(baseline), swap)
+        for swap in swaps
     ]
     for pair in pairs:
-        prior = each if are_stated(board, pair) else TWO / len(pairs)
-        found.append(Hypothesis(pair, prior, together(*(coarse[name] for name in pair)), few, baseline))
-    return tuple(found)
+        pair_prior = single_prior if are_stated(board, pair) else PRIOR_OF_TWO / len(pairs)
+        all_hypotheses.append(
+            Hypothesis(pair, pair_prior, combine_cells(*(coarse[name] for name in pair)), few_levels, baseline)
+        )
+    return tuple(all_hypotheses)
 
 
 def are_stated(board: Board, pair: Sequence[str]) -> bool:
     """Whether two effects are known ones of which the card states at least one, without declaring it.
 
-    What is known to be there is no coincidence of two causes: such a pair has the prior of a single effect, and stands
-    for itself.
+    Two effects that are known to act are no coincidence: such a pair has the prior of a single effect, and is an
+    explanation of its own.
     """
     effects = [EFFECTS[name] for name in pair if name in EFFECTS]
     return (
@@ -123,13 +128,13 @@ def are_stated(board: Board, pair: Sequence[str]) -> bool:
     )
 
 
-def confusable(baseline: Baseline) -> tuple[Swap, ...]:
-    """Neighbouring readings of one setup that lie close together and whose labels may be each other's.
+def confusable_labels(baseline: Baseline) -> tuple[Swap, ...]:
+    """Pairs of neighbouring readings of one setup, close in frequency, whose labels may have been exchanged.
 
-    None where a card doubts a label or a peak has none: there the sums over assignments of peaks to modes say what each
-    may be instead, and a label that is stated for sure stands.
-    Either they belong to different symmetry classes; or to one, and stand in the other order than the modes of the
-    fitted plate, which an effect that mixes the two may cause as well as a slip.
+    Either their modes belong to different symmetry classes; or to one, and the readings are in the other order than the
+    modes of the fitted plate, which an effect that mixes the two may cause as well as a slip.
+    Empty where a card doubts a label or a peak has none: there the sums over assignments of peaks to modes cover other
+    labels, and a label that is stated for sure is kept.
     """
     readings = baseline.log_readings
     if baseline.every.is_open:
@@ -141,7 +146,7 @@ def confusable(baseline: Baseline) -> tuple[Swap, ...]:
         for first, second in pairwise(ordered):
             differ = baseline.places[first].parity != baseline.places[second].parity
             crossed = baseline.log_frequency[first] > baseline.log_frequency[second]
-            if (differ or crossed) and readings[second] - readings[first] < CLOSE:
+            if (differ or crossed) and readings[second] - readings[first] < CLOSE_LOG_RATIO:
                 swaps.append(Swap(int(first), int(second)))
     return tuple(swaps)
 
@@ -149,24 +154,29 @@ def confusable(baseline: Baseline) -> tuple[Swap, ...]:
 def log_evidences(found: Sequence[Hypothesis], baseline: Baseline, residuals: Floats) -> Floats:
     """Logarithm of the evidence of every hypothesis for every data set: (n_hypotheses, n_sets) array.
 
-    Summed over the ways to take peaks for modes, as far as the hypotheses know of any (`with_own_labels`).
+    Summed over the assignments of peaks to modes, where the hypotheses have labels of their own (`with_own_labels`).
     """
-    return np.stack([one.terms.log_evidence(one.seen(baseline, residuals)) + one.log_labels for one in found])
+    return np.stack(
+        [
+            hypothesis.terms.log_evidence(hypothesis.seen(baseline, residuals)) + hypothesis.log_labels
+            for hypothesis in found
+        ]
+    )
 
 
 def probabilities(found: Sequence[Hypothesis], evidences: Floats) -> Floats:
     """Posterior probabilities, summing to one over the hypotheses: same shape as the evidences."""
-    return normalised(_joint(found, evidences))
+    return normalised_weights(_log_joint(found, evidences))
 
 
 def odds_against_none(found: Sequence[Hypothesis], evidences: Floats) -> Floats:
-    """ln of the odds that something is lacking against that nothing is: one per data set."""
-    total = _joint(found, evidences)
+    """ln of the odds that an effect is lacking against that none is: one per data set."""
+    total = _log_joint(found, evidences)
     if len(total) == 1:
         return np.full(total.shape[1:], -np.inf)
     return np.asarray(log_sum(total[1:]) - total[0])
 
 
-def _joint(found: Sequence[Hypothesis], evidences: Floats) -> Floats:
-    log_prior = np.log([one.prior for one in found])
+def _log_joint(all_hypotheses: Sequence[Hypothesis], evidences: Floats) -> Floats:
+    log_prior = np.log([hypothesis.prior for hypothesis in all_hypotheses])
     return np.asarray(evidences + log_prior.reshape(-1, *([1] * (evidences.ndim - 1))))

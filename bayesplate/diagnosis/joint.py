@@ -1,13 +1,13 @@
-"""Pairs of effects that are plausible after a first search, solved together: their shifts need not add.
+"""Plausible pairs of effects are solved together after a first search: their shifts need not add.
 
-No member of a pair has to do well alone: air that slows all modes and a tension that speeds them up each raise the
-error, and both together explain it. Two large shifts of opposite signs are also those whose sum is the worst
-approximation, by a fifth of what is left of them, so that the right pair may seem improbable. Where nothing explains
-the readings the most probable pairs are therefore solved together however improbable they are.
+Each effect of a pair may fail alone: air that lowers all frequencies and a tension that raises them each raise the
+error, and both together explain it. The sum of two large shifts of opposite signs is also a poor approximation, wrong
+by a fifth of the remaining shift, so that the right pair may seem improbable. Where nothing explains the readings the
+most probable pairs are therefore solved together however improbable they are.
 
-A pair of known effects of which the card states one is solved together in any case.
+A pair of known effects of which the card states one is always solved together.
 
-Pairs with transverse shear are left to the sampler, which fits whatever is named again: solving them takes minutes.
+Pairs with transverse shear are left to the sampler, which fits every named effect again: solving them takes minutes.
 """
 
 from __future__ import annotations
@@ -21,70 +21,72 @@ from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.hypotheses import are_stated
 from bayesplate.diagnosis.laws import FormLaw
 from bayesplate.diagnosis.peaks import with_own_labels
-from bayesplate.diagnosis.search import PASSES, Ground, SearchResult, prepare_search, search
+from bayesplate.diagnosis.search import LEAST_P_VALUE, SearchGround, SearchResult, prepare_search, run_search
 from bayesplate.diagnosis.shifts import JointLaws, joint_law, joint_table
 
-PLAUSIBLE = 0.05
-"""Probability from which a pair is solved together where something explains the readings: each costs as much as a
-candidate of its own."""
+PLAUSIBLE_FROM = 0.05
+"""Probability from which a pair is solved together where some hypothesis explains the readings: each costs as much as
+a candidate."""
 _MOST_PAIRS = 3
-_WORTH = 0.05
+_LEAST_SHARE = 0.05
 """Share of a pair's probability below which two of its forms keep the sum of their shifts."""
 
 
 def full_search(
     baseline: Baseline, tried: Sequence[str] | None = None, tell: Callable[[float], None] | None = None
-) -> tuple[Ground, SearchResult]:
-    """The search of a diagnosis, and its ground with the labels of the board: every candidate, each hypothesis with its
-    own labels, plausible pairs solved together."""
+) -> tuple[SearchGround, SearchResult]:
+    """The ground of a diagnosis, with the labels of the board, and its search: all candidates, each hypothesis with
+    labels of its own, plausible pairs solved together."""
     ground = prepare_search(baseline, tried=tried, tell=tell)
-    found = search(with_own_labels(ground))
-    together = with_joint_pairs(found, ground)
-    return (ground, found) if together is ground else (together, search(with_own_labels(together)))
+    result = run_search(with_own_labels(ground))
+    joint_ground = with_joint_pairs(result, ground)
+    return (ground, result) if joint_ground is ground else (joint_ground, run_search(with_own_labels(joint_ground)))
 
 
-def with_joint_pairs(found: SearchResult, ground: Ground) -> Ground:
-    """A ground on which the pairs that a search on it finds plausible are solved together; the same where none is."""
-    pairs = [i for i in _plausible(found) if not ground.hypotheses[i].joint]
+def with_joint_pairs(found: SearchResult, ground: SearchGround) -> SearchGround:
+    """The ground with the plausible pairs of its search solved together; the same ground if there is none."""
+    pairs = [i for i in _plausible_pairs(found) if not ground.hypotheses[i].joint]
     if not pairs:
         return ground
-    every = list(ground.hypotheses)
+    hypotheses = list(ground.hypotheses)
     for index in pairs:
-        one, other = ground.members(index)
+        first, second = ground.members(index)
         laws: JointLaws = {
-            (i, j): joint_law(ground.baseline, one.laws[i].form, other.laws[j].form)
-            for i, j in _forms_worth(found, index)
+            (i, j): joint_law(ground.baseline, first.laws[i].form, second.laws[j].form)
+            for i, j in _probable_forms(found, index)
         }
-        table = joint_table(ground.baseline, every[index].table, laws)
-        every[index] = replace(every[index], table=table, joint=laws)
-    return replace(ground, hypotheses=tuple(every))
+        table = joint_table(ground.baseline, hypotheses[index].table, laws)
+        hypotheses[index] = replace(hypotheses[index], table=table, joint=laws)
+    return replace(ground, hypotheses=tuple(hypotheses))
 
 
-def _plausible(found: SearchResult) -> list[int]:
-    """Indices of the most probable pairs whose effects have laws and leave the plate thin."""
-    log_probability = found.log_evidence + np.log([one.prior for one in found.ground.hypotheses])
-    is_explained = found.p_value(int(np.argmax(found.probability))) >= PASSES
-    board = found.ground.baseline.board
-    cheap = [
+def _plausible_pairs(result: SearchResult) -> list[int]:
+    """Indices of the most probable pairs of candidates whose plate is thin; pairs of stated effects first."""
+    log_probability = result.log_evidence + np.log([hypothesis.prior for hypothesis in result.ground.hypotheses])
+    is_explained = result.p_value(int(np.argmax(result.probability))) >= LEAST_P_VALUE
+    board = result.ground.baseline.board
+    thin_pairs = [
         int(i)
-        for i in np.lexsort((-log_probability, -found.probability))  # by logarithms where they are too small to tell
-        if len(members := found.ground.members(int(i))) == 2
-        and all(_is_cheap(law) for one in members for law in one.laws)
+        for i in np.lexsort((-log_probability, -result.probability))  # by logarithms where they are too small to tell
+        if len(members := result.ground.members(int(i))) == 2
+        and all(_is_thin(law) for candidate in members for law in candidate.laws)
     ]
-    stated = [i for i in cheap if are_stated(board, found.ground.hypotheses[i].members)]
-    pairs = [i for i in cheap if i not in stated and (found.probability[i] >= PLAUSIBLE or not is_explained)]
-    return [*stated, *pairs[:_MOST_PAIRS]]
+    stated_pairs = [i for i in thin_pairs if are_stated(board, result.ground.hypotheses[i].members)]
+    probable_pairs = [
+        i for i in thin_pairs if i not in stated_pairs and (result.probability[i] >= PLAUSIBLE_FROM or not is_explained)
+    ]
+    return [*stated_pairs, *probable_pairs[:_MOST_PAIRS]]
 
 
-def _is_cheap(law: FormLaw) -> bool:
-    """Whether an effect leaves the plate thin: a shear-flexible one with a further effect takes minutes to solve."""
+def _is_thin(law: FormLaw) -> bool:
+    """Whether the plate with an effect is thin: a shear-flexible one with a further effect takes minutes to solve."""
     return all(model.system.theory == "thin" for model in law.models)
 
 
-def _forms_worth(found: SearchResult, index: int) -> list[tuple[int, int]]:
-    """Pairs of forms that have a share in the probability of a pair of effects."""
-    table = found.ground.hypotheses[index].table
-    forms = np.stack([one.form[cells] for one, cells in (table.member(0), table.member(1))])
+def _probable_forms(result: SearchResult, index: int) -> list[tuple[int, int]]:
+    """Indices of the pairs of forms that have a large enough share of the probability of a pair of effects."""
+    table = result.ground.hypotheses[index].table
+    forms = np.stack([member_table.form[cells] for member_table, cells in (table.member(0), table.member(1))])
     by_forms = np.zeros(forms.max(axis=1) + 1)
-    np.add.at(by_forms, tuple(forms), found.cells(index))
-    return [(int(i), int(j)) for i, j in np.argwhere(by_forms > _WORTH)]
+    np.add.at(by_forms, tuple(forms), result.cells(index))
+    return [(int(i), int(j)) for i, j in np.argwhere(by_forms > _LEAST_SHARE)]

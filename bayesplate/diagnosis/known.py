@@ -1,10 +1,10 @@
-"""What physics knows and nobody needs to search: shear, air, what the card states; computed, and the error it leads to.
+"""Known effects, which need no search: shear, air, effects that the card states; computed, with the resulting error.
 
-Known effects are computed in every combination of up to three, for two of them may lower an error that each of them
-alone raises. Each says itself whether it is known (`Effect.is_known`) and how it is computed (`Effect.at_known_size`):
-its sizes are what the card states, or the medians of their priors. Sizes of other effects that the board declares
-without stating them stand where its own fit has them, all other inputs at their nominal values, as in
-`bayesplate.estimates.least_squares`. Nothing is fitted but the constants, so that an error may rise as well as fall.
+Known effects are computed in every combination of up to three, because two of them may lower an error that each of them
+alone raises. The library says whether an effect is known (`Effect.is_known`) and how it is computed
+(`Effect.at_known_size`): its sizes are those that the card states, or the medians of their priors. Sizes of other
+effects that the board declares without stating them have the values of its own fit, all other inputs their nominal
+values, as in `bayesplate.estimates.least_squares`. Only the constants are fitted, so that an error may rise or fall.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import RIGIDITIES, moduli
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.sessions import same_modes
-from bayesplate.diagnosis.baseline import Baseline, PossibleModes, Rows, baseline_of, labelled_rows, symmetry_of
+from bayesplate.board.sessions import readings_by_mode
+from bayesplate.diagnosis.baseline import Baseline, ModeIndices, PossibleModes, baseline_of, labelled_rows, symmetry_of
 from bayesplate.diagnosis.peaks import likely_labels
 from bayesplate.effects import EFFECTS, Effect
 from bayesplate.estimates.least_squares import log_measured, reading_scales
-from bayesplate.estimates.leave_one_out import Errors, prediction_errors
+from bayesplate.estimates.leave_one_out import PredictionErrors, prediction_errors
 from bayesplate.estimates.refit import normal_misfit, refit, sensitivities
 from bayesplate.frequencies.model import SetupModel, setup_model
 from bayesplate.frequencies.predictor import Predictor
@@ -35,102 +35,110 @@ from bayesplate.posterior.posing import PosedProblem
 
 Models = Sequence[SetupModel]
 
-MOST_TOGETHER = 3
-"""Known effects that are computed together, at most."""
-_MOST_LABELLINGS, _MOST_PLACES = 4, 4
+MOST_KNOWN_EFFECTS = 3
+"""Largest number of known effects that are computed together."""
+_MOST_LABELLINGS, _MOST_SOLVES = 4, 4
 _ACCEPTED_CENTS = 0.1
-"""Error of a law of a known effect: it is shown beside what `check` solves in full."""
-_NEAR = 0.1
-"""Change of ln D up to which a law holds that was made before it: half a side of the smallest box it is trained in."""
+"""Accepted error of the law of a known effect, cents: its result is shown beside the full solves of `check`."""
+_LAW_REACH = 0.1
+"""Change of ln D up to which a law holds: half a side of the smallest box in which it is trained."""
 
 
 @dataclass(frozen=True, eq=False)
 class KnownFit:
     """The constants fitted to a board with known effects of fixed sizes."""
 
-    combination: tuple[str, ...]  # all known effects that it has
-    effects: tuple[str, ...]  # those beyond what the board declares
-    without: tuple[str, ...]  # known ones that the board declares and that are left out
-    baseline: Baseline  # the fit, all inputs fixed, with the labels that it makes likely
+    combination: tuple[str, ...]  # all known effects of the fit
+    effects: tuple[str, ...]  # known effects that the board does not declare
+    without: tuple[str, ...]  # known effects that the board declares and that are left out
+    baseline: Baseline  # the fit, all inputs fixed, with its likely labels
     moduli: Floats  # (3,) array, Pa: E_x, E_y, G_xy
-    errors: Errors  # of ln f of every reading, in sample and left out; not a number where the reading is no mode
+    errors: PredictionErrors  # of ln f of each reading, in sample and left out; not a number where it is no mode
 
 
 def known_fits(problem: PosedProblem, tell: Callable[[float], None] | None = None) -> tuple[KnownFit, ...]:
-    """The board as it stands, then with its known effects in every combination of up to three, fewer ones first.
+    """The board as it stands, then with its known effects in every combination of up to three, smaller ones first.
 
-    All that the card states together is among them, however much it is.
+    The combination of all effects that the card states is among them, however large.
     """
     board = problem.board
-    own = {name for name in known_effects(board) if name in board.effects}
-    is_stated = not any(one.source for one in board.uncertain if one.effect in own)
-    every = [None, *(one for one in every_combination(board) if set(one) != own or not is_stated)]
-    found = []
-    for one in every:
-        found.append(known_fit(problem, one))
+    declared = {name for name in known_effects(board) if name in board.effects}
+    is_stated = not any(parameter.source for parameter in board.uncertain if parameter.effect in declared)
+    all_combinations = [
+        None,
+        *(combination for combination in known_combinations(board) if set(combination) != declared or not is_stated),
+    ]
+    fits = []
+    for combination in all_combinations:
+        fits.append(known_fit(problem, combination))
         if tell is not None:
-            tell(len(found) / len(every))
-    return tuple(found)
+            tell(len(fits) / len(all_combinations))
+    return tuple(fits)
 
 
 def known_fit(problem: PosedProblem, combination: Sequence[str] | None = None) -> KnownFit:
-    """The constants fitted to a board with some of its known effects and no others; by default as it stands."""
-    own = [name for name in known_effects(problem.board) if name in problem.board.effects]
-    baseline = fit_with(problem, combination)
-    kept, law = baseline.used, baseline.every.predict
+    """The constants fitted to a board with a combination of its known effects; by default to the board as it stands."""
+    declared = [name for name in known_effects(problem.board) if name in problem.board.effects]
+    baseline = fit_with_effects(problem, combination)
+    used_readings, law = baseline.used, baseline.every.predict
     assert isinstance(law, Predictor)
-    modes = [np.flatnonzero(np.isin(kept, mode)).tolist() for mode in same_modes(problem.board)]
+    modes = [np.flatnonzero(np.isin(used_readings, mode)).tolist() for mode in readings_by_mode(problem.board)]
     errors = prediction_errors(
-        law.of(baseline.rows[kept]),
-        baseline.log_readings[kept],
-        normal_misfit(baseline.log_readings[kept], baseline.scales[kept]),
+        law.of(baseline.rows[used_readings]),
+        baseline.log_readings[used_readings],
+        normal_misfit(baseline.log_readings[used_readings], baseline.scales[used_readings]),
         baseline.log_rigidities[None, :],
         modes=[mode for mode in modes if mode],
     )
     D_x, D_y, D_s, thickness, nu_xy = (baseline.values[name] for name in (*RIGIDITIES, "thickness", "poisson_xy"))
-    combination = own if combination is None else combination
+    combination = declared if combination is None else combination
     return KnownFit(
         combination=tuple(combination),
-        effects=tuple(name for name in combination if name not in own),
-        without=tuple(name for name in own if name not in combination),
+        effects=tuple(name for name in combination if name not in declared),
+        without=tuple(name for name in declared if name not in combination),
         baseline=baseline,
         moduli=np.array(moduli(D_x, D_y, D_s, thickness, nu_xy)),
-        errors=errors.at(kept, baseline.n_modes),
+        errors=errors.at(used_readings, baseline.n_modes),
     )
 
 
-def fit_with(problem: PosedProblem, combination: Sequence[str] | None, n_first: int | None = None) -> Baseline:
-    """The constants fitted to a board with known effects (None: as it stands), the law made anew where they move far.
+def fit_with_effects(problem: PosedProblem, combination: Sequence[str] | None, n_first: int | None = None) -> Baseline:
+    """The constants fitted to a board with known effects (None: as it stands), solved again where they move far.
 
-    Only the first `n_first` of the readings tell them, by default all.
+    They are fitted to the first `n_first` readings, by default to all.
     """
     board = problem.board if combination is None else with_combination(problem.board, combination)
-    inputs, fitted = _inputs_of(problem, board), _estimated(problem)
-    models = problem.posterior.models if combination is None else _solved(problem, board, inputs, fitted)
+    inputs, log_rigidities = _inputs_of(problem, board), _estimated_log_rigidities(problem)
+    models = problem.posterior.models if combination is None else _solve_models(problem, board, inputs, log_rigidities)
     rows = labelled_rows(models)
-    for _ in range(_MOST_PLACES):
-        start = fitted
+    for _ in range(_MOST_SOLVES):
+        start = log_rigidities
         law = Predictor(lambda x: _values(board, x, inputs), models, "exact", n_constants=board.symmetry.n)
         for _ in range(_MOST_LABELLINGS):
-            kept = np.flatnonzero(rows[:n_first] >= 0)  # readings that are a mode
-            fitted = refit(law.of(rows[kept]), log_measured(board)[kept], reading_scales(board)[kept], fitted)
-            before, rows = rows, _likely(problem, law, rows, fitted)
-            if np.array_equal(rows, before):
+            used_readings = np.flatnonzero(rows[:n_first] >= 0)  # readings that are a mode
+            log_rigidities = refit(
+                law.of(rows[used_readings]),
+                log_measured(board)[used_readings],
+                reading_scales(board)[used_readings],
+                log_rigidities,
+            )
+            previous_rows, rows = rows, _likely_rows(problem, law, rows, log_rigidities)
+            if np.array_equal(rows, previous_rows):
                 break
-        rows = before
-        if np.abs(fitted - start).max() <= _NEAR:
+        rows = previous_rows
+        if np.abs(log_rigidities - start).max() <= _LAW_REACH:
             break
-        models = _solved(problem, board, inputs, fitted)
+        models = _solve_models(problem, board, inputs, log_rigidities)
     return Baseline(
         board=board,
-        values=_values(board, fitted, inputs),
-        log_rigidities=fitted,
+        values=_values(board, log_rigidities, inputs),
+        log_rigidities=log_rigidities,
         log_readings=log_measured(board),
         every=PossibleModes(
-            log_frequency=law(fitted[None, :])[0],
-            slopes=sensitivities(law, fitted),
-            input_slopes=np.zeros((sum(len(one.every_place) for one in law.models), 0)),
-            places=tuple(one.every_place for one in law.models),
+            log_frequency=law(log_rigidities[None, :])[0],
+            slopes=sensitivities(law, log_rigidities),
+            input_slopes=np.zeros((sum(len(model.every_place) for model in law.models), 0)),
+            places=tuple(model.every_place for model in law.models),
             inputs=np.zeros(0),
             peaks=(None,) * len(law.models),
             predict=law,
@@ -140,64 +148,73 @@ def fit_with(problem: PosedProblem, combination: Sequence[str] | None, n_first: 
     )
 
 
-def _likely(problem: PosedProblem, law: Predictor, rows: Rows, fitted: Floats) -> Rows:
-    """The likely labels at fitted constants, whose own misfit tells the noise.
+def _likely_rows(problem: PosedProblem, law: Predictor, rows: ModeIndices, log_rigidities: Floats) -> ModeIndices:
+    """The likely labels of the readings at fitted constants, with the noise from the misfit there.
 
-    The same where all labels are certain, and where the plate's symmetry is another, so that modes cannot be told.
+    `rows` where all labels are certain, and where the plate has another symmetry, so that its modes do not correspond.
     """
     if not any(problem.posterior.peaks):
         return rows
-    predicted = law(fitted[None, :])
+    predicted = law(log_rigidities[None, :])
     if predicted.shape[1] != sum(problem.posterior.n_every):
         return rows
-    kept = np.flatnonzero(rows >= 0)
-    off = log_measured(problem.board)[kept] - predicted[0, rows[kept]]
+    used_readings = np.flatnonzero(rows >= 0)
+    residual = log_measured(problem.board)[used_readings] - predicted[0, rows[used_readings]]
     medians = np.array([setup.noise.median for setup in problem.board.setups])
-    noise = np.maximum(medians, float(np.sqrt(np.mean(off**2))))
+    noise = np.maximum(medians, float(np.sqrt(np.mean(residual**2))))
     return likely_labels(baseline_of(problem), predicted, noise[None, :], rows)
 
 
 def _inputs_of(problem: PosedProblem, board: Board) -> Values:
-    """Nominal inputs of a board, but for sizes that it declares and leaves to a prior of the library.
+    """Nominal inputs of a board, but for sizes of declared effects with a prior of the library.
 
-    The readings tell those: they stand at the centre of the posterior of the problem's board.
+    The readings determine these: they have their values at the centre of the posterior of the problem's board.
     """
-    there = problem.parameters.values(problem.centre[None, :])
-    learnt = (one.name for one in board.uncertain if one.is_of_effect and one.source and not one.is_component)
-    return {**board.nominal(), **{name: np.asarray(there[name][0]) for name in learnt}}
+    estimates = problem.parameters.values(problem.centre[None, :])
+    learnt_names = (
+        parameter.name
+        for parameter in board.uncertain
+        if parameter.is_of_effect and parameter.source and not parameter.is_component
+    )
+    return {**board.nominal(), **{name: np.asarray(estimates[name][0]) for name in learnt_names}}
 
 
 def _values(board: Board, log_rigidities: Floats, inputs: Values) -> Values:
     return {**inputs, **board.symmetry.rigidities(np.exp(log_rigidities).T, inputs["poisson_xy"])}
 
 
-def _estimated(problem: PosedProblem) -> Floats:
+def _estimated_log_rigidities(problem: PosedProblem) -> Floats:
     """ln of the free rigidities of the board as it stands."""
     return np.log(problem.board.symmetry.free_of(problem.estimate.values))
 
 
-def _solved(problem: PosedProblem, board: Board, inputs: Values, at: Floats) -> Models:
-    """Every setup solved at given ln D, with the exact law around them for the constants alone.
+def _solve_models(problem: PosedProblem, board: Board, inputs: Values, log_rigidities: Floats) -> Models:
+    """A model of each setup at given ln D, with the exact law around them for the constants alone.
 
-    The mesh is that of the board as it stands, so that its matrices serve again. A mode keeps its class and its rank
-    there, as long as the plate keeps its symmetry: where two modes lie close, their shapes would exchange names from
-    one model to the next, and errors of different modes would be compared.
+    The mesh is that of the board as it stands, so that its matrices are used again. A mode keeps its class and its rank
+    of that board, as long as the plate keeps its symmetry: where two modes lie close, their shapes would exchange names
+    from one model to the next, and errors of different modes would be compared.
     """
-    values, meshed = _values(board, at, inputs), _values(board, _estimated(problem), inputs)
+    values, mesh_values = (
+        _values(board, log_rigidities, inputs),
+        _values(board, _estimated_log_rigidities(problem), inputs),
+    )
     models = []
-    for setup, before in zip(board.setups, problem.posterior.models, strict=True):
+    for setup, fitted_model in zip(board.setups, problem.posterior.models, strict=True):
         system = system_of(board, setup)
-        model = setup_model(system, values, system.plate(meshed))
-        keeps = symmetry_of([model]) == symmetry_of([before])
-        models.append(replace(model, places=before.places, others=before.others) if keeps else model)
-    slopes = board.symmetry.along(np.concatenate([one.sensitivities(values) for one in models]))
+        model = setup_model(system, values, system.plate(mesh_values))
+        keeps_symmetry = symmetry_of([model]) == symmetry_of([fitted_model])
+        models.append(
+            replace(model, places=fitted_model.places, others=fitted_model.others) if keeps_symmetry else model
+        )
+    slopes = board.symmetry.along(np.concatenate([model.sensitivities(values) for model in models]))
     weighted = slopes / reading_scales(board)[:, None]
-    fixed = board.with_priors({name: Quantity.exact(float(value)) for name, value in inputs.items()})
-    parameters = Parameters(fixed)
+    fixed_board = board.with_priors({name: Quantity.exact(float(value)) for name, value in inputs.items()})
+    parameters = Parameters(fixed_board)
     n, covariance = parameters.n_constants, np.eye(parameters.n_dim)
     covariance[:n, :n] = np.linalg.inv(weighted.T @ weighted)
     centre = parameters.theta(values, np.array([setup.noise.median for setup in board.setups]))
-    return exact_models(fixed, models, centre, covariance, is_rough=True, accepted_cents=_ACCEPTED_CENTS)
+    return exact_models(fixed_board, models, centre, covariance, is_rough=True, accepted_cents=_ACCEPTED_CENTS)
 
 
 def known_effects(board: Board) -> tuple[str, ...]:
@@ -205,7 +222,7 @@ def known_effects(board: Board) -> tuple[str, ...]:
     return tuple(
         name
         for name, effect in EFFECTS.items()
-        if effect.is_known(board) and (name in board.effects or acting_at_known_size(board, name))
+        if effect.is_known(board) and (name in board.effects or effects_at_known_size(board, name))
     )
 
 
@@ -214,29 +231,35 @@ def stated_effects(board: Board) -> tuple[str, ...]:
     return tuple(name for name in known_effects(board) if name in board.effects or EFFECTS[name].is_implied(board))
 
 
-def every_combination(board: Board) -> list[tuple[str, ...]]:
-    """Combinations of up to three known effects, fewer ones first, and of all that the card states."""
+def known_combinations(board: Board) -> list[tuple[str, ...]]:
+    """Combinations of up to three known effects, smaller ones first, and that of all effects that the card states."""
     names = known_effects(board)
-    found = [one for n in range(min(MOST_TOGETHER, len(names)) + 1) for one in combinations(names, n)]
+    small_combinations = [
+        combination for n in range(min(MOST_KNOWN_EFFECTS, len(names)) + 1) for combination in combinations(names, n)
+    ]
     stated = stated_effects(board)
-    return [*found, *([stated] if len(stated) > MOST_TOGETHER else [])]
+    return [*small_combinations, *([stated] if len(stated) > MOST_KNOWN_EFFECTS else [])]
 
 
 def with_combination(board: Board, combination: Sequence[str]) -> Board:
-    """A board with some of its known effects and without the others, whether it declares them or not.
+    """A board with a combination of its known effects and without the others, whether it declares them or not.
 
-    What it declares and states in full stays as it is; every other size is fixed at the median of its prior.
+    A size that the card states for a declared effect stays; every other size is fixed at the median of its prior.
     """
-    others = [name for name in known_effects(board) if name in board.effects and name not in combination]
-    kept, new = board.without(others), [name for name in combination if name not in board.effects]
-    acting = [one for name in new for one in acting_at_known_size(board, name)]
-    added = replace(kept, effects=(*kept.effects, *new), chosen=(*kept.chosen, *acting))
-    sizes = {one.name: one for effect in acting for one in effect.parameters()}
-    sizes |= {one.name: one for one in kept.uncertain if one.effect in combination and one.source}
-    return added.with_parameters(replace(size, prior=Quantity.exact(size.prior.median)) for size in sizes.values())
+    left_out = [name for name in known_effects(board) if name in board.effects and name not in combination]
+    kept_board, new_effects = board.without(left_out), [name for name in combination if name not in board.effects]
+    acting_effects = [effect for name in new_effects for effect in effects_at_known_size(board, name)]
+    extended_board = replace(
+        kept_board, effects=(*kept_board.effects, *new_effects), chosen=(*kept_board.chosen, *acting_effects)
+    )
+    sizes = {size.name: size for effect in acting_effects for size in effect.parameters()}
+    sizes |= {size.name: size for size in kept_board.uncertain if size.effect in combination and size.source}
+    return extended_board.with_parameters(
+        replace(size, prior=Quantity.exact(size.prior.median)) for size in sizes.values()
+    )
 
 
-def acting_at_known_size(board: Board, name: str) -> list[Effect]:
+def effects_at_known_size(board: Board, name: str) -> list[Effect]:
     """An effect at its known size in each setup in which it can act."""
-    found = (EFFECTS[name].at_known_size(board, setup) for setup in board.setups)
-    return [one for one in found if one is not None]
+    effects = (EFFECTS[name].at_known_size(board, setup) for setup in board.setups)
+    return [effect for effect in effects if effect is not None]

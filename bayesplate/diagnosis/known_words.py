@@ -1,4 +1,4 @@
-"""What physics knows, in words: the error with effects that were computed and not fitted, whether it falls or rises."""
+"""Known effects in words and in a table: whether the error falls or rises with effects that are not fitted."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import numpy as np
 
 from bayesplate.board.material import MODULI
 from bayesplate.diagnosis.known import KnownFit
-from bayesplate.diagnosis.stated import LEAST_FALL, StatedClaim
+from bayesplate.diagnosis.stated import LEAST_ERROR_FALL, StatedClaim
 from bayesplate.effects.words import effect_name, effect_names
 from bayesplate.frequencies.laws import cents
 from bayesplate.results.contract import rms
 from bayesplate.results.tables import Row, Table
-from bayesplate.results.words import cents_alike, number, percent
+from bayesplate.results.words import cents_texts, number, percent
 
-_COMPUTED = "Computed at its known size, with nothing fitted but the constants by weighted least squares, "
+_COMPUTED_WORDS = "Computed at its known size, with nothing fitted but the constants by weighted least squares, "
 AS_IT_STANDS = "as it stands"
-_RISES = (
+_RISE_WORDS = (
     " Where the error rises, something that acts the other way is lacking, or the effect has another size on this "
     "board, or the fit was that good by chance."
 )
@@ -45,30 +45,30 @@ class KnownModel:
 
 
 def known_models(fits: Sequence[KnownFit], carried: Sequence[int] = ()) -> tuple[KnownModel, ...]:
-    """Errors in cents and changes in percent, the board as it stands first, as in the fits.
+    """Errors in cents and changes in percent, in the order of the fits, the board as it stands first.
 
-    Readings that are carried, whose mode alone carries a constant or a size, count in the left-out error of none.
+    `carried` readings, whose mode alone carries a constant or a size, do not count in the left-out errors.
     """
     if not fits:
         return ()
-    left_out = np.array([one.errors.left_out for one in fits])
+    left_out = np.array([fit.errors.left_out for fit in fits])
     is_of_all = np.isfinite(left_out).all(axis=0)
     is_of_all[list(carried)] = False
     return tuple(
         KnownModel(
-            combination=one.combination,
-            effects=one.effects,
-            without=one.without,
-            in_sample_rms_cents=rms(cents(one.errors.in_sample)) or 0.0,
-            leave_one_out_rms_cents=rms(cents(one.errors.left_out[is_of_all])),
+            combination=fit.combination,
+            effects=fit.effects,
+            without=fit.without,
+            in_sample_rms_cents=rms(cents(fit.errors.in_sample)) or 0.0,
+            leave_one_out_rms_cents=rms(cents(fit.errors.left_out[is_of_all])),
             n_left_out=int(is_of_all.sum()),
             n_readings=is_of_all.size,
             change_percent={
                 name: 100.0 * float(new / old - 1.0)
-                for name, new, old in zip(MODULI, one.moduli, fits[0].moduli, strict=True)
+                for name, new, old in zip(MODULI, fit.moduli, fits[0].moduli, strict=True)
             },
         )
-        for one in fits
+        for fit in fits
     )
 
 
@@ -77,9 +77,9 @@ def known_table(known: Sequence[KnownModel]) -> Table | None:
     if len(known) < 2:
         return None
     rows: list[Row] = []
-    for words, one in zip(known_titles(known), known, strict=True):
-        errors = (number(value, 1) for value in (one.in_sample_rms_cents, one.leave_one_out_rms_cents))
-        changes = (number(value, 1, signed=True) for value in one.change_percent.values())
+    for words, model in zip(known_titles(known), known, strict=True):
+        errors = (number(value, 1) for value in (model.in_sample_rms_cents, model.leave_one_out_rms_cents))
+        changes = (number(value, 1, signed=True) for value in model.change_percent.values())
         rows.append((words, *errors, *changes))
     columns = ("model", "in the fit", "left out", *(f"{name}, %" for name in MODULI))
     keys = ("model", "in_sample_rms_cents", "leave_one_out_rms_cents", *(f"{name}_percent" for name in MODULI))
@@ -96,32 +96,36 @@ def known_titles(known: Sequence[KnownModel]) -> list[str]:
 
 
 def model_words(one: KnownModel) -> str:
-    """Which model it is, by all known effects that it has and the declared ones that it lacks."""
-    parts = [f"with {effect_names(one.combination)}"] if one.combination else []
-    parts += [f"without {effect_names(one.without)}"] if one.without else []
-    return ", ".join(parts) or AS_IT_STANDS
+    """A model in words: the known effects that it has and the declared ones that it lacks."""
+    phrases = [f"with {effect_names(one.combination)}"] if one.combination else []
+    phrases += [f"without {effect_names(one.without)}"] if one.without else []
+    return ", ".join(phrases) or AS_IT_STANDS
 
 
 def known_sentence(known: Sequence[KnownModel]) -> str:
-    """What each known effect does to the error, which model has the lowest, and which two work only together.
+    """How each known effect changes the error, which model has the lowest, and which pairs work only together.
 
-    Empty if there is nothing to tell.
+    Empty if the board has no known effect.
     """
     if len(known) < 2:
         return ""
-    errors = _Errors(known)
-    alone = [one for one in known[1:] if len(one.effects) + len(one.without) == 1]
-    said = [_clause(one, known[0], errors) for one in alone]
+    errors = _ComparedError(known)
+    single_models = [model for model in known[1:] if len(model.effects) + len(model.without) == 1]
+    effect_clauses = [_effect_clause(model, known[0], errors) for model in single_models]
     clauses = "; ".join(
-        words.format(error=f"the {errors.name}" if i == 0 else "it") for i, (words, _) in enumerate(said)
+        words.format(error=f"the {errors.name}" if i == 0 else "it") for i, (words, _) in enumerate(effect_clauses)
     )
-    rises = _RISES if any(is_rise for _, is_rise in said) else ""
-    further = (*_best(known, errors), *_only_together(known, errors), *_of_some(known))
-    return " ".join([f"{_COMPUTED}{clauses}.{rises}", *further])
+    rises = _RISE_WORDS if any(is_rise for _, is_rise in effect_clauses) else ""
+    further_sentences = (
+        *_best_sentences(known, errors),
+        *_pair_sentences(known, errors),
+        *_partial_error_sentences(known),
+    )
+    return " ".join([f"{_COMPUTED_WORDS}{clauses}.{rises}", *further_sentences])
 
 
-def _of_some(known: Sequence[KnownModel]) -> list[str]:
-    """A sentence where left-out errors are not of all readings."""
+def _partial_error_sentences(known: Sequence[KnownModel]) -> list[str]:
+    """A sentence on how many readings have a left-out error, where not all have one."""
     n, n_all = known[0].n_left_out, known[0].n_readings
     if n in (0, n_all):
         return []
@@ -130,78 +134,89 @@ def _of_some(known: Sequence[KnownModel]) -> list[str]:
     ]
 
 
-class _Errors:
+class _ComparedError:
     """The error that models are compared by: left out where every model has one, in the fit otherwise."""
 
     def __init__(self, known: Sequence[KnownModel]) -> None:
-        self._is_left_out = all(one.leave_one_out_rms_cents is not None for one in known)
+        self._is_left_out = all(model.leave_one_out_rms_cents is not None for model in known)
         self.name = "left-out error" if self._is_left_out else "error in the fit"
 
-    def of(self, one: KnownModel) -> float:
-        left_out = one.leave_one_out_rms_cents if self._is_left_out else None
-        return one.in_sample_rms_cents if left_out is None else left_out
+    def of(self, model: KnownModel) -> float:
+        left_out = model.leave_one_out_rms_cents if self._is_left_out else None
+        return model.in_sample_rms_cents if left_out is None else left_out
 
-    def shown(self, *models: KnownModel) -> list[str]:
+    def texts(self, *models: KnownModel) -> list[str]:
         """Errors of some models, cents, with the same decimals."""
-        return cents_alike(*map(self.of, models))
+        return cents_texts(*map(self.of, models))
 
 
-def _clause(one: KnownModel, as_it_stands: KnownModel, errors: _Errors) -> tuple[str, bool]:
-    """What an effect does to {error}, in words, and whether that rises; a stated one from the model without it."""
-    ends = (one, as_it_stands) if one.without else (as_it_stands, one)
-    old, new = errors.shown(*ends)
-    who = f"{effect_name(one.without[0])}, as the card states it," if one.without else effect_names(one.effects)
+def _effect_clause(model: KnownModel, as_it_stands: KnownModel, errors: _ComparedError) -> tuple[str, bool]:
+    """How an effect changes {error}, in words, and whether it rises; a stated effect from the model without it."""
+    before_and_after = (model, as_it_stands) if model.without else (as_it_stands, model)
+    old, new = errors.texts(*before_and_after)
+    subject = (
+        f"{effect_name(model.without[0])}, as the card states it," if model.without else effect_names(model.effects)
+    )
     if old == new:
-        return f"{who} leaves {{error}} at {new} cents", False
-    is_rise = errors.of(ends[1]) > errors.of(ends[0])
-    return f"{who} {'raises' if is_rise else 'lowers'} {{error}} from {old} to {new} cents", is_rise
+        return f"{subject} leaves {{error}} at {new} cents", False
+    is_rise = errors.of(before_and_after[1]) > errors.of(before_and_after[0])
+    return f"{subject} {'raises' if is_rise else 'lowers'} {{error}} from {old} to {new} cents", is_rise
 
 
-def _best(known: Sequence[KnownModel], errors: _Errors) -> list[str]:
-    """Which combination has the lowest error, where there are any beyond single effects."""
+def _best_sentences(known: Sequence[KnownModel], errors: _ComparedError) -> list[str]:
+    """A sentence on the combination with the lowest error, where there are combinations of several effects."""
     if len(known) < 4:
         return []
     best = min(known, key=errors.of)
-    told, first = errors.shown(best, known[0])
-    if told == first:
+    best_error, standing_error = errors.texts(best, known[0])
+    if best_error == standing_error:
         return [f"None of {len(known) - 1} other combinations has a lower {errors.name} than the board as it stands."]
-    return [f"Of {len(known)} combinations the board {model_words(best)} has the lowest {errors.name}, {told} cents."]
+    return [
+        f"Of {len(known)} combinations the board {model_words(best)} has the lowest {errors.name}, {best_error} cents."
+    ]
 
 
-def _only_together(known: Sequence[KnownModel], errors: _Errors) -> list[str]:
-    """Two effects of which either alone raises the error, which both together lower: a sentence each."""
-    found = {frozenset(one.combination): one for one in reversed(known)}
-    standing = frozenset(known[0].combination)
-    said = []
-    for pair in combinations(dict.fromkeys(name for one in known for name in one.combination), 2):
-        rest = standing - set(pair)
-        models = [found[one] for some in ((), pair[:1], pair[1:], pair) if (one := rest | set(some)) in found]
+def _pair_sentences(known: Sequence[KnownModel], errors: _ComparedError) -> list[str]:
+    """A sentence on each pair of effects that lower the error together, though each alone raises it."""
+    models_by_effects = {frozenset(model.combination): model for model in reversed(known)}
+    standing_effects = frozenset(known[0].combination)
+    sentences = []
+    for pair in combinations(dict.fromkeys(name for model in known for name in model.combination), 2):
+        other_effects = standing_effects - set(pair)
+        models = [
+            models_by_effects[combination]
+            for members in ((), pair[:1], pair[1:], pair)
+            if (combination := other_effects | set(members)) in models_by_effects
+        ]
         if len(models) < 4:
             continue
-        neither, first, second, both = map(errors.of, models)
-        if both < neither < min(first, second):
-            shown = errors.shown(*models)
+        without_pair, first, second, with_pair = map(errors.of, models)
+        if with_pair < without_pair < min(first, second):
+            texts = errors.texts(*models)
             name, other = map(effect_name, pair)
-            said.append(
+            sentences.append(
                 f"{effect_names(pair).capitalize()} work only together: {name} alone takes the {errors.name} from "
-                f"{shown[0]} to {shown[1]} cents, {other} alone to {shown[2]}, both to {shown[3]}."
+                f"{texts[0]} to {texts[1]} cents, {other} alone to {texts[2]}, both to {texts[3]}."
             )
-    return said
+    return sentences
 
 
 def stated_sentence(one: StatedClaim) -> str:
-    """What is predicted, the error without and with the stated effects, and whether it is reduced."""
-    who = f"{effect_names(one.effects)}, as stated and not chosen by the readings,"
+    """The predicted setup, its error without and with the stated effects, and whether it is reduced, in words."""
+    subject = f"{effect_names(one.effects)}, as stated and not chosen by the readings,"
     verb = "takes" if len(one.effects) == 1 else "take"
     if one.predicts:
-        what = f"the error of setup '{one.predicts}', predicted by the constants of the first setup alone,"
+        prediction = f"the error of setup '{one.predicts}', predicted by the constants of the first setup alone,"
     else:
-        what = "the left-out error"
-    told = (
-        f"{who[0].upper()}{who[1:]} {verb} {what} from {one.before_rms_cents:.1f} to {one.after_rms_cents:.1f} cents; "
-        f"the log score changes by {one.log_score_gain:+.1f} ± {one.standard_error:.1f} over {one.n_modes} modes"
+        prediction = "the left-out error"
+    sentence = (
+        f"{subject[0].upper()}{subject[1:]} {verb} {prediction} from {one.before_rms_cents:.1f} to "
+        f"{one.after_rms_cents:.1f} cents; the log score changes by {one.log_score_gain:+.1f} ± "
+        f"{one.standard_error:.1f} over {one.n_modes} modes"
     )
     if one.holds:
-        return f"{told}: error reduced."
-    needs = f"that asks for a fall by {percent(LEAST_FALL)} and a score that rises by more than two standard errors"
-    return f"{told}. That an error is reduced is not claimed: {needs}."
+        return f"{sentence}: error reduced."
+    condition = (
+        f"that asks for a fall by {percent(LEAST_ERROR_FALL)} and a score that rises by more than two standard errors"
+    )
+    return f"{sentence}. That an error is reduced is not claimed: {condition}."

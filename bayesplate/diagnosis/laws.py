@@ -1,9 +1,9 @@
 """Exact frequencies of a board with one more effect, over all sizes that the effect may have.
 
-A laboratory names a mode by its figure. Where an effect breaks the symmetry, modes that crossed before now veer, and
-the rank by frequency no longer says which figure it is. So each mode is sought among those of the plate with the effect
-by its share in the shape that it has without. Within a symmetry class of the plate without the effect the rank decides,
-there as everywhere: the lower reading is the lower mode, whatever the two are called.
+A laboratory names a mode by its figure. Where an effect breaks the symmetry, modes that crossed without it veer, and
+the rank by frequency no longer tells the figure. So each mode is followed to the plate with the effect by the share of
+its old shape in the new ones. Within a symmetry class of the plate without the effect the rank decides, as everywhere:
+the lower reading is the lower mode, whatever their labels.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bayesplate.arrays import Floats
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Values
 from bayesplate.board.material import RIGIDITIES
-from bayesplate.diagnosis.baseline import Baseline, Rows, symmetry_of
+from bayesplate.diagnosis.baseline import Baseline, symmetry_of
 from bayesplate.diagnosis.forms import Form
 from bayesplate.frequencies.laws import ExactLaw
 from bayesplate.frequencies.model import OtherMode, SetupModel, setup_model
 from bayesplate.frequencies.system import system_of
-from bayesplate.plate.naming import Place
+from bayesplate.plate.naming import ModePlace
 from bayesplate.plate.reduced import ReducedClass, ReducedOrderModel
 from bayesplate.plate.terms import Parity, Weights
 from bayesplate.posterior.laplace import exact_models
@@ -31,25 +31,25 @@ from bayesplate.posterior.parameters import Parameters
 _ACCEPTED_CENTS = 0.05
 """Error of a law where it is checked, cents. It errs more at the ends of a prior: with half a cent here, transverse
 shear was 0.7 cents off there, which took two nats from its odds on a half-top."""
-_BEYOND = 3
-"""Modes above the wanted ones among which these are sought."""
+_N_SPARE_MODES = 3
+"""Modes above the highest labelled one among which the labelled modes are sought."""
 
 
 @dataclass(frozen=True, eq=False)
-class Following:
-    """Shapes of a block without the effect."""
+class FollowedShapes:
+    """Mode shapes of a block without the effect, by which modes are followed to the plate with it."""
 
     block: ReducedClass
-    # (n_modes, r) array: shape times mass of its lowest modes: their product with another shape is the share
+    # (n_modes, r) array: shape times mass of the lowest modes; the product with another shape is the share
     shapes: Floats
-    wanted: Rows  # (n_wanted,) array of int: which of them are labelled
+    wanted: Indices  # (n_wanted,) array of int: indices of the labelled modes among them
     # tuple of array of int: positions in `wanted` of the modes of one symmetry class, in the order of their ranks
-    groups: tuple[Rows, ...]
+    groups: tuple[Indices, ...]
 
     @classmethod
-    def of(cls, block: ReducedClass, without: Weights, wanted: Rows, groups: tuple[Rows, ...]) -> Following:
-        """Take the shapes at the weights of one draw without the effect."""
-        _, vectors = block.modes(without, int(wanted.max()) + 1 + _BEYOND)
+    def of(cls, block: ReducedClass, without: Weights, wanted: Indices, groups: tuple[Indices, ...]) -> FollowedShapes:
+        """The shapes at the weights of one draw without the effect."""
+        _, vectors = block.modes(without, int(wanted.max()) + 1 + _N_SPARE_MODES)
         return cls(block, vectors[0].T @ block.mass(without)[0], wanted, groups)
 
     def eigenvalues(self, weights: Weights) -> Floats:
@@ -59,29 +59,29 @@ class Following:
         """
         from scipy.optimize import linear_sum_assignment
 
-        values, vectors = self.block.modes(weights, len(self.shapes) + _BEYOND)
+        values, vectors = self.block.modes(weights, len(self.shapes) + _N_SPARE_MODES)
         shares = (self.shapes @ vectors) ** 2
-        found = np.full((len(values), self.wanted.size), np.nan)
+        eigenvalues = np.full((len(values), self.wanted.size), np.nan)
         for draw in np.flatnonzero(np.isfinite(values).all(axis=1)):
             picked = linear_sum_assignment(shares[draw], maximize=True)[1][self.wanted]
-            found[draw] = values[draw, picked]
+            eigenvalues[draw] = values[draw, picked]
         for group in self.groups:
-            found[:, group] = np.sort(found[:, group], axis=1)
-        return found
+            eigenvalues[:, group] = np.sort(eigenvalues[:, group], axis=1)
+        return eigenvalues
 
 
 @dataclass(frozen=True, eq=False)
 class FollowedLaw(ExactLaw):
-    """The exact law of modes that are followed by their shapes, block by block."""
+    """The exact law of modes that are followed by their shapes in each block."""
 
-    following: tuple[Following, ...] = ()
+    following: tuple[FollowedShapes, ...] = ()
 
     def squared(self, weights: Weights) -> Floats:
         """omega^2 in s^-2: (n_draws, n_modes) array; not a number at a draw that is no plate."""
         squared = np.empty((len(weights.stiffness), len(self.reduced.places)))
-        for each in self.following:
-            own = [place.parity == each.block.parity for place in self.reduced.places]
-            squared[:, own] = each.eigenvalues(weights)
+        for shapes in self.following:
+            is_of_block = [place.parity == shapes.block.parity for place in self.reduced.places]
+            squared[:, is_of_block] = shapes.eigenvalues(weights)
         return squared
 
 
@@ -98,99 +98,108 @@ class FormLaw:
 
     def every_log_frequency(self, baseline: Baseline, log_rigidities: Floats, values: Mapping[str, Floats]) -> Floats:
         """ln f (Hz) of all modes that the baseline's readings may be, at the same values: (n, n_every) array."""
-        there = _with_rigidities(baseline, _inputs(baseline, self.form) | dict(values), np.exp(log_rigidities).T)
-        parts = [model.every_log_frequency(there, "exact") for model in self.models]
-        return np.concatenate(parts, axis=1) + baseline.every.discrepancy
+        all_values = _with_rigidities(baseline, _inputs(baseline, self.form) | dict(values), np.exp(log_rigidities).T)
+        by_setup = [model.every_log_frequency(all_values, "exact") for model in self.models]
+        return np.concatenate(by_setup, axis=1) + baseline.every.discrepancy
 
     def placed(self, baseline: Baseline) -> FormLaw:
         """The same law with the modes of a baseline, which may be another board of the same sizes.
 
-        Where the effect keeps the symmetry a mode keeps its class and its rank there. Elsewhere it is found by its
-        frequency without the effect, and followed from there by its shape.
+        Where the effect keeps the symmetry, a mode keeps its class and its rank there. Elsewhere it is found by its
+        frequency on the plate without the effect, and followed by its shape to the plate with it.
         """
-        stations = [[self._placed(baseline, i, one) for one in model.stations] for i, model in enumerate(self.models)]
+        stations = [
+            [self._place_station(baseline, i, station) for station in model.stations]
+            for i, model in enumerate(self.models)
+        ]
         return replace(self, models=tuple(replace(first, roved=tuple(rest)) for first, *rest in stations))
 
-    def _placed(self, baseline: Baseline, setup: int, model: SetupModel) -> SetupModel:
+    def _place_station(self, baseline: Baseline, setup: int, model: SetupModel) -> SetupModel:
         """One station of a setup with the modes of a baseline."""
         assert model.exact is not None
-        of_base, n_labelled = baseline.every.places[setup], len(model.setup.readings)
+        base_places, n_labelled = baseline.every.places[setup], len(model.setup.readings)
         if symmetry_of([model])[0] == baseline.symmetry[setup]:
-            places = of_base
+            places = base_places
             exact = ExactLaw(replace(model.exact.reduced, places=places))
         else:
-            places = self._by_frequency(baseline, setup, model)
+            places = self._places_by_frequency(baseline, setup, model)
             reduced = replace(model.exact.reduced, places=places)
-            exact = FollowedLaw(reduced, following=self._followed(baseline, model, reduced, of_base))
+            exact = FollowedLaw(reduced, following=self._followed_shapes(baseline, model, reduced, base_places))
         others = tuple(OtherMode(place, None) for place in places[n_labelled:])
         return replace(model, places=places[:n_labelled], others=others, exact=exact)
 
-    def _followed(
-        self, baseline: Baseline, model: SetupModel, reduced: ReducedOrderModel, of_base: Sequence[Place]
-    ) -> tuple[Following, ...]:
-        """Shapes without the effect, block by block."""
-        weights = model.system.weights(self._without(baseline))
-        result = []
+    def _followed_shapes(
+        self, baseline: Baseline, model: SetupModel, reduced: ReducedOrderModel, base_places: Sequence[ModePlace]
+    ) -> tuple[FollowedShapes, ...]:
+        """Mode shapes of each block without the effect."""
+        weights = model.system.weights(self._values_without_effect(baseline))
+        followed_shapes = []
         for block in reduced.classes:
             rows = np.flatnonzero([place.parity == block.parity for place in reduced.places])
             classes: dict[object, list[int]] = {}
             for position, row in enumerate(rows):
-                classes.setdefault(of_base[int(row)].parity, []).append(position)
+                classes.setdefault(base_places[int(row)].parity, []).append(position)
             groups = tuple(
-                np.array(sorted(members, key=lambda position: of_base[int(rows[position])].rank))
+                np.array(sorted(members, key=lambda position: base_places[int(rows[position])].rank))
                 for members in classes.values()
             )
-            wanted = np.array([reduced.places[row].rank for row in rows])
-            result.append(Following.of(block, weights, wanted, groups))
-        return tuple(result)
+            ranks = np.array([reduced.places[row].rank for row in rows])
+            followed_shapes.append(FollowedShapes.of(block, weights, ranks, groups))
+        return tuple(followed_shapes)
 
-    def _without(self, baseline: Baseline) -> Values:
+    def _values_without_effect(self, baseline: Baseline) -> Values:
         """Values of the baseline with the effect absent, whether its sizes are free or exact."""
-        sizes = [one for one in self.form.board.parameters if one.effect and one.effect not in baseline.board.effects]
-        nothing = {one.name: np.full(1, one.null) for one in sizes if one.null is not None}
-        free = np.exp(baseline.log_rigidities)[:, None]
-        return _with_rigidities(baseline, _inputs(baseline, self.form) | nothing, free)
+        sizes = [
+            parameter
+            for parameter in self.form.board.parameters
+            if parameter.effect and parameter.effect not in baseline.board.effects
+        ]
+        null_values = {parameter.name: np.full(1, parameter.null) for parameter in sizes if parameter.null is not None}
+        free_rigidities = np.exp(baseline.log_rigidities)[:, None]
+        return _with_rigidities(baseline, _inputs(baseline, self.form) | null_values, free_rigidities)
 
-    def _by_frequency(self, baseline: Baseline, setup: int, model: SetupModel) -> tuple[Place, ...]:
-        """Where the modes of a setup stand on the plate with the effect absent, each at a place of its own."""
+    def _places_by_frequency(self, baseline: Baseline, setup: int, model: SetupModel) -> tuple[ModePlace, ...]:
+        """The places of the modes of a setup on the plate with the effect absent, each at a place of its own."""
         from scipy.optimize import linear_sum_assignment
 
-        of_base = baseline.every.places[setup]
+        base_places = baseline.every.places[setup]
         assert model.exact is not None
-        weights = model.system.weights(self._without(baseline))
+        weights = model.system.weights(self._values_without_effect(baseline))
         start = baseline.every.starts[setup]
-        of_plate = baseline.every.log_frequency - baseline.every.discrepancy
-        wanted = of_plate[start : start + len(of_base)]
-        found: dict[int, Place] = {}
+        plate_log_frequency = baseline.every.log_frequency - baseline.every.discrepancy
+        base_log_frequency = plate_log_frequency[start : start + len(base_places)]
+        places: dict[int, ModePlace] = {}
         for block in model.exact.reduced.classes:
             rows = [
-                i for i, place in enumerate(of_base) if merged(place.parity, symmetry_of([model])[0]) == block.parity
+                i
+                for i, place in enumerate(base_places)
+                if merged_parity(place.parity, symmetry_of([model])[0]) == block.parity
             ]
-            there = 0.5 * np.log(block.eigenvalues(weights)[0]) - np.log(2.0 * np.pi)
-            misses = (wanted[rows, None] - there) ** 2
+            block_log_frequency = 0.5 * np.log(block.eigenvalues(weights)[0]) - np.log(2.0 * np.pi)
+            misses = (base_log_frequency[rows, None] - block_log_frequency) ** 2
             for row, rank in zip(*linear_sum_assignment(misses), strict=True):
-                at = rows[int(row)]
-                found[at] = Place(block.parity, int(rank), of_base[at].correlation)
-        return tuple(found[i] for i in range(len(of_base)))
+                position = rows[int(row)]
+                places[position] = ModePlace(block.parity, int(rank), base_places[position].correlation)
+        return tuple(places[i] for i in range(len(base_places)))
 
 
 def form_law(baseline: Baseline, form: Form, half_width: float | None = None) -> FormLaw:
     """Solve a form around a baseline and over the prior of its parameters.
 
-    `half_width` is that of the region in ln D_x / D_s and ln D_y / D_s, of which an isotropic board has none; by
-    default three standard deviations of the fit.
+    `half_width` is half the width of the region in ln D_x / D_s and ln D_y / D_s, ratios that an isotropic board does
+    not have; by default three standard deviations of the fit.
     """
     board = form.board
     parameters = Parameters(board)
     values = dict(_inputs(baseline, form))
-    middle = {free.name: np.asarray(free.prior.median) for free in form.free}
-    at_middle = {**values, **middle, **{n: baseline.values[n] for n in RIGIDITIES}}
+    medians = {free.name: np.asarray(free.prior.median) for free in form.free}
+    median_values = {**values, **medians, **{n: baseline.values[n] for n in RIGIDITIES}}
     models = tuple(
-        _with_others(setup_model(system_of(board, setup), at_middle), baseline, i)
+        _with_modes_of_baseline(setup_model(system_of(board, setup), median_values), baseline, i)
         for i, setup in enumerate(board.setups)
     )
     noise = np.array([setup.noise.median for setup in board.setups])
-    centre = parameters.theta(at_middle, noise)
+    centre = parameters.theta(median_values, noise)
     n, covariance = parameters.n_constants, np.eye(parameters.n_dim)
     if half_width is None:
         weighted = baseline.slopes / baseline.scales[:, None]
@@ -200,26 +209,26 @@ def form_law(baseline: Baseline, form: Form, half_width: float | None = None) ->
     return FormLaw(form, exact_models(board, models, centre, covariance, accepted_cents=_ACCEPTED_CENTS))
 
 
-def merged(parity: Parity, symmetry: tuple[bool, bool]) -> Parity:
+def merged_parity(parity: Parity, symmetry: tuple[bool, bool]) -> Parity:
     """The class of a mode on a plate that has only the given symmetries left."""
     return Parity(parity.x if symmetry[0] else 0, parity.y if symmetry[1] else 0)
 
 
-def _with_others(model: SetupModel, baseline: Baseline, setup: int) -> SetupModel:
-    """A model of as many modes of each class as the baseline has of those that fall into it."""
+def _with_modes_of_baseline(model: SetupModel, baseline: Baseline, setup: int) -> SetupModel:
+    """A model with as many modes of each class as the baseline has modes that fall into this class."""
     if model.roved:
-        first, *rest = (_with_others(one, baseline, setup) for one in model.stations)
+        first, *rest = (_with_modes_of_baseline(station, baseline, setup) for station in model.stations)
         return replace(first, roved=tuple(rest))
-    of_base = baseline.every.places[setup]
+    base_places = baseline.every.places[setup]
     n_readings = len(model.setup.readings)
-    if len(of_base) == n_readings:
+    if len(base_places) == n_readings:
         return model
     symmetry = symmetry_of([model])[0]
-    counts = Counter(merged(place.parity, symmetry) for place in of_base)
-    others = [Place(parity, rank, 0.0) for parity, n in counts.items() for rank in range(n)]
+    counts = Counter(merged_parity(place.parity, symmetry) for place in base_places)
+    other_places = [ModePlace(parity, rank, 0.0) for parity, n in counts.items() for rank in range(n)]
     if symmetry == baseline.symmetry[setup]:
-        others = list(of_base[n_readings:])
-    return replace(model, others=tuple(OtherMode(place, None) for place in others))
+        other_places = list(base_places[n_readings:])
+    return replace(model, others=tuple(OtherMode(place, None) for place in other_places))
 
 
 def _with_rigidities(baseline: Baseline, values: Values, free: Floats) -> Values:

@@ -9,32 +9,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.arrays import Floats
-from bayesplate.diagnosis.folds import ALWAYS, CERTAINLY_NEEDED, Nested, nested
+from bayesplate.diagnosis.folds import ANY_LOG_ODDS, NEEDED_LOG_ODDS, NestedErrors, nested_leave_one_out
 from bayesplate.diagnosis.hypotheses import log_evidences, odds_against_none
-from bayesplate.diagnosis.search import Ground, noise_of_board
+from bayesplate.diagnosis.search import SearchGround, simulate_noise
 
 N_SETS = 500
-"""Simulated boards at most, a batch at a time until the answer is certain."""
-_BATCH, _CERTAIN = 100, 0.99
+"""Largest number of simulated boards; they are simulated in batches until the result is certain."""
+_BATCH, _CONFIDENCE = 100, 0.99
 FALSE_ALARMS = 0.02
-"""Share of boards without any effect on which one is called needed."""
-BY_CHANCE = 0.05
+"""Share of boards without any effect on which an effect is called needed."""
+CHANCE_SHARE = 0.05
 """Share of such boards, each made to choose an effect, whose left-out error falls further than a claim needs."""
 
 
 @dataclass(frozen=True, eq=False)
 class NullControl:
-    """What the search makes of readings that contain nothing."""
+    """The odds and the errors of the search on simulated readings without any effect."""
 
     against: Floats  # (n_sets,) array: ln odds that something is lacking against that nothing is
-    # (n,) array: nested leave-one-out rms after over before of the first n sets, every fold made to choose its most
-    # probable effect; None with too few readings, or where nothing is claimed that chance might have chosen
+    # (n,) array: nested leave-one-out rms after over before of the first n sets, every fold forced to choose its most
+    # probable effect; None with too few readings, or where no effect is claimed
     ratio: Floats | None = None
     residuals: Floats | None = None  # (n_sets, n_modes) array: the sets themselves, ln f
-    folded: Nested | None = None  # the errors that the ratios are of
+    folded: NestedErrors | None = None  # the errors that the ratios are of
 
     def without(self, carried: Sequence[int]) -> NullControl:
-        """The same sets, some readings not counted in the ratios, for their modes alone carry something."""
+        """The same sets without some readings in the ratios, because their modes alone carry a constant or a size."""
         if self.folded is None or not carried:
             return self
         folded = self.folded.without(carried)
@@ -42,13 +42,14 @@ class NullControl:
 
     @property
     def needed_from(self) -> float:
-        """ln odds against no effect above which one is needed: those of the false alarms, or of certainty if less.
+        """ln odds against no effect above which an effect is needed: the smaller of the quantile that allows the share
+        of false alarms, and `NEEDED_LOG_ODDS`.
 
-        Of certainty too where there is nothing that could be lacking, and so no odds.
+        `NEEDED_LOG_ODDS` too where no effect can act, so that there are no odds.
         """
         if not np.isfinite(self.against).all():
-            return CERTAINLY_NEEDED
-        return min(float(np.quantile(self.against, 1.0 - FALSE_ALARMS)), CERTAINLY_NEEDED)
+            return NEEDED_LOG_ODDS
+        return min(float(np.quantile(self.against, 1.0 - FALSE_ALARMS)), NEEDED_LOG_ODDS)
 
     @property
     def flagged(self) -> float:
@@ -57,8 +58,8 @@ class NullControl:
 
     @property
     def ratio_to_beat(self) -> float | None:
-        """The nested ratio that an effect chosen by chance stays above in 95 of 100 null sets."""
-        return None if self.ratio is None else float(np.quantile(self.ratio, BY_CHANCE))
+        """The nested ratio above which an effect chosen by chance stays in 95 of 100 null sets."""
+        return None if self.ratio is None else float(np.quantile(self.ratio, CHANCE_SHARE))
 
     def percentile_of(self, against: float) -> float:
         """Share of null sets with smaller odds against no effect, percent."""
@@ -70,54 +71,53 @@ class NullControl:
 
 
 def null_control(
-    ground: Ground, rng: np.random.Generator, n_sets: int = N_SETS, against: float = np.inf
+    ground: SearchGround, rng: np.random.Generator, n_sets: int = N_SETS, against: float = np.inf
 ) -> NullControl:
-    """Readings of boards like this one without any effect, at most `n_sets`, and the odds that a search gives each of
-    them.
+    """Simulate at most `n_sets` sets of readings of this board without any effect, and search each for its odds.
 
-    Where the ln odds `against` no effect of the board at hand are clearly within chance, fewer sets say so as well.
-    Without ratios, which take as many searches as there are readings: see `made_to_choose`.
+    Fewer sets are simulated where the ln odds `against` no effect of the board at hand are clearly within chance.
+    The ratios, which take as many searches as there are readings, come from `force_choices`.
     """
     sets: list[Floats] = []
     odds: list[Floats] = []
     for n_done in range(0, n_sets, _BATCH):
-        sets.append(noise_of_board(ground.baseline, rng, min(_BATCH, n_sets - n_done)))
+        sets.append(simulate_noise(ground.baseline, rng, min(_BATCH, n_sets - n_done)))
         odds.append(odds_against_none(ground.hypotheses, log_evidences(ground.hypotheses, ground.baseline, sets[-1])))
-        if _share(np.concatenate(odds) > against)[0] > FALSE_ALARMS:
+        if _share_bounds(np.concatenate(odds) > against)[0] > FALSE_ALARMS:
             break
     return NullControl(np.concatenate(odds), residuals=np.concatenate(sets))
 
 
-def made_to_choose(
-    ground: Ground, control: NullControl, ratio: float = np.nan, carried: Sequence[int] = ()
+def force_choices(
+    ground: SearchGround, control: NullControl, ratio: float = np.nan, carried: Sequence[int] = ()
 ) -> NullControl:
-    """The same boards with the errors of their readings left out, every fold made to choose an effect.
+    """The same sets with their nested errors, every fold forced to choose an effect.
 
-    Where it is clear on which side of the threshold the nested `ratio` of the board at hand lies, fewer sets say so as
-    well. Without ratios where there are too few readings.
+    Fewer sets are searched where it is clear on which side of the threshold the nested `ratio` of the board at hand
+    lies. Without ratios where there are too few readings.
     """
     assert control.residuals is not None
-    parts: list[Nested] = []
+    batches: list[NestedErrors] = []
     for first in range(0, len(control.residuals), _BATCH):
-        folded = nested(ground, control.residuals[first : first + _BATCH], ALWAYS)
-        if folded is None:
+        errors = nested_leave_one_out(ground, control.residuals[first : first + _BATCH], ANY_LOG_ODDS)
+        if errors is None:
             return control
-        parts.append(folded.without(carried))
-        low, high = _share(np.concatenate([one.ratio for one in parts]) <= ratio)
-        if not np.isnan(ratio) and (low > BY_CHANCE or high < BY_CHANCE):
+        batches.append(errors.without(carried))
+        low, high = _share_bounds(np.concatenate([batch.ratio for batch in batches]) <= ratio)
+        if not np.isnan(ratio) and (low > CHANCE_SHARE or high < CHANCE_SHARE):
             break
     before, after, chosen = (
-        np.concatenate([getattr(one, name) for one in parts]) for name in ("before", "after", "chosen")
+        np.concatenate([getattr(batch, name) for batch in batches]) for name in ("before", "after", "chosen")
     )
-    every = Nested(before, after, chosen).without(carried)
-    return replace(control, ratio=every.ratio, folded=every)
+    all_errors = NestedErrors(before, after, chosen).without(carried)
+    return replace(control, ratio=all_errors.ratio, folded=all_errors)
 
 
-def _share(is_so: NDArray[np.bool_]) -> tuple[float, float]:
-    """Bounds of Clopper and Pearson on a share, each certain to `_CERTAIN`."""
+def _share_bounds(flags: NDArray[np.bool_]) -> tuple[float, float]:
+    """Bounds of Clopper and Pearson on a share, each with the confidence `_CONFIDENCE`."""
     from scipy.special import betaincinv
 
-    n, k = is_so.size, int(is_so.sum())
-    low = float(betaincinv(k, n - k + 1, 1.0 - _CERTAIN)) if k else 0.0
-    high = float(betaincinv(k + 1, n - k, _CERTAIN)) if k < n else 1.0
+    n, k = flags.size, int(flags.sum())
+    low = float(betaincinv(k, n - k + 1, 1.0 - _CONFIDENCE)) if k else 0.0
+    high = float(betaincinv(k + 1, n - k, _CONFIDENCE)) if k < n else 1.0
     return low, high

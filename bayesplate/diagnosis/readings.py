@@ -1,4 +1,4 @@
-"""A reading that is simply wrong: without it the others agree with the model, and nothing else explains the misfit."""
+"""A wrong reading: without it the other readings agree with the model, and no effect explains the misfit."""
 
 from __future__ import annotations
 
@@ -6,55 +6,59 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayesplate.diagnosis.folds import FEWEST
-from bayesplate.diagnosis.search import PASSES, SearchResult, predictive_p_value
-from bayesplate.diagnosis.verdict import CLEARLY, p_words
+from bayesplate.diagnosis.folds import FEWEST_MODES
+from bayesplate.diagnosis.search import LEAST_P_VALUE, SearchResult, predictive_p_value
+from bayesplate.diagnosis.verdict import CLEAR_FACTOR, p_value_words
 from bayesplate.frequencies.laws import cents
 
 
 @dataclass(frozen=True)
-class Suspect:
-    """A reading without which the others agree."""
+class SuspectReading:
+    """A reading without which the others agree with the model."""
 
     index: int  # among all readings
-    p_value: float  # of the others
-    off: float  # ln of the reading over what the others let expect
-    log_weight: float  # how little the others expect it: minus the log density of the reading, given them
+    p_value: float  # of the other readings
+    off: float  # ln of the reading over its prediction by the others
+    log_weight: float  # minus the log density of the reading, given the others
 
 
-def suspects(found: SearchResult) -> tuple[Suspect, ...]:
-    """Readings without any one of which the others agree with the model, the least expected first."""
+def suspect_readings(found: SearchResult) -> tuple[SuspectReading, ...]:
+    """Readings without which, each by itself, the others agree with the model; the least expected first."""
     ground = found.ground
-    if ground.baseline.n_modes < FEWEST or found.p_value(0) >= PASSES:
-        return ()  # too few to tell, or all of them agree
-    bare = ground.hypotheses[0]
-    seen = found.seen(0)
-    whole = float(bare.terms.log_evidence(seen)[0])
-    errors = bare.terms.left_out(seen)[1][:, 0]
-    told = []
-    for index in bare.own.used:
-        rows = bare.own.rows.copy()
+    if ground.baseline.n_modes < FEWEST_MODES or found.p_value(0) >= LEAST_P_VALUE:
+        return ()  # too few readings, or all of them agree
+    bare_hypothesis = ground.hypotheses[0]
+    residuals = found.seen(0)
+    log_evidence = float(bare_hypothesis.terms.log_evidence(residuals)[0])
+    errors = bare_hypothesis.terms.left_out(residuals)[1][:, 0]
+    suspects = []
+    for index in bare_hypothesis.own.used:
+        rows = bare_hypothesis.own.rows.copy()
         rows[index] = -1
-        others = bare.labelled(bare.own, rows)
-        p_value = float(predictive_p_value(others, bare.own, seen)[0])
-        if p_value >= PASSES:
-            weight = float(others.terms.log_evidence(others.seen(bare.own, seen))[0]) - whole
-            told.append(Suspect(int(index), p_value, float(errors[index]), weight))
-    return tuple(sorted(told, key=lambda one: -one.log_weight))
+        hypothesis_without = bare_hypothesis.labelled(bare_hypothesis.own, rows)
+        p_value = float(predictive_p_value(hypothesis_without, bare_hypothesis.own, residuals)[0])
+        if p_value >= LEAST_P_VALUE:
+            weight = (
+                float(hypothesis_without.terms.log_evidence(hypothesis_without.seen(bare_hypothesis.own, residuals))[0])
+                - log_evidence
+            )
+            suspects.append(SuspectReading(int(index), p_value, float(errors[index]), weight))
+    return tuple(sorted(suspects, key=lambda suspect: -suspect.log_weight))
 
 
 def wrong_reading(found: SearchResult) -> str:
-    """Which reading to take again, if it alone spoils the fit; empty if none does, or more than one may."""
-    told = suspects(found)
-    if not told or (len(told) > 1 and told[0].log_weight - told[1].log_weight < np.log(CLEARLY)):
+    """A sentence on the reading to take again, if it alone spoils the fit; empty if none does, or several may."""
+    suspects = suspect_readings(found)
+    if not suspects or (len(suspects) > 1 and suspects[0].log_weight - suspects[1].log_weight < np.log(CLEAR_FACTOR)):
         return ""
-    one, baseline = told[0], found.ground.baseline
-    setup = baseline.board.setups[baseline.setup_index[one.index]]
-    place = one.index - int(np.flatnonzero(baseline.setup_index == baseline.setup_index[one.index])[0])
-    label, hertz = setup.labels[place], float(setup.measured[place])
-    where = f" in setup {setup.name}" if len(baseline.board.setups) > 1 else ""
+    suspect, baseline = suspects[0], found.ground.baseline
+    setup = baseline.board.setups[baseline.setup_index[suspect.index]]
+    position = suspect.index - int(np.flatnonzero(baseline.setup_index == baseline.setup_index[suspect.index])[0])
+    label, hertz = setup.labels[position], float(setup.measured[position])
+    setup_words = f" in setup {setup.name}" if len(baseline.board.setups) > 1 else ""
     return (
-        f"Read {label}{where} again: without it the other readings agree with the model ({p_words(one.p_value)}). It "
-        f"was read as {hertz:.6g} Hz, {abs(float(cents(np.asarray(one.off)))):.0f} cents "
-        f"{'above' if one.off > 0 else 'below'} the {hertz * np.exp(-one.off):.4g} Hz that they let expect."
+        f"Read {label}{setup_words} again: without it the other readings agree with the model "
+        f"({p_value_words(suspect.p_value)}). It was read as {hertz:.6g} Hz, "
+        f"{abs(float(cents(np.asarray(suspect.off)))):.0f} cents "
+        f"{'above' if suspect.off > 0 else 'below'} the {hertz * np.exp(-suspect.off):.4g} Hz that they let expect."
     )

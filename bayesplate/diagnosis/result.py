@@ -10,7 +10,7 @@ from bayesplate.diagnosis.claim import Condition
 from bayesplate.diagnosis.hypotheses import RELABELLING
 from bayesplate.diagnosis.known_words import KnownModel
 from bayesplate.diagnosis.stated import StatedClaim
-from bayesplate.diagnosis.verdict import Word
+from bayesplate.diagnosis.verdict import VerdictWord
 from bayesplate.estimates.leave_one_out import CarryingMode
 from bayesplate.results.contract import NOT_IN_JSON, Spread, as_json
 
@@ -18,7 +18,7 @@ FORMAT = 1
 
 
 @dataclass(frozen=True, kw_only=True)
-class Errors:
+class ModelErrors:
     """The errors of a model; None for what these readings are too few to tell."""
 
     in_sample_rms_cents: float  # of the modes that the fit has seen
@@ -84,7 +84,7 @@ class Finalist:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Explanation:
+class ExplanationSummary:
     """One way to explain the residual, an effect, a pair or an exchange of labels, with its probability."""
 
     effects: tuple[str, ...]
@@ -132,7 +132,7 @@ class Diagnosis:
     probability_of_none : float
     probability_of_none_with_halved_priors, probability_of_none_with_doubled_priors : float
     p_value : PValues
-    before, after : Errors
+    before, after : ModelErrors
         The same where nothing was added.
     gain_null_percentile : float or None
         Share of simulated boards without any effect with smaller odds against no effect, percent; None where no
@@ -145,7 +145,7 @@ class Diagnosis:
     elastic_averaged, rigidity_averaged : dict of Spread
         The constants to quote, Pa and N m: averaged over everything that may be the case, each by its probability; if
         nothing explains the readings, those of the first fit. The rigidities are not written to JSON.
-    answers : tuple of Explanation
+    answers : tuple of ExplanationSummary
         Best first; with the probability of none they sum to one.
     candidates : tuple of EffectEntry and ExchangeEntry
     recommendation : str
@@ -163,7 +163,7 @@ class Diagnosis:
     name: str
     seed: int
     card_sha256: str
-    verdict: Word
+    verdict: VerdictWord
     claim: bool
     conditions: tuple[Condition, ...]
     effects: tuple[str, ...]
@@ -179,15 +179,15 @@ class Diagnosis:
     probability_of_none_with_halved_priors: float
     probability_of_none_with_doubled_priors: float
     p_value: PValues
-    before: Errors
-    after: Errors
+    before: ModelErrors
+    after: ModelErrors
     gain_null_percentile: float | None
     null_control: NullControlSummary
     elastic_shift: Mapping[str, ElasticShift]
     finalists: tuple[Finalist, ...]
     elastic_averaged: Mapping[str, Spread]
     rigidity_averaged: Mapping[str, Spread] = field(metadata=NOT_IN_JSON)
-    answers: tuple[Explanation, ...]
+    answers: tuple[ExplanationSummary, ...]
     candidates: tuple[CandidateEntry, ...]
     recommendation: str
     notes: tuple[str, ...]
@@ -201,14 +201,14 @@ class Diagnosis:
         return bool(self.refitted)
 
     def __repr__(self) -> str:
-        named = f": {', '.join(self.effects)}" if self.effects else ""
+        effects = f": {', '.join(self.effects)}" if self.effects else ""
         claim = ", error reduced" if self.claim else ""
-        return f"<Diagnosis of {self.name}, {self.verdict}{named}{claim}>"
+        return f"<Diagnosis of {self.name}, {self.verdict}{effects}{claim}>"
 
     def _repr_html_(self) -> str:
-        from bayesplate.diagnosis.tables import html
+        from bayesplate.diagnosis.tables import diagnosis_html
 
-        return html(self)
+        return diagnosis_html(self)
 
 
 def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The search: from tables of shifts to the probability of every hypothesis and effect, and to the p-value of each."""
+"""The search: the probability of each hypothesis and effect from tables of shifts, and the p-value of each."""
 
 from __future__ import annotations
 
@@ -11,38 +11,38 @@ import numpy as np
 from bayesplate.arrays import Floats
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.forms import Form, forms
-from bayesplate.diagnosis.hypotheses import Hypothesis, hypotheses, log_evidences, odds_against_none, probabilities
+from bayesplate.diagnosis.hypotheses import Hypothesis, log_evidences, make_hypotheses, odds_against_none, probabilities
 from bayesplate.diagnosis.laws import FormLaw, form_law
-from bayesplate.diagnosis.shifts import COARSE, Cells, refitted, tabulate
+from bayesplate.diagnosis.shifts import COARSE_CELLS, Cells, refitted_shifts, tabulate
 from bayesplate.diagnosis.signatures import Signature, signature
-from bayesplate.diagnosis.terms import Terms
+from bayesplate.diagnosis.terms import NormalTerms
 
 LEAST_TRACE = 2.0
 """Length of a trace, in units of the readings' uncertainty, from which an effect may be one of two."""
-PASSES = 0.05
-_LEAST, _MOST = 1000, 20_000
-"""Simulated sets of readings: make the standard error of a p-value of 0.05 a seventh, or a thirtieth, of it."""
+LEAST_P_VALUE = 0.05
+_LEAST_SETS, _MOST_SETS = 1000, 20_000
+"""Simulated sets of readings: the standard error of a p-value of 0.05 is then a seventh, or a thirtieth, of it."""
 _MOST_TERMS = 2_000_000
-"""Normal densities up to which more sets are simulated than the least."""
+"""Normal densities to compute, up to which more than the least number of sets are simulated."""
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An effect that is tried."""
+    """An effect that the search tries, with its laws and tables."""
 
     name: str
     laws: tuple[FormLaw, ...]
     fine: Cells
     coarse: Cells
-    signature: Signature  # of the form that shows most
-    # length of its visible shift at nominal size, at the constants of a board with the effect that looks like the one
-    # at hand, in units of the readings' uncertainty: what the search goes by
+    signature: Signature  # of the most visible form
+    # length of its visible shift at nominal size, in units of the readings' uncertainty, at the constants that a board
+    # with the effect and the same frequencies would have
     trace: float
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
-    """Everything about a board that a search needs, whatever the readings turn out to be."""
+class SearchGround:
+    """The baseline, candidates and hypotheses of a board: all that a search needs beside a residual."""
 
     baseline: Baseline
     candidates: Mapping[str, Candidate]
@@ -50,20 +50,21 @@ class Ground:
 
     @property
     def n_directions(self) -> int:
-        """Directions of the readings that the constants cannot reach, and that are left to judge by."""
+        """Directions of the readings that the constants cannot reach, by which hypotheses are judged."""
         return len(self.baseline.blind)
 
     @property
     def paired(self) -> tuple[str, ...]:
-        """Effects that may be one of two: those whose trace the search could see."""
-        return tuple(name for name, one in self.candidates.items() if not one.trace < LEAST_TRACE)
+        """Effects that may be in a pair: those with a trace that the search can see."""
+        return tuple(name for name, candidate in self.candidates.items() if not candidate.trace < LEAST_TRACE)
 
-    def with_hypotheses(self, paired: Sequence[str]) -> Ground:
-        """The same candidates and every hypothesis about them, pairs being of these effects."""
+    def with_hypotheses(self, paired: Sequence[str]) -> SearchGround:
+        """The same candidates and all hypotheses about them, with pairs of the effects `paired`."""
         fine, coarse = (
-            {name: getattr(one, kind) for name, one in self.candidates.items()} for kind in ("fine", "coarse")
+            {name: getattr(candidate, kind) for name, candidate in self.candidates.items()}
+            for kind in ("fine", "coarse")
         )
-        return replace(self, hypotheses=hypotheses(self.baseline, fine, coarse, paired))
+        return replace(self, hypotheses=make_hypotheses(self.baseline, fine, coarse, paired))
 
     def members(self, index: int) -> tuple[Candidate, ...]:
         """The effects of a hypothesis; none where it only exchanges labels."""
@@ -72,9 +73,9 @@ class Ground:
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """What the search finds in one set of readings."""
+    """The evidence and the probability of each hypothesis, given one set of readings."""
 
-    ground: Ground
+    ground: SearchGround
     residual: Floats  # (n_modes,) array: ln measured less ln f of the baseline
     # log_evidence, probability: (n_hypotheses,) array
     log_evidence: Floats
@@ -82,12 +83,12 @@ class SearchResult:
 
     @property
     def none(self) -> float:
-        """Probability that nothing is lacking."""
+        """Probability that no effect is lacking."""
         return float(self.probability[0])
 
     @property
     def against_none(self) -> float:
-        """ln of the odds that something is lacking against that nothing is."""
+        """ln of the odds that an effect is lacking against that none is."""
         if not self.none:  # less than any number: the logarithms still tell how much less
             return float(odds_against_none(self.ground.hypotheses, self.log_evidence))
         with np.errstate(divide="ignore"):
@@ -95,11 +96,11 @@ class SearchResult:
 
     def inclusion(self, name: str) -> float:
         """Probability that an effect is present, alone or with another."""
-        present = [name in one.members for one in self.ground.hypotheses]
+        present = [name in hypothesis.members for hypothesis in self.ground.hypotheses]
         return float(self.probability[present].sum())
 
     def seen(self, index: int) -> Floats:
-        """The residual as a hypothesis reads it: (1, n_modes) array."""
+        """The residual under the labels of a hypothesis: (1, n_modes) array."""
         return self.ground.hypotheses[index].seen(self.ground.baseline, self.residual[None, :])
 
     def cells(self, index: int) -> Floats:
@@ -109,13 +110,13 @@ class SearchResult:
     def p_value(self, index: int) -> float:
         """The prior predictive p-value of a hypothesis."""
         if index not in self._p_values:
-            found = predictive_p_value(self.ground.hypotheses[index], self.ground.baseline, self.residual[None, :])
-            self._p_values[index] = float(found[0])
+            p_values = predictive_p_value(self.ground.hypotheses[index], self.ground.baseline, self.residual[None, :])
+            self._p_values[index] = float(p_values[0])
         return self._p_values[index]
 
     @cached_property
     def _p_values(self) -> dict[int, float]:
-        """Those that were asked for: each takes thousands of simulated readings."""
+        """P-values computed so far, by index: each takes thousands of simulated readings."""
         return {}
 
 
@@ -124,39 +125,45 @@ def prepare_search(
     solve: Callable[[Baseline, Form], FormLaw] = form_law,
     tried: Sequence[str] | None = None,
     tell: Callable[[float], None] | None = None,
-) -> Ground:
-    """Tabulate the candidates of a board, their forms solved by `solve`; without any that leaves no plate."""
-    every = {name: each for name, each in forms(baseline.board).items() if tried is None or name in tried}
-    made = []
-    for name, each in every.items():
-        made.append(_candidate(baseline, name, tuple(solve(baseline, form).placed(baseline) for form in each)))
+) -> SearchGround:
+    """Tabulate the candidates of a board, with forms solved by `solve`; without effects that no plate can have."""
+    forms_by_effect = {
+        name: effect_forms for name, effect_forms in forms(baseline.board).items() if tried is None or name in tried
+    }
+    all_candidates = []
+    for name, effect_forms in forms_by_effect.items():
+        all_candidates.append(
+            _make_candidate(baseline, name, tuple(solve(baseline, form).placed(baseline) for form in effect_forms))
+        )
         if tell is not None:
-            tell(len(made) / len(every))
-    candidates = {one.name: one for one in made if one.fine.n_cells and one.coarse.n_cells}
-    ground = Ground(baseline, candidates, ())
+            tell(len(all_candidates) / len(forms_by_effect))
+    candidates = {
+        candidate.name: candidate for candidate in all_candidates if candidate.fine.n_cells and candidate.coarse.n_cells
+    }
+    ground = SearchGround(baseline, candidates, ())
     return ground.with_hypotheses(ground.paired)
 
 
-def search(ground: Ground, residual: Floats | None = None) -> SearchResult:
-    """Judge one set of readings: those of the board, or others given by their residual."""
+def run_search(ground: SearchGround, residual: Floats | None = None) -> SearchResult:
+    """Compute the probabilities of the hypotheses for the board's readings, or for those of another residual."""
     residual = ground.baseline.residual if residual is None else residual
     evidence = log_evidences(ground.hypotheses, ground.baseline, residual[None, :])
     return SearchResult(ground, residual, evidence[:, 0], probabilities(ground.hypotheses, evidence)[:, 0])
 
 
-def _candidate(baseline: Baseline, name: str, laws: tuple[FormLaw, ...]) -> Candidate:
-    seen, traces = [], []
+def _make_candidate(baseline: Baseline, name: str, laws: tuple[FormLaw, ...]) -> Candidate:
+    signatures, traces = [], []
     for law in laws:
         free = law.form.free
-        nominal = {one.name: np.array([one.nominal]) for one in free}
-        there = law.log_frequencies(baseline, baseline.log_rigidities[None, :], nominal)[0]
-        seen.append(signature(baseline, name, free, there))
-        z = np.array([[float(one.prior.standard(one.nominal)) for one in free]])
-        shift = refitted(baseline, law, z)[0][0, baseline.rows]
+        nominal = {parameter.name: np.array([parameter.nominal]) for parameter in free}
+        log_frequency = law.log_frequencies(baseline, baseline.log_rigidities[None, :], nominal)[0]
+        signatures.append(signature(baseline, name, free, log_frequency))
+        z = np.array([[float(parameter.prior.standard(parameter.nominal)) for parameter in free]])
+        shift = refitted_shifts(baseline, law, z)[0][0, baseline.rows]
         traces.append(np.linalg.norm((shift - baseline.slopes @ (baseline.absorbing @ shift)) / baseline.scales))
-    shown = int(np.argmax([np.nansum((one.visible / one.scales) ** 2) for one in seen]))
-    fine, coarse = tabulate(baseline, laws), tabulate(baseline, laws, COARSE)
-    return Candidate(name, laws, fine, coarse, seen[shown], float(np.fmax.reduce(traces)))
+    strongest = int(np.argmax([np.nansum((signature.visible / signature.scales) ** 2) for signature in signatures]))
+    fine, coarse = tabulate(baseline, laws), tabulate(baseline, laws, COARSE_CELLS)
+    return Candidate(name, laws, fine, coarse, signatures[strongest], float(np.fmax.reduce(traces)))
 
 
 def predictive_p_value(hypothesis: Hypothesis, baseline: Baseline, residuals: Floats) -> Floats:
@@ -171,31 +178,33 @@ def predictive_p_value(hypothesis: Hypothesis, baseline: Baseline, residuals: Fl
     """
     terms = hypothesis.terms
     observed = terms.log_evidence(hypothesis.seen(baseline, residuals))
-    expected = _expected(terms)
+    expected = _simulated_log_evidences(terms)
     return np.asarray((1.0 + np.searchsorted(expected, observed, side="right")) / (1.0 + expected.size))
 
 
-def _expected(terms: Terms) -> Floats:
+def _simulated_log_evidences(terms: NormalTerms) -> Floats:
     """ln of the marginal density of readings simulated under a hypothesis, in ascending order: (n_sets,) array."""
     rng = np.random.default_rng(0)
-    n_batches = int(np.clip(_MOST_TERMS // terms.log_weights.size, _LEAST, _MOST)) // _LEAST
-    return np.sort(np.concatenate([terms.log_evidence(_simulated(terms, rng, _LEAST)) for _ in range(n_batches)]))
+    n_batches = int(np.clip(_MOST_TERMS // terms.log_weights.size, _LEAST_SETS, _MOST_SETS)) // _LEAST_SETS
+    return np.sort(
+        np.concatenate([terms.log_evidence(_simulate_residuals(terms, rng, _LEAST_SETS)) for _ in range(n_batches)])
+    )
 
 
-def _simulated(terms: Terms, rng: np.random.Generator, n_sets: int) -> Floats:
-    """Residuals with an effect whose size is drawn from its prior: (n_sets, n_modes) array, ln f."""
+def _simulate_residuals(terms: NormalTerms, rng: np.random.Generator, n_sets: int) -> Floats:
+    """Simulated residuals with an effect whose size is drawn from its prior: (n_sets, n_modes) array, ln f."""
     table = terms.table
     cells = rng.choice(table.n_cells, n_sets, p=table.weights / table.weights.sum())
-    along = rng.standard_normal((n_sets, table.slopes.shape[2]))
-    effect = table.shift[cells] + np.einsum("nip,np->ni", table.slopes[cells], along)
-    return effect + noise_of_board(terms.baseline, rng, n_sets)
+    coordinates = rng.standard_normal((n_sets, table.slopes.shape[2]))
+    effect = table.shift[cells] + np.einsum("nip,np->ni", table.slopes[cells], coordinates)
+    return effect + simulate_noise(terms.baseline, rng, n_sets)
 
 
-def noise_of_board(baseline: Baseline, rng: np.random.Generator, n_sets: int) -> Floats:
-    """Residuals of readings without any effect: (n_sets, n_modes) array, ln f.
+def simulate_noise(baseline: Baseline, rng: np.random.Generator, n_sets: int) -> Floats:
+    """Simulated residuals of readings without any effect: (n_sets, n_modes) array, ln f.
 
-    Noise levels and inputs are drawn from their priors; the constants need no drawing, for the search does not see
-    them.
+    Noise levels and inputs are drawn from their priors. The constants are not drawn, because the search does not depend
+    on them.
     """
     noise = [setup.noise.value(rng.standard_normal(n_sets)) for setup in baseline.board.setups]
     sd = np.sqrt(np.stack(noise, axis=1)[:, baseline.setup_index] ** 2 + baseline.own_variance)

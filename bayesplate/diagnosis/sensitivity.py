@@ -1,12 +1,12 @@
-"""How far the answer hangs on what was assumed: the same search with other priors, and under the exact law.
+"""Sensitivity of a search to its assumptions: the same search with other priors, and under the exact law.
 
 The terms are linear in the constants about the fit of the ideal board. Where an effect moves the constants far, or the
-law bends within their uncertainty, that is not exact: a draw x of them then counts by the weight
+law bends within their uncertainty, that is not exact: a draw x of the constants then has the weight
 
     w(x) = L_exact(x) / L_linear(x),
 
-the mean of which over the draws is the evidence's correction. Exact in the constants and in the size of each effect;
-of two effects that were not solved together the shifts at a draw's constants add, and uncertain inputs stay linear.
+and the mean weight of the draws corrects the evidence. It is exact in the constants and in the size of each effect; the
+shifts of two effects that were not solved together add at the constants of a draw, and uncertain inputs stay linear.
 """
 
 from __future__ import annotations
@@ -23,85 +23,91 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.draws import TermDraws, draw_terms, joint_sizes_of, sizes_of
 from bayesplate.diagnosis.hypotheses import Hypothesis, probabilities
-from bayesplate.diagnosis.peaks import log_mean, log_of_terms, log_summed
-from bayesplate.diagnosis.search import SearchResult, search
+from bayesplate.diagnosis.peaks import log_likelihood_of_labels, log_likelihood_summed, log_mean
+from bayesplate.diagnosis.search import SearchResult, run_search
 from bayesplate.diagnosis.shifts import Cells
-from bayesplate.diagnosis.terms import normalised
+from bayesplate.diagnosis.terms import normalised_weights
 
-WIDTHS = {"halved": 0.5, "doubled": 2.0}
+PRIOR_WIDTH_FACTORS = {"halved": 0.5, "doubled": 2.0}
 """Factors of the standard deviation of the priors of all sizes."""
-NOISES = {"smaller": 1.0 / 1.5, "larger": 1.5}
+NOISE_FACTORS = {"smaller": 1.0 / 1.5, "larger": 1.5}
 """Factors of the noise prior."""
 _N_DRAWS = 128
-_WORTH = 0.01
-"""Probability beside the largest below which an explanation is corrected as no effect is."""
-_OVERSAMPLED = 2
-"""Draws for each that is kept by its weight."""
+_LEAST_SHARE = 0.01
+"""Probability over the largest one below which a hypothesis gets the correction of that of no effect."""
+_OVERSAMPLING = 2
+"""Draws for each one that is kept by its weight."""
 
 
-def variants(found: SearchResult) -> Iterator[tuple[str, SearchResult]]:
-    """The searches that a name has to survive, each made when it is asked for, and which it is in words.
+def variant_searches(found: SearchResult) -> Iterator[tuple[str, SearchResult]]:
+    """The searches under other assumptions, in which a named effect has to stand out too, each with its words.
 
-    With the width of the sizes' priors halved and doubled, the noise prior moved by 1.5 either way, and under the exact
-    law where some draw is a plate by it.
+    The widths of the sizes' priors are halved and doubled, the noise prior is moved by 1.5 either way, and the exact
+    law is used where it has a plate at some draw. Each search is run when the iterator reaches it.
     """
-    for word, factor in WIDTHS.items():
-        yield f"with the priors of the sizes {word}", varied(found, width=factor)
-    for word, factor in NOISES.items():
-        yield f"if the noise is 1.5 times {word}", varied(found, noise=factor)
+    for word, factor in PRIOR_WIDTH_FACTORS.items():
+        yield f"with the priors of the sizes {word}", vary_priors(found, width=factor)
+    for word, factor in NOISE_FACTORS.items():
+        yield f"if the noise is 1.5 times {word}", vary_priors(found, noise=factor)
     exact = under_exact_law(found)
     if exact is not None:
         yield "under the exact law", exact
 
 
-@lru_cache(maxsize=8)  # the verdict, the claim and the result ask for the same
-def varied(found: SearchResult, *, width: float = 1.0, noise: float = 1.0) -> SearchResult:
+@lru_cache(maxsize=8)  # the verdict, the claim and the result use the same searches
+def vary_priors(found: SearchResult, *, width: float = 1.0, noise: float = 1.0) -> SearchResult:
     """The same search, the standard deviation of every size's prior and every noise prior multiplied by a factor.
 
-    The cells reach three of the old standard deviations; what a wider prior puts beyond them counts as unable to
-    explain the readings.
+    The cells reach three of the old standard deviations; sizes beyond them, which a wider prior allows, count as unable
+    to explain the readings.
     """
     ground = found.ground
-    changed = replace(ground, hypotheses=tuple(_changed(found, i, width, noise) for i in range(len(ground.hypotheses))))
-    return search(changed, found.residual)
+    varied_ground = replace(
+        ground, hypotheses=tuple(_vary_hypothesis(found, i, width, noise) for i in range(len(ground.hypotheses)))
+    )
+    return run_search(varied_ground, found.residual)
 
 
-def _changed(found: SearchResult, index: int, width: float, noise: float) -> Hypothesis:
-    one = found.ground.hypotheses[index]
-    weights = one.table.weights.copy()
-    for which, candidate in enumerate(found.ground.members(index)):
-        table, cells = one.table.member(which)
-        weights *= _widening(table, [[free.prior for free in law.form.free] for law in candidate.laws], width)[cells]
-    return replace(one, table=replace(one.table, weights=weights), noise=replace(one.noise, sd=noise * one.noise.sd))
+def _vary_hypothesis(result: SearchResult, index: int, width: float, noise: float) -> Hypothesis:
+    hypothesis = result.ground.hypotheses[index]
+    weights = hypothesis.table.weights.copy()
+    for member, candidate in enumerate(result.ground.members(index)):
+        table, cells = hypothesis.table.member(member)
+        weights *= _prior_ratio(table, [[free.prior for free in law.form.free] for law in candidate.laws], width)[cells]
+    return replace(
+        hypothesis,
+        table=replace(hypothesis.table, weights=weights),
+        noise=replace(hypothesis.noise, sd=noise * hypothesis.noise.sd),
+    )
 
 
-def _widening(table: Cells, priors: list[list[Quantity]], factor: float) -> Floats:
+def _prior_ratio(table: Cells, priors: list[list[Quantity]], factor: float) -> Floats:
     """Density of the wider prior over that of the old one at each cell: (n_cells,) array."""
-    result = np.ones(table.n_cells)
-    for index, of_form in enumerate(priors):
-        own = table.form == index
-        for i, prior in enumerate(of_form):
-            z = table.z[own, i]
-            wider = np.exp(-0.5 * (z / factor) ** 2) / (factor * _inside(prior, factor))
-            result[own] *= wider / (np.exp(-0.5 * z**2) / _inside(prior, 1.0))
-    return result
+    ratio = np.ones(table.n_cells)
+    for index, form_priors in enumerate(priors):
+        is_of_form = table.form == index
+        for i, prior in enumerate(form_priors):
+            z = table.z[is_of_form, i]
+            wider = np.exp(-0.5 * (z / factor) ** 2) / (factor * _share_within_bounds(prior, factor))
+            ratio[is_of_form] *= wider / (np.exp(-0.5 * z**2) / _share_within_bounds(prior, 1.0))
+    return ratio
 
 
-def _inside(prior: Quantity, factor: float) -> float:
-    """Share of a normal distribution of that standard deviation within the prior's bounds."""
+def _share_within_bounds(prior: Quantity, factor: float) -> float:
+    """Share of a normal distribution, `factor` times as wide as the prior, within the prior's bounds."""
     from scipy.special import ndtr
 
     low, high = (bound / factor for bound in prior.standard_bounds)
     return float(ndtr(high) - ndtr(low))
 
 
-@lru_cache(maxsize=2)  # the verdict and the averages ask for the same
+@lru_cache(maxsize=2)  # the verdict and the averages use the same search
 def under_exact_law(found: SearchResult) -> SearchResult | None:
-    """The same search, every evidence corrected to the exact law; None where no draw is a plate by it."""
+    """The same search, every evidence corrected to the exact law; None where no draw is a plate under that law."""
     rng = np.random.default_rng(0)
     corrections = np.full(found.probability.size, _correction(found, 0, rng))
-    worth = found.probability > _WORTH * found.probability.max()
-    for index in 1 + np.flatnonzero(worth[1:]):
+    is_probable = found.probability > _LEAST_SHARE * found.probability.max()
+    for index in 1 + np.flatnonzero(is_probable[1:]):
         corrections[index] = _correction(found, int(index), rng)
     evidence = found.log_evidence + corrections
     if not np.isfinite(evidence).any():
@@ -111,23 +117,28 @@ def under_exact_law(found: SearchResult) -> SearchResult | None:
 
 def draw_exact(found: SearchResult, index: int, rng: np.random.Generator, n_draws: int) -> TermDraws:
     """Draw under one hypothesis and the exact law."""
-    drawn = draw_terms(found, index, rng, _OVERSAMPLED * n_draws)
-    log_weights = log_weights_of(found, index, drawn)
-    if not np.isfinite(log_weights.max()):  # no draw is a plate by the exact law: the linear terms are all there is
-        return drawn.at(np.arange(0, drawn.n_draws, _OVERSAMPLED))  # which stand in the order of their noise
-    return drawn.at(rng.choice(drawn.n_draws, size=n_draws, p=normalised(log_weights)))
+    draws = draw_terms(found, index, rng, _OVERSAMPLING * n_draws)
+    log_weights = log_weights_of(found, index, draws)
+    if not np.isfinite(log_weights.max()):  # no draw is a plate under the exact law: only the linear terms are left
+        return draws.at(np.arange(0, draws.n_draws, _OVERSAMPLING))  # draws are in the order of their noise
+    return draws.at(rng.choice(draws.n_draws, size=n_draws, p=normalised_weights(log_weights)))
 
 
 def log_weights_of(found: SearchResult, index: int, drawn: TermDraws) -> Floats:
     """ln of the likelihood under the exact law over that of the linear terms: (n_draws,) array.
 
-    Where readings may be other modes than their labels say, the former is summed over all ways to take them.
+    Where labels are uncertain, the former is summed over all assignments of peaks to modes.
     """
-    own, exact = found.ground.hypotheses[index].own, exact_log_frequencies(found, index, drawn)
-    seen = own.middle + found.seen(index)[0]
-    if own.every.is_open:
-        return log_summed(own, exact, drawn.noise) - log_of_terms(own, seen, drawn)
-    squares = ((seen - exact[:, own.rows]) ** 2 - (seen - drawn.predicted[:, own.rows]) ** 2) / drawn.variance
+    baseline, exact_log_frequency = found.ground.hypotheses[index].own, exact_log_frequencies(found, index, drawn)
+    log_readings = baseline.middle + found.seen(index)[0]
+    if baseline.every.is_open:
+        return log_likelihood_summed(baseline, exact_log_frequency, drawn.noise) - log_likelihood_of_labels(
+            baseline, log_readings, drawn
+        )
+    squares = (
+        (log_readings - exact_log_frequency[:, baseline.rows]) ** 2
+        - (log_readings - drawn.predicted[:, baseline.rows]) ** 2
+    ) / drawn.variance
     return np.nan_to_num(-0.5 * squares.sum(axis=1), nan=-np.inf, neginf=-np.inf)
 
 
@@ -138,28 +149,28 @@ def exact_log_frequencies(found: SearchResult, index: int, drawn: TermDraws) -> 
     total = np.zeros((drawn.n_draws, baseline.every.log_frequency.size))
     if n_members != 1:
         total += (1 - n_members) * baseline.every.predict(drawn.log_rigidities)
-    for which in range(n_members):
-        for _, law, rows, values in sizes_of(found, index, drawn, which):
+    for member in range(n_members):
+        for _, law, rows, values in sizes_of(found, index, drawn, member):
             total[rows] += law.every_log_frequency(baseline, drawn.log_rigidities[rows], values)
     for law, rows, values in joint_sizes_of(found, index, drawn):
         total[rows] = law.every_log_frequency(baseline, drawn.log_rigidities[rows], values)
     return np.asarray(total + (drawn.inputs - baseline.every.inputs) @ baseline.every.input_slopes.T)
 
 
-def _correction(found: SearchResult, index: int, rng: np.random.Generator) -> float:
-    drawn = draw_terms(found, index, rng, _N_DRAWS)
-    log_weights = log_weights_of(found, index, drawn)
+def _correction(result: SearchResult, index: int, rng: np.random.Generator) -> float:
+    draws = draw_terms(result, index, rng, _N_DRAWS)
+    log_weights = log_weights_of(result, index, draws)
     if not np.isfinite(log_weights.max()):
         return -np.inf
-    own = found.ground.hypotheses[index].own
-    if not own.every.is_open:
+    baseline = result.ground.hypotheses[index].own
+    if not baseline.every.is_open:
         return log_mean(log_weights)
-    # The sum over labels is in the evidence already: what the law adds is the ratio of both sums at the same draws.
-    by_terms = log_of_terms(own, own.middle + found.seen(index)[0], drawn)
-    return log_mean(log_weights) - log_mean(log_summed(own, drawn.predicted, drawn.noise) - by_terms)
+    # The evidence includes the sum over labels already: the correction is the ratio of both sums at the same draws.
+    by_terms = log_likelihood_of_labels(baseline, baseline.middle + result.seen(index)[0], draws)
+    return log_mean(log_weights) - log_mean(log_likelihood_summed(baseline, draws.predicted, draws.noise) - by_terms)
 
 
-Constants = Mapping[str, Floats]
+ConstantDraws = Mapping[str, Floats]
 """Draws of rigidities (N m) and moduli (Pa) by name."""
 
 
@@ -168,43 +179,43 @@ def draw_constants(
     rng: np.random.Generator,
     n_draws: int,
     among: Sequence[int] | None = None,
-    sampled: Mapping[int, Constants] | None = None,
-) -> Constants:
+    sampled: Mapping[int, ConstantDraws] | None = None,
+) -> ConstantDraws:
     """Draws of the constants and inputs by name, (n_draws,) arrays, from the terms of hypotheses, weighted to the exact
     law.
 
-    Over the hypotheses `among` by their probability, by default over all by that under the exact law; of hypotheses
-    that were `sampled` from those draws.
+    The hypotheses `among` have their probability as weight; by default all have that under the exact law. Draws of a
+    hypothesis in `sampled` are taken from there.
     """
-    weighed = (under_exact_law(found) or found) if among is None else found
+    weighed_result = (under_exact_law(found) or found) if among is None else found
     indices = np.arange(len(found.ground.hypotheses)) if among is None else np.asarray(among)
-    shares = weighed.probability[indices] / weighed.probability[indices].sum()
-    parts: list[Constants] = []
+    shares = weighed_result.probability[indices] / weighed_result.probability[indices].sum()
+    parts: list[ConstantDraws] = []
     for index, n in zip(indices.tolist(), rng.multinomial(n_draws, shares).tolist(), strict=True):
         if n and sampled and index in sampled:
-            picked = rng.integers(next(iter(sampled[index].values())).size, size=n)
-            parts.append({name: np.ravel(values)[picked] for name, values in sampled[index].items()})
+            picked_draws = rng.integers(next(iter(sampled[index].values())).size, size=n)
+            parts.append({name: np.ravel(values)[picked_draws] for name, values in sampled[index].items()})
         elif n:
-            parts.append(_drawn(found, index, rng, n))
+            parts.append(_draw_under(found, index, rng, n))
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def _drawn(found: SearchResult, index: int, rng: np.random.Generator, n_draws: int) -> Constants:
-    """The same under one hypothesis, whose effects may replace thickness (m) and nu_xy by their own."""
-    drawn, symmetry = draw_exact(found, index, rng, n_draws), found.ground.baseline.board.symmetry
-    inputs = {name: _input(found.ground.baseline, name, drawn.inputs) for name in ("thickness", "poisson_xy")}
-    for which in range(len(found.ground.members(index))):
-        for _, law, rows, values in sizes_of(found, index, drawn, which):
+def _draw_under(result: SearchResult, index: int, rng: np.random.Generator, n_draws: int) -> ConstantDraws:
+    """Draws of the constants under one hypothesis, whose effects may replace thickness (m) and nu_xy."""
+    draws, symmetry = draw_exact(result, index, rng, n_draws), result.ground.baseline.board.symmetry
+    inputs = {name: _input(result.ground.baseline, name, draws.inputs) for name in ("thickness", "poisson_xy")}
+    for member in range(len(result.ground.members(index))):
+        for _, law, rows, values in sizes_of(result, index, draws, member):
             for free in law.form.free:
                 if free.replaces in inputs:
                     inputs[free.replaces][rows] = values[free.name]
-    D = symmetry.rigidities(np.exp(drawn.log_rigidities).T, inputs["poisson_xy"])
+    D = symmetry.rigidities(np.exp(draws.log_rigidities).T, inputs["poisson_xy"])
     constants = moduli(D["D_x"], D["D_y"], D["D_s"], inputs["thickness"], inputs["poisson_xy"])
     return D | dict(zip(MODULI, constants, strict=True))
 
 
 def _input(baseline: Baseline, name: str, z: Floats) -> Floats:
-    """An input of the board from the standard coordinates of all uncertain ones: (n,) array from (n, n_inputs)."""
+    """An input of the board from the standard coordinates of all uncertain inputs: (n,) array from (n, n_inputs)."""
     uncertain = tuple(baseline.board.uncertain_inputs)
     if name not in uncertain:
         return np.full(len(z), float(baseline.values[name]))

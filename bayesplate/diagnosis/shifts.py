@@ -5,8 +5,8 @@ shifts. It is kept as a mixture of normal cells: a regular grid in the standard 
 shift at each point, and its change up to the sides of the cell, so that neighbouring cells join without a gap.
 Evidence, prediction and the posterior of a size are then sums over cells.
 
-The shifts of two effects are added; a mass that slows a mode makes the tension that speeds it up count the less, so
-that plausible pairs are solved together, at every pair of their cells.
+The shifts of two effects are added. This is approximate: the frequency that a mass lowers is raised less by a tension.
+Plausible pairs are therefore solved together, at every pair of their cells.
 """
 
 from __future__ import annotations
@@ -19,23 +19,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.arrays import Floats
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.quantity import Quantity
-from bayesplate.diagnosis.baseline import Baseline, Rows
+from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.forms import Form, with_forms
 from bayesplate.diagnosis.laws import FormLaw, form_law
 
 JointLaws = Mapping[tuple[int, int], FormLaw]
-"""Laws of two effects at once, by the indices of their forms; the free parameters are those of the first, then those
-of the second."""
+"""Joint laws of two effects, by the indices of their forms; free parameters of the first effect, then of the second."""
 
-FINE, COARSE = (33, 11, 256), (9, 5, 27)
-"""Cells along one parameter, along each of two, and at most in all of more; the second where effects are combined."""
+FINE_CELLS, COARSE_CELLS = (33, 11, 256), (9, 5, 27)
+"""Cells along a single parameter, along each of two, and in all along more; the coarse ones for pairs of effects."""
 
 _REACH = 3.0
 _OVERLAP = 0.5
 _REFITS = 10
-_SETTLED = 2e-4
+_SETTLED_STEP = 2e-4
 _LONGEST_STEP = 0.3
 
 
@@ -48,33 +47,33 @@ class Cells:
     slopes: Floats  # (n_cells, n_modes, n_tangents) array: change of the shift over one standard deviation of the cell
     moved: Floats  # (n_cells, n_constants) array: change of ln D by the refit
     moved_slopes: Floats  # (n_cells, n_constants, n_tangents) array
-    form: Rows  # (n_cells,) array of int: which form of the effect; of the first one where there are two
+    form: Indices  # (n_cells,) array of int: which form of the effect; of the first one where there are two
     z: Floats  # (n_cells, n_parameters) array: standard coordinates of the first effect's parameters
     z_slopes: Floats  # (n_cells, n_parameters) array: their change over one standard deviation of the cell
-    # of two effects together: the tables of both, the cells of the second running fastest
+    # of two effects together: the tables of both, the cells of the second effect running fastest
     parts: tuple[Cells, ...] = ()
 
     @property
     def n_cells(self) -> int:
         return int(self.weights.size)
 
-    def some(self, cells: slice | Rows) -> Cells:
-        """Some of the cells, with the weights that they have among all."""
+    def some(self, cells: slice | Indices) -> Cells:
+        """Some of the cells, with their weights unchanged."""
         return replace(self, **{key: getattr(self, key)[cells] for key in _PER_CELL})
 
-    def of(self, rows: Rows) -> Cells:
+    def of(self, rows: Indices) -> Cells:
         """The same cells for some of the modes, by their indices."""
         if np.array_equal(rows, np.arange(self.shift.shape[1])):
             return self
         return replace(self, shift=self.shift[:, rows], slopes=self.slopes[:, rows])
 
-    def member(self, which: int, cells: Rows | None = None) -> tuple[Cells, Rows]:
-        """The table of one of its effects, and which cell there each cell of this one has; by default of all."""
+    def member(self, which: int, cells: Indices | None = None) -> tuple[Cells, Indices]:
+        """The table of one of its effects, and the index there of each of some cells; by default of all cells."""
         cells = np.arange(self.n_cells) if cells is None else cells
         return (self.parts[which], np.divmod(cells, self.parts[1].n_cells)[which]) if self.parts else (self, cells)
 
     def tangents(self, which: int) -> slice:
-        """Which tangents are of one of its effects."""
+        """The slice of the tangents of one of its effects."""
         ends = np.cumsum([0, *(part.slopes.shape[2] for part in self.parts or (self,))])
         return slice(int(ends[which]), int(ends[which + 1]))
 
@@ -82,7 +81,7 @@ class Cells:
 _PER_CELL = ("weights", "shift", "slopes", "moved", "moved_slopes", "form", "z", "z_slopes")
 
 
-def nothing(n_modes: int, n_constants: int = 3) -> Cells:
+def no_effect_cells(n_modes: int, n_constants: int = 3) -> Cells:
     """No effect: one cell without shift."""
     return Cells(
         weights=np.ones(1),
@@ -96,31 +95,31 @@ def nothing(n_modes: int, n_constants: int = 3) -> Cells:
     )
 
 
-def tabulate(baseline: Baseline, laws: Sequence[FormLaw], cells: tuple[int, int, int] = FINE) -> Cells:
-    """Tabulate an effect over all its forms, equally probable; without cells where no size of it leaves a plate."""
+def tabulate(baseline: Baseline, laws: Sequence[FormLaw], cells: tuple[int, int, int] = FINE_CELLS) -> Cells:
+    """Tabulate an effect over all its forms, equally probable; without cells where no plate has it at any size."""
     n_tangents = max(len(law.form.free) for law in laws)
-    parts = [_of_form(baseline, i, law, cells, n_tangents) for i, law in enumerate(laws)]
-    joined: dict[str, Any] = {key: np.concatenate([getattr(part, key) for part in parts]) for key in _PER_CELL}
-    return replace(parts[0], **joined | {"weights": joined["weights"] / len(laws)})
+    tables = [_tabulate_form(baseline, i, law, cells, n_tangents) for i, law in enumerate(laws)]
+    columns: dict[str, Any] = {key: np.concatenate([getattr(table, key) for table in tables]) for key in _PER_CELL}
+    return replace(tables[0], **columns | {"weights": columns["weights"] / len(laws)})
 
 
-def together(one: Cells, other: Cells) -> Cells:
-    """Two effects at once: their shifts and refits add."""
+def combine_cells(one: Cells, other: Cells) -> Cells:
+    """The table of two effects together: their shifts and refits add."""
 
-    def added(first: Floats, second: Floats) -> Floats:
+    def add(first: Floats, second: Floats) -> Floats:
         total = first[:, None] + second[None]
         return total.reshape(-1, *total.shape[2:])
 
-    def joined(first: Floats, second: Floats) -> Floats:
+    def join(first: Floats, second: Floats) -> Floats:
         parts = (np.repeat(first, len(second), axis=0), np.tile(second, (len(first), 1, 1)))
         return np.concatenate(parts, axis=2)
 
     return Cells(
         weights=np.outer(one.weights, other.weights).ravel(),
-        shift=added(one.shift, other.shift),
-        slopes=joined(one.slopes, other.slopes),
-        moved=added(one.moved, other.moved),
-        moved_slopes=joined(one.moved_slopes, other.moved_slopes),
+        shift=add(one.shift, other.shift),
+        slopes=join(one.slopes, other.slopes),
+        moved=add(one.moved, other.moved),
+        moved_slopes=join(one.moved_slopes, other.moved_slopes),
         form=np.repeat(one.form, other.n_cells),
         z=np.repeat(one.z, other.n_cells, axis=0),
         z_slopes=np.repeat(one.z_slopes, other.n_cells, axis=0),
@@ -130,34 +129,39 @@ def together(one: Cells, other: Cells) -> Cells:
 
 def joint_law(baseline: Baseline, one: Form, other: Form) -> FormLaw:
     """Solve a board with two effects around a baseline and over the priors of both."""
-    detail = ", ".join(part for part in (one.detail, other.detail) if part)
+    detail = ", ".join(form_detail for form_detail in (one.detail, other.detail) if form_detail)
     board = with_forms(baseline.board, (one, other))
-    both = Form(f"{one.effect} and {other.effect}", detail, board, (*one.free, *other.free))
-    return form_law(baseline, both).placed(baseline)
+    pair_form = Form(f"{one.effect} and {other.effect}", detail, board, (*one.free, *other.free))
+    return form_law(baseline, pair_form).placed(baseline)
 
 
 def joint_table(baseline: Baseline, added: Cells, laws: JointLaws) -> Cells:
-    """Two effects at once: exactly where there are laws of both, elsewhere as in `added`, whose cells it has."""
-    (one, first), (other, second) = added.member(0), added.member(1)
-    found = {key: getattr(added, key).copy() for key in ("shift", "moved", "slopes", "moved_slopes")}
+    """The table of two effects, exact for forms with a joint law, and otherwise that of `added`, with its cells."""
+    (first_table, first_cells), (second_table, second_cells) = added.member(0), added.member(1)
+    arrays = {key: getattr(added, key).copy() for key in ("shift", "moved", "slopes", "moved_slopes")}
     for (i, j), law in laws.items():
-        cells = np.flatnonzero((one.form[first] == i) & (other.form[second] == j))
-        used = np.flatnonzero(np.r_[one.z_slopes[first[cells[0]]], other.z_slopes[second[cells[0]]]] > 0.0)
-        z, step = (
-            np.hstack([of_one[first[cells]], of_other[second[cells]]])[:, used]
-            for of_one, of_other in ((one.z, other.z), (one.z_slopes, other.z_slopes))
+        cells = np.flatnonzero((first_table.form[first_cells] == i) & (second_table.form[second_cells] == j))
+        used_tangents = np.flatnonzero(
+            np.r_[first_table.z_slopes[first_cells[cells[0]]], second_table.z_slopes[second_cells[cells[0]]]] > 0.0
         )
-        solved = _cells(baseline, law, z, step)
-        good = _finite(*solved)
-        for key, values in zip(found, solved, strict=True):
+        z, step = (
+            np.hstack([first_values[first_cells[cells]], second_values[second_cells[cells]]])[:, used_tangents]
+            for first_values, second_values in (
+                (first_table.z, second_table.z),
+                (first_table.z_slopes, second_table.z_slopes),
+            )
+        )
+        solved = _solve_cells(baseline, law, z, step)
+        is_solved = _is_finite(*solved)
+        for key, values in zip(arrays, solved, strict=True):
             if key.endswith("slopes"):
-                found[key][np.ix_(cells[good], np.arange(values.shape[1]), used)] = values[good]
+                arrays[key][np.ix_(cells[is_solved], np.arange(values.shape[1]), used_tangents)] = values[is_solved]
             else:
-                found[key][cells[good]] = values[good]
-    return replace(added, **found)
+                arrays[key][cells[is_solved]] = values[is_solved]
+    return replace(added, **arrays)
 
 
-def refitted(baseline: Baseline, law: FormLaw, z: Floats) -> tuple[Floats, Floats]:
+def refitted_shifts(baseline: Baseline, law: FormLaw, z: Floats) -> tuple[Floats, Floats]:
     """Shifts, (n, n_every), with the constants refitted at (n, n_parameters) standard coordinates, and the changes of
     ln D.
 
@@ -168,66 +172,68 @@ def refitted(baseline: Baseline, law: FormLaw, z: Floats) -> tuple[Floats, Float
     shift = np.empty((len(z), baseline.every.log_frequency.size))
     moving = np.arange(len(z))
     for n_done in range(_REFITS):
-        there = {name: value[moving] for name, value in values.items()}
-        at = baseline.log_rigidities + moved[moving]
-        shift[moving] = law.every_log_frequency(baseline, at, there) - baseline.every.log_frequency
+        moving_values = {name: value[moving] for name, value in values.items()}
+        log_rigidities = baseline.log_rigidities + moved[moving]
+        shift[moving] = law.every_log_frequency(baseline, log_rigidities, moving_values) - baseline.every.log_frequency
         step = -np.nan_to_num(shift[moving][:, baseline.rows]) @ baseline.absorbing.T
         longest = np.abs(step).max(axis=1)
-        moving, step, longest = (each[longest > _SETTLED] for each in (moving, step, longest))
+        moving, step, longest = (array[longest > _SETTLED_STEP] for array in (moving, step, longest))
         if not moving.size or n_done == _REFITS - 1:
             break
         moved[moving] += step * np.minimum(1.0, _LONGEST_STEP / longest)[:, None]
     return shift, moved
 
 
-def _cells(baseline: Baseline, law: FormLaw, z: Floats, step: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Shift and refit of cells, and their changes over one standard deviation of each along every parameter."""
-    shift, moved = refitted(baseline, law, z)
+def _solve_cells(baseline: Baseline, law: FormLaw, z: Floats, step: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Shift and refit of cells, and their changes over one standard deviation of the cell along each parameter."""
+    shift, moved = refitted_shifts(baseline, law, z)
     sides = []
     for k in range(z.shape[1]):
-        along = step * (np.arange(z.shape[1]) == k)
-        above, below = (refitted(baseline, law, z + sign * along) for sign in (1.0, -1.0))
+        side = step * (np.arange(z.shape[1]) == k)
+        above, below = (refitted_shifts(baseline, law, z + sign * side) for sign in (1.0, -1.0))
         sides.append([0.5 * (after - before) for after, before in zip(above, below, strict=True)])
     if not sides:
         return shift, moved, np.zeros((*shift.shape, 0)), np.zeros((*moved.shape, 0))
-    slopes, moved_slopes = (np.stack(each, axis=2) for each in zip(*sides, strict=True))
+    slopes, moved_slopes = (np.stack(changes, axis=2) for changes in zip(*sides, strict=True))
     return shift, moved, slopes, moved_slopes
 
 
-def _finite(*values: Floats) -> NDArray[np.bool_]:
-    return np.all([np.isfinite(one).reshape(len(one), -1).all(axis=1) for one in values], axis=0)
+def _is_finite(*values: Floats) -> NDArray[np.bool_]:
+    return np.all([np.isfinite(array).reshape(len(array), -1).all(axis=1) for array in values], axis=0)
 
 
-def _of_form(baseline: Baseline, index: int, law: FormLaw, cells: tuple[int, int, int], n_tangents: int) -> Cells:
+def _tabulate_form(baseline: Baseline, index: int, law: FormLaw, cells: tuple[int, int, int], n_tangents: int) -> Cells:
     free = law.form.free
-    axes = [_axis(one.prior, cells_along(len(free), cells)) for one in free]
-    points = list(product(*(points for points, _ in axes)))
+    axes = [_axis_cells(parameter.prior, cells_along(len(free), cells)) for parameter in free]
+    points = list(product(*(middles for middles, _ in axes)))
     z = np.reshape(points, (len(points), len(axes)))
     step = np.tile([_OVERLAP * width for _, width in axes], (len(z), 1))
-    log_weights = np.sum([one.prior.log_prior(z[:, i]) for i, one in enumerate(free)], axis=0) + np.zeros(len(z))
-    shift, moved, slopes, moved_slopes = _cells(baseline, law, z, step)
-    good = _finite(shift, slopes, log_weights)
-    weights = np.exp(np.where(good, log_weights, -np.inf))
-    none = n_tangents - len(free)
+    log_weights = np.sum([parameter.prior.log_prior(z[:, i]) for i, parameter in enumerate(free)], axis=0) + np.zeros(
+        len(z)
+    )
+    shift, moved, slopes, moved_slopes = _solve_cells(baseline, law, z, step)
+    is_plate = _is_finite(shift, slopes, log_weights)
+    weights = np.exp(np.where(is_plate, log_weights, -np.inf))
+    n_unused = n_tangents - len(free)
     return Cells(
         weights=weights / max(weights.sum(), np.finfo(float).tiny),
         shift=shift,
-        slopes=np.pad(slopes, ((0, 0), (0, 0), (0, none))),
+        slopes=np.pad(slopes, ((0, 0), (0, 0), (0, n_unused))),
         moved=moved,
-        moved_slopes=np.pad(moved_slopes, ((0, 0), (0, 0), (0, none))),
+        moved_slopes=np.pad(moved_slopes, ((0, 0), (0, 0), (0, n_unused))),
         form=np.full(len(z), index),
-        z=np.pad(z, ((0, 0), (0, none))),
-        z_slopes=np.pad(step, ((0, 0), (0, none))),
-    ).some(np.flatnonzero(good))
+        z=np.pad(z, ((0, 0), (0, n_unused))),
+        z_slopes=np.pad(step, ((0, 0), (0, n_unused))),
+    ).some(np.flatnonzero(is_plate))
 
 
 def cells_along(n_parameters: int, cells: tuple[int, int, int]) -> int:
-    """Cells along each of so many parameters; their product stays bounded, however many setups have one each."""
+    """Cells along each of `n_parameters`; their product stays bounded, however many setups have a size each."""
     *few, most = cells
     return few[n_parameters - 1] if n_parameters <= len(few) else int(most ** (1.0 / n_parameters) + 1e-9)
 
 
-def _axis(prior: Quantity, n: int) -> tuple[Floats, float]:
+def _axis_cells(prior: Quantity, n: int) -> tuple[Floats, float]:
     """Middles of n equal cells between the prior's bounds or three standard deviations, and their width."""
     low, high = prior.standard_bounds
     low, high = max(low, -_REACH), min(high, _REACH)

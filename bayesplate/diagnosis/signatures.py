@@ -1,8 +1,8 @@
-"""What each effect would do to the frequencies, how much of it the constants hide, and which effects look alike.
+"""The shift of the frequencies by each effect, the part that the constants hide, and which effects look alike.
 
-A fit of the constants absorbs most of any effect: only its visible part, what is left after the constants have been
-fitted again, can ever be traced, and the rest has gone into the constants as a bias. All of it by exact solves at the
-effect's nominal size; first-order columns of the bare plate are wrong by factors here.
+A fit of the constants absorbs most of any effect: only its visible part, the shift that remains after a refit of the
+constants, can be traced; the rest biases the constants. Shifts come from exact solves at the effect's nominal size,
+because first-order columns of the bare plate are wrong by factors here.
 """
 
 from __future__ import annotations
@@ -24,17 +24,18 @@ from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import system_of
 from bayesplate.posterior.posing import PosedProblem
 
-LOOK_ALIKE = 0.95
+LOOK_ALIKE_COSINE = 0.95
 """Cosine of two visible parts above which two effects look alike: they differ by less than a third of their trace.
 
-Below its negative too, if one of them may act either way: a mass that can only lower what a tension can only raise is
-told from it at sight. A remark, no rule: whether the readings tell two apart is said by their probabilities.
+Below its negative too, if one of them may act either way: a mass, which can only lower frequencies, and a tension,
+which can only raise them, do not look alike. This is a remark, no rule: the probabilities say whether the readings tell
+two effects apart.
 """
 _ROUNDING = 1e-9
-_WITHIN = 3.0
-"""Standard deviations of its prior within which a size may lie."""
+_MOST_SD = 3.0
+"""Standard deviations of its prior within which a size may be."""
 
-INVISIBLE = (
+INVISIBLE_CHANGES = (
     "A uniform change of thickness, density or side lengths cannot be seen in the frequencies: it goes into the "
     "constants. Measure these; their uncertainty is carried along."
 )
@@ -50,11 +51,11 @@ class Signature:
     raw: Floats
     # (n_modes,) array, cents: what remains after the constants have been fitted again without the effect
     visible: Floats
-    bias_percent: Mapping[str, float]  # what ignoring the effect does to E_x, E_y, G_xy
+    bias_percent: Mapping[str, float]  # bias of E_x, E_y, G_xy in a fit without the effect
     # (n_modes,) array: relative uncertainty of each reading: its weight in the fit, in every rms and in the likeness of
     # two effects
     scales: Floats
-    acts_both_ways: bool = False  # whether it may also be the opposite of what it is here: see `acts_both_ways`
+    acts_both_ways: bool = False  # whether its shifts may also have the opposite sign: see the function of this name
 
     @property
     def raw_rms(self) -> float:
@@ -73,7 +74,7 @@ class Signature:
 
     @property
     def is_below_detection_limit(self) -> bool:
-        """Whether this experiment could not see the effect even if it were there."""
+        """Whether these readings could not show the effect even if it were present."""
         return self.visible_rms < self.detection_limit_cents
 
     def _rms(self, shift: Floats) -> float:
@@ -86,7 +87,7 @@ def signature(baseline: Baseline, effect: str, sizes: Sequence[Parameter], log_f
     visible, step = baseline.refitted_to(raw)
     return Signature(
         effect=effect,
-        size={one.name: one.nominal for one in sizes},
+        size={parameter.name: parameter.nominal for parameter in sizes},
         raw=cents(raw),
         visible=cents(visible),
         bias_percent=_bias(baseline, step),
@@ -96,69 +97,77 @@ def signature(baseline: Baseline, effect: str, sizes: Sequence[Parameter], log_f
 
 
 def signatures(problem: PosedProblem, names: Sequence[str] | None = None) -> tuple[Signature, ...]:
-    """Signatures of all effects that can act, or of those named, around the estimate of a problem, by full solves.
+    """Signatures of all effects that can act, or of those in `names`, around the estimate of a problem, by full solves.
 
-    Without an effect that at its nominal size leaves no plate with these modes, or none to fit them.
+    Without effects of which the plate at nominal size lacks one of these modes, or cannot be fitted to them.
     """
     baseline = baseline_of(problem)
-    found = (_solved(baseline, problem, name) for name in _acting(problem.board) if names is None or name in names)
-    return tuple(one for one in found if np.isfinite([*one.raw, *one.bias_percent.values()]).all())
+    solved_signatures = (
+        _solve_signature(baseline, problem, name)
+        for name in _acting_effects(problem.board)
+        if names is None or name in names
+    )
+    return tuple(
+        signature
+        for signature in solved_signatures
+        if np.isfinite([*signature.raw, *signature.bias_percent.values()]).all()
+    )
 
 
-def _acting(board: Board) -> Iterable[str]:
+def _acting_effects(board: Board) -> Iterable[str]:
     for name, effect in EFFECTS.items():
         if name not in board.effects and any(not effect.refusal(board, setup) for setup in board.setups):
             yield name
 
 
-def _solved(baseline: Baseline, problem: PosedProblem, name: str) -> Signature:
+def _solve_signature(baseline: Baseline, problem: PosedProblem, name: str) -> Signature:
     """The signature of one more effect at its nominal size."""
     board = declare(replace(baseline.board, effects=(*baseline.board.effects, name)))
-    acting = (one for setup in board.setups for one in effects_of(board, setup) if one.name == name)
-    sizes = {one.name: one for effect in acting for one in effect.parameters()}
+    acting_effects = (effect for setup in board.setups for effect in effects_of(board, setup) if effect.name == name)
+    sizes = {parameter.name: parameter for effect in acting_effects for parameter in effect.parameters()}
     values = {key: np.asarray(quantity.mean) for key, quantity in board.inputs.items()} | dict(baseline.values)
-    values |= {key: np.asarray(one.nominal) for key, one in sizes.items()}
-    parts = []
+    values |= {key: np.asarray(parameter.nominal) for key, parameter in sizes.items()}
+    log_frequencies = []
     for setup, fitted in zip(board.setups, problem.posterior.models, strict=True):
-        plate = setup_model(system_of(board, setup), values).log_frequencies(values, "linear")[0]
-        parts.append(plate + fitted.discrepancies(values)[0, : plate.size])
-    return signature(baseline, name, tuple(sizes.values()), np.concatenate(parts))
+        plate_log_frequency = setup_model(system_of(board, setup), values).log_frequencies(values, "linear")[0]
+        log_frequencies.append(plate_log_frequency + fitted.discrepancies(values)[0, : plate_log_frequency.size])
+    return signature(baseline, name, tuple(sizes.values()), np.concatenate(log_frequencies))
 
 
 def look_alikes(found: Sequence[Signature]) -> dict[str, tuple[str, ...]]:
-    """For each effect, the others of which the visible part is like its own, or opposite if one acts either way."""
+    """For each effect, the others with a like visible part, or an opposite one if one of the two acts either way."""
 
-    def are_alike(one: Signature, other: Signature) -> bool:
-        likeness = cosine(one, other)
-        return (abs(likeness) if one.acts_both_ways or other.acts_both_ways else likeness) > LOOK_ALIKE
+    def are_alike(first: Signature, second: Signature) -> bool:
+        likeness = cosine(first, second)
+        return (abs(likeness) if first.acts_both_ways or second.acts_both_ways else likeness) > LOOK_ALIKE_COSINE
 
     return {
-        one.effect: tuple(other.effect for other in found if other is not one and are_alike(one, other))
-        for one in found
+        first.effect: tuple(second.effect for second in found if second is not first and are_alike(first, second))
+        for first in found
     }
 
 
 def acts_both_ways(sizes: Iterable[Parameter]) -> bool:
-    """Whether a size of an effect may lie on either side of that of no effect."""
-    return any(_is_within(one.prior, one.null) for one in sizes if one.null is not None)
+    """Whether a size of an effect may be on either side of its null value."""
+    return any(_is_within(parameter.prior, parameter.null) for parameter in sizes if parameter.null is not None)
 
 
 def _is_within(prior: Quantity, value: float) -> bool:
-    """Whether an uncertain quantity may as well lie on either side of a value."""
+    """Whether an uncertain quantity may be on either side of a value."""
     inside = not prior.is_exact and prior.lower < value < prior.upper
-    return inside and abs(float(prior.standard(value))) < _WITHIN
+    return inside and abs(float(prior.standard(value))) < _MOST_SD
 
 
 def cosine(one: Signature, other: Signature) -> float:
     """Cosine of the visible parts of two effects; 0 if one has none but rounding."""
-    if any(each.visible_rms <= _ROUNDING * each.raw_rms for each in (one, other)):
+    if any(signature.visible_rms <= _ROUNDING * signature.raw_rms for signature in (one, other)):
         return 0.0
     first, second = one.visible / one.scales, other.visible / other.scales
     return float(first @ second / (np.linalg.norm(first) * np.linalg.norm(second)))
 
 
 def _bias(baseline: Baseline, step: Floats) -> dict[str, float]:
-    """What the moduli of a fit are off by, percent, whose ln D have moved by a step that hides an effect."""
+    """Bias of the moduli of a fit, percent, whose ln D have moved by a step that hides an effect."""
     values, symmetry = baseline.values, baseline.board.symmetry
     thickness, nu_xy = values["thickness"], values["poisson_xy"]
     free = symmetry.free_of(values)

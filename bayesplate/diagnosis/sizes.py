@@ -6,13 +6,13 @@ import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
-from bayesplate.board.parameter import unit_of_people
+from bayesplate.board.parameter import display_unit
 from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.draws import draw_terms, standard_sizes_of
 from bayesplate.diagnosis.forms import with_forms, with_labels_exchanged
 from bayesplate.diagnosis.search import SearchResult
 
-AT_LIMIT = 0.005
+LIMIT_PROBABILITY = 0.005
 """Prior probability between the posterior median of a size and a bound below which the size is at its limit."""
 _N_DRAWS = 2000
 
@@ -38,42 +38,42 @@ def refit_board(found: SearchResult, index: int) -> Board:
     if hypothesis.swap is not None:
         return with_labels_exchanged(board, hypothesis.swap.first, hypothesis.swap.second)
     members = enumerate(found.ground.members(index))
-    return with_forms(board, [one.laws[likely_form(found, index, which)].form for which, one in members])
+    return with_forms(board, [candidate.laws[likely_form(found, index, member)].form for member, candidate in members])
 
 
-def at_limit(found: SearchResult, index: int) -> str:
-    """Which size of a hypothesis sits at the limit of its range; empty if none does.
+def size_at_limit(found: SearchResult, index: int) -> str:
+    """The size of a hypothesis that is at the limit of its range, in words; empty if none is.
 
-    A size that may be zero is not at a limit there: zero is no effect. The size is looked at by draws, for a cell of a
-    table may be wider than what counts as the limit.
+    Zero is no limit of a size that may be zero: it means no effect. The median is that of draws, because a cell of the
+    table may be wider than the limit.
     """
-    drawn = draw_terms(found, index, np.random.default_rng(0), _N_DRAWS)
-    for which in range(len(found.ground.members(index))):
-        for _, law, rows, z in standard_sizes_of(found, index, drawn, which):
-            if 2 * rows.size < drawn.n_draws:
+    draws = draw_terms(found, index, np.random.default_rng(0), _N_DRAWS)
+    for member in range(len(found.ground.members(index))):
+        for _, law, rows, z in standard_sizes_of(found, index, draws, member):
+            if 2 * rows.size < draws.n_draws:
                 continue
             for free, column in zip(law.form.free, z.T, strict=True):
                 median = _median_within(free.prior, column)
                 if _is_extreme(free.prior, median):
-                    factor, unit = unit_of_people(free.unit)
+                    factor, unit = display_unit(free.unit)
                     return f"{free.key} = {factor * float(free.prior.value(median)):.3g} {unit}".rstrip()
     return ""
 
 
 def _median_within(prior: Quantity, z: Floats) -> float:
-    """Median of the draws that lie within the bounds of a prior; the bound next to them where none does."""
+    """Median of the draws within the bounds of a prior; the bound next to the draws where none is within."""
     low, high = prior.standard_bounds
     inside = z[(low <= z) & (z <= high)]
     return float(np.median(inside) if inside.size else np.clip(np.median(z), low, high))
 
 
 def _is_extreme(prior: Quantity, z: float) -> bool:
-    """Whether hardly any of a prior lies between a size and a bound; a zero that means no effect is no bound."""
+    """Whether a prior has hardly any mass between a size and a bound; a zero that means no effect is no bound."""
     from scipy.special import ndtr
 
     low, high = prior.standard_bounds
-    whole = ndtr(high) - ndtr(low)
-    starts_at_nothing = prior.lower == 0.0 and prior.mean == 0.0
-    near_top = np.isfinite(high) and (ndtr(high) - ndtr(z)) / whole < AT_LIMIT
-    near_bottom = np.isfinite(low) and not starts_at_nothing and (ndtr(z) - ndtr(low)) / whole < AT_LIMIT
+    prior_mass = ndtr(high) - ndtr(low)
+    starts_at_zero = prior.lower == 0.0 and prior.mean == 0.0
+    near_top = np.isfinite(high) and (ndtr(high) - ndtr(z)) / prior_mass < LIMIT_PROBABILITY
+    near_bottom = np.isfinite(low) and not starts_at_zero and (ndtr(z) - ndtr(low)) / prior_mass < LIMIT_PROBABILITY
     return bool(near_top or near_bottom)

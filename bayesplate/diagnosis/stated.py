@@ -1,7 +1,7 @@
-"""The claim without selection: what the card states is not chosen by the readings, so that two conditions are enough.
+"""The claim of stated effects: the readings do not choose them, so that two conditions are enough.
 
-Known effects that the card states or declares are computed at their stated sizes, and nothing is searched for: neither
-chance selection nor priors of sizes can make an error fall. The same holds of a second setup that is predicted by the
+Known effects that the card states or declares are computed at their stated sizes, without a search: neither chance
+selection nor priors of sizes can make an error fall. The same holds of a second setup that is predicted by the
 constants of the first.
 """
 
@@ -14,20 +14,20 @@ import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
-from bayesplate.board.sessions import same_modes
+from bayesplate.board.sessions import readings_by_mode
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.claim import STANDARD_ERRORS, score_gain
-from bayesplate.diagnosis.known import KnownFit, acting_at_known_size, fit_with, stated_effects
-from bayesplate.diagnosis.shifts import nothing
-from bayesplate.diagnosis.terms import Terms, noise_grid, reach_of
+from bayesplate.diagnosis.known import KnownFit, effects_at_known_size, fit_with_effects, stated_effects
+from bayesplate.diagnosis.shifts import no_effect_cells
+from bayesplate.diagnosis.terms import NormalTerms, noise_grid, noise_reach
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.results.contract import rms
 
-LEAST_FALL = 0.2
+LEAST_ERROR_FALL = 0.2
 """Share of the error by which it has to fall."""
-_FEWEST = 3
-"""Modes without which differences have no scatter worth the name."""
+_FEWEST_MODES = 3
+"""Modes that must be compared for their differences to have a meaningful scatter."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,15 +47,16 @@ class StatedClaim:
     holds: bool  # whether the error falls by a fifth at least and the score rises by more than two standard errors
 
 
-def judge_stated(
+def judge_stated_effects(
     effects: Sequence[str], predicts: str, before: Floats, after: Floats, gains: Floats
 ) -> StatedClaim | None:
-    """Judge stated effects by errors of prediction, ln f, and each mode's gain in log density; None of too few."""
-    if gains.size < _FEWEST:
+    """Judge stated effects by errors of prediction, ln f, and each mode's gain in log density; None with too few
+    modes."""
+    if gains.size < _FEWEST_MODES:
         return None
     old, new = (rms(cents(errors)) or 0.0 for errors in (before, after))
     gain, error = score_gain(gains)
-    falls, rises = new <= (1.0 - LEAST_FALL) * old, gain > STANDARD_ERRORS * error
+    falls, rises = new <= (1.0 - LEAST_ERROR_FALL) * old, gain > STANDARD_ERRORS * error
     return StatedClaim(
         effects=tuple(effects),
         predicts=predicts,
@@ -69,35 +70,39 @@ def judge_stated(
 
 
 def stated_claims(problem: PosedProblem, fits: Sequence[KnownFit]) -> tuple[StatedClaim, ...]:
-    """Judge what the card states of a board: by modes left out, and by each further setup in which it is another."""
+    """Judge the stated effects of a board by modes left out, and by each further setup that states other sizes."""
     board = problem.board
     effects = stated_effects(board)
     if not effects:
         return ()
-    without, having = (next(one for one in reversed(fits) if one.combination == wanted) for wanted in ((), effects))
-    before, after = without.errors.left_out, having.errors.left_out
-    both = np.asarray(np.isfinite(before) & np.isfinite(after))
-    both &= (without.errors.leverages.carries < 0) & (having.errors.leverages.carries < 0)
-    modes = [mode for mode in same_modes(board) if both[list(mode)].all()]
-    scores = [scores_given(one.baseline, modes) for one in (without, having)]
-    claims = [judge_stated(effects, "", before[both], after[both], scores[1] - scores[0])]
-    further = [setup.name for setup in board.setups[1:] if _states_differently(board, effects, setup.name)]
-    if further:
-        claims += _of_further_setups(problem, effects, further)
-    return tuple(one for one in claims if one is not None)
+    bare_fit, stated_fit = (
+        next(fit for fit in reversed(fits) if fit.combination == combination) for combination in ((), effects)
+    )
+    before, after = bare_fit.errors.left_out, stated_fit.errors.left_out
+    has_both = np.asarray(np.isfinite(before) & np.isfinite(after))
+    has_both &= (bare_fit.errors.leverages.carries < 0) & (stated_fit.errors.leverages.carries < 0)
+    modes = [mode for mode in readings_by_mode(board) if has_both[list(mode)].all()]
+    scores = [scores_given(fit.baseline, modes) for fit in (bare_fit, stated_fit)]
+    claims = [judge_stated_effects(effects, "", before[has_both], after[has_both], scores[1] - scores[0])]
+    further_setups = [setup.name for setup in board.setups[1:] if _states_differently(board, effects, setup.name)]
+    if further_setups:
+        claims += _claims_of_further_setups(problem, effects, further_setups)
+    return tuple(claim for claim in claims if claim is not None)
 
 
-def _of_further_setups(problem: PosedProblem, effects: Sequence[str], names: Sequence[str]) -> list[StatedClaim | None]:
-    """Setups predicted by the constants of the first."""
+def _claims_of_further_setups(
+    problem: PosedProblem, effects: Sequence[str], names: Sequence[str]
+) -> list[StatedClaim | None]:
+    """Claims of further setups, predicted by the constants of the first setup."""
     n_first = len(problem.board.setups[0].readings)
-    sides = [fit_with(problem, one, n_first) for one in ((), effects)]
+    fits = [fit_with_effects(problem, combination, n_first) for combination in ((), effects)]
     claims = []
     for number, setup in enumerate(problem.board.setups):
         if setup.name in names:
-            own = np.flatnonzero(sides[0].setup_index == number)
-            scores = [scores_given(one, [[i] for i in own.tolist()], range(n_first)) for one in sides]
-            before, after = (one.residual[own] for one in sides)
-            claims.append(judge_stated(effects, setup.name, before, after, scores[1] - scores[0]))
+            own_readings = np.flatnonzero(fits[0].setup_index == number)
+            scores = [scores_given(fit, [[i] for i in own_readings.tolist()], range(n_first)) for fit in fits]
+            before, after = (fit.residual[own_readings] for fit in fits)
+            claims.append(judge_stated_effects(effects, setup.name, before, after, scores[1] - scores[0]))
     return claims
 
 
@@ -108,28 +113,30 @@ def scores_given(fit: Baseline, groups: Sequence[Sequence[int]], given: Iterable
     To first order about a fit of fixed inputs. The constants are left open and the noise is averaged over its prior, so
     that neither a better fit to the reading itself nor a noise that follows it can raise its score.
     """
-    reach = reach_of(fit.board, fit.setup_index, np.where(fit.is_mode, fit.residual, np.nan))
+    reach = noise_reach(fit.board, fit.setup_index, np.where(fit.is_mode, fit.residual, np.nan))
     noise = noise_grid(fit.board, reach=reach if len(fit.board.setups) <= 2 else ())
-    empty = nothing(fit.n_modes, fit.log_rigidities.size)
+    empty = no_effect_cells(fit.n_modes, fit.log_rigidities.size)
 
-    def log_density(used: set[int]) -> float:
-        rows = np.where(np.isin(np.arange(fit.n_modes), list(used)), fit.rows, -1)
-        return float(Terms(empty, fit.labelled(rows), noise).log_evidence(fit.residual[None, :])[0])
+    def log_density(readings: set[int]) -> float:
+        rows = np.where(np.isin(np.arange(fit.n_modes), list(readings)), fit.rows, -1)
+        return float(NormalTerms(empty, fit.labelled(rows), noise).log_evidence(fit.residual[None, :])[0])
 
-    every = set(range(fit.n_modes) if given is None else given)
-    return np.array([log_density(every | set(one)) - log_density(every - set(one)) for one in groups])
+    given_readings = set(range(fit.n_modes) if given is None else given)
+    return np.array(
+        [log_density(given_readings | set(group)) - log_density(given_readings - set(group)) for group in groups]
+    )
 
 
 def _states_differently(board: Board, effects: Sequence[str], name: str) -> bool:
-    """Whether what the card states of known effects is another in a setup than in the first one."""
+    """Whether the card states other sizes of known effects in a setup than in the first one."""
 
-    def sizes(setup: str) -> list[tuple[str, object]]:
+    def sizes(setup_name: str) -> list[tuple[str, object]]:
         return [
-            (one.key, one.prior)
+            (parameter.key, parameter.prior)
             for effect in effects
-            for acting in acting_at_known_size(board, effect)
-            if acting.owner.name == setup
-            for one in acting.parameters()
+            for acting in effects_at_known_size(board, effect)
+            if acting.owner.name == setup_name
+            for parameter in acting.parameters()
         ]
 
     return sizes(name) != sizes(board.setups[0].name)

@@ -1,10 +1,11 @@
-"""How probable readings are under an effect: a sum over its sizes and the noise, constants projected out.
+"""The density of readings under an effect: a sum over its sizes and the noise, constants projected out.
 
 With a flat prior on the logarithms of the constants the marginal density of the readings is that of their projection
-on the directions that they cannot reach, n - 3 of a board of wood (the restricted likelihood). Under one cell of a
-table and one level of noise the projection is normal, with the precision Q of the readings; evidence is a sum of such
-terms. So is the prediction of readings m that are left out, whatever the term: they miss it by Q_mm^-1 (Q g)_m, with g
-what the term leaves of all readings, and the others are as probable as all of them over the density of that.
+on the directions that the constants cannot reach, n - 3 for a board of wood (the restricted likelihood). Under one cell
+of a table and one level of noise the projection is normal, with the precision Q of the readings; the evidence is a sum
+of such terms. Each term also predicts readings m that are left out: they differ from the prediction by
+Q_mm^-1 (Q g)_m, where g is the residual of all readings under the term, and the density of the other readings is that
+of all over that of this difference.
 """
 
 from __future__ import annotations
@@ -16,23 +17,23 @@ from itertools import product
 
 import numpy as np
 
-from bayesplate.arrays import Floats
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board
-from bayesplate.diagnosis.baseline import Baseline, Rows
+from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.shifts import Cells
 
-_MOST_NUMBERS = 200_000
-"""Held at once of any one kind: larger arrays cost more to fetch and to give back than to fill."""
+_MOST_ARRAY_ELEMENTS = 200_000
+"""Elements of an array, at most: larger arrays cost more to allocate and to free than to fill."""
 _LOG_TWO_PI = float(np.log(2.0 * np.pi))
-_LEAST = 1e-12
-"""Of its precision without the constants, what a reading keeps at least: one that alone carries a constant has none."""
+_LEAST_PRECISION = 1e-12
+"""Least share of its precision without the constants that a reading keeps: one that alone carries a constant has 0."""
 
 
 @dataclass(frozen=True, eq=False)
-class Terms:
+class NormalTerms:
     """Normal terms of a table: one per level of noise and cell, cells running fastest."""
 
-    table: Cells  # of the modes that the readings are taken for
+    table: Cells  # of the modes of the readings, by their labels
     baseline: Baseline
     noise: NoiseGrid
 
@@ -53,7 +54,7 @@ class Terms:
 
     @cached_property
     def _tangents(self) -> tuple[Floats, Floats]:
-        """What the tangents T of the cells, whitened, take off the squares of whitened readings.
+        """The whitened tangents T of the cells, by which the squares of whitened readings are reduced.
 
         C^-1 T' with C C' = I + T' T, (n_levels, n_cells, p, d) array, and ln of the determinant of C.
         """
@@ -68,10 +69,10 @@ class Terms:
         """ln of weight times density, (n_levels, n_cells, n_sets) array, and the readings along the tangents."""
         along, log_factor = self._tangents
         n_levels, n_cells, p, d = along.shape
-        seen = np.swapaxes(residuals @ np.swapaxes(self._whitening, 1, 2), 1, 2)
+        whitened = np.swapaxes(residuals @ np.swapaxes(self._whitening, 1, 2), 1, 2)
         middles = self.table.shift @ np.swapaxes(self._whitening, 1, 2)
-        squares = (seen**2).sum(axis=1)[:, None] + (middles**2).sum(axis=2)[:, :, None] - 2.0 * (middles @ seen)
-        inside = (along.reshape(n_levels, n_cells * p, d) @ seen).reshape(n_levels, n_cells, p, len(residuals))
+        squares = (whitened**2).sum(axis=1)[:, None] + (middles**2).sum(axis=2)[:, :, None] - 2.0 * (middles @ whitened)
+        inside = (along.reshape(n_levels, n_cells * p, d) @ whitened).reshape(n_levels, n_cells, p, len(residuals))
         inside -= np.einsum("lkpd,lkd->lkp", along, middles)[:, :, :, None]
         squares -= (inside**2).sum(axis=2)
         gram = self._whitening @ np.swapaxes(self._whitening, 1, 2)
@@ -94,37 +95,40 @@ class Terms:
 
         An error is a reading less its mean prediction by the others; not a number where the reading is no mode.
         """
-        parts = [part._left_out(residuals) for part in self._in_parts(len(residuals))]
-        log_masses, errors = (np.stack(each) for each in zip(*parts, strict=True))
-        mean = (normalised(log_masses)[:, self.baseline.mode_index] * errors).sum(axis=0)
+        parts = [part._left_out_of_cells(residuals) for part in self._in_parts(len(residuals))]
+        log_masses, errors = (np.stack(values) for values in zip(*parts, strict=True))
+        mean = (normalised_weights(log_masses)[:, self.baseline.mode_index] * errors).sum(axis=0)
         return np.asarray(log_sum(log_masses) - self.baseline.half_log_det), np.asarray(mean)
 
-    def _left_out(self, residuals: Floats) -> tuple[Floats, Floats]:
-        """The same of these cells alone: ln of their weight in place of the evidence, no change of volume counted."""
+    def _left_out_of_cells(self, residuals: Floats) -> tuple[Floats, Floats]:
+        """`left_out` for these cells alone, with ln of their weight, without `half_log_det`, in place of the
+        evidence."""
         log_densities, inside = self._densities(residuals)
         white, along = self._whitening, self._tangents[0] @ self._whitening[:, None]
-        seen = np.swapaxes(white, 1, 2) @ (white @ residuals.T)
+        weighted_residuals = np.swapaxes(white, 1, 2) @ (white @ residuals.T)
         middles = self.table.shift @ (np.swapaxes(white, 1, 2) @ white)
         log_mass = np.empty((len(self.baseline.same_modes), len(residuals)))
         errors = np.full((self.baseline.n_modes, len(residuals)), np.nan)
         for i, mode in enumerate(self.baseline.same_modes):
             rows = [reading for reading in mode if self.baseline.is_mode[reading]]
-            own, tangents = white[:, :, rows], along[:, :, :, rows]
-            pulled = seen[:, None, rows] - middles[:, :, rows, None] - np.swapaxes(tangents, 2, 3) @ inside
-            bare = np.swapaxes(own, 1, 2) @ own
-            least = _LEAST * bare * np.eye(len(rows))
-            precision = (bare + least)[:, None] - np.swapaxes(tangents, 2, 3) @ tangents
-            misses = np.linalg.inv(precision) @ pulled
-            log_others = log_densities + 0.5 * (pulled * misses).sum(axis=2) + 0.5 * len(rows) * _LOG_TWO_PI
+            white_readings, tangents = white[:, :, rows], along[:, :, :, rows]
+            weighted_errors = (
+                weighted_residuals[:, None, rows] - middles[:, :, rows, None] - np.swapaxes(tangents, 2, 3) @ inside
+            )
+            bare_precision = np.swapaxes(white_readings, 1, 2) @ white_readings
+            least = _LEAST_PRECISION * bare_precision * np.eye(len(rows))
+            precision = (bare_precision + least)[:, None] - np.swapaxes(tangents, 2, 3) @ tangents
+            misses = np.linalg.inv(precision) @ weighted_errors
+            log_others = log_densities + 0.5 * (weighted_errors * misses).sum(axis=2) + 0.5 * len(rows) * _LOG_TWO_PI
             log_others -= 0.5 * np.linalg.slogdet(precision)[1][:, :, None]
             log_mass[i] = log_sum(log_others.reshape(-1, len(residuals)))
             errors[rows] = np.einsum("lks,lkms->ms", np.exp(log_others - log_mass[i]), misses)
         return log_mass, errors
 
-    def _in_parts(self, n_sets: int) -> Iterator[Terms]:
-        """The terms of some cells at a time, so many that what they make of the data sets stays small."""
+    def _in_parts(self, n_sets: int) -> Iterator[NormalTerms]:
+        """The terms in parts, with so few cells each that their arrays over the data sets stay small."""
         n_modes, n_tangents = self.table.slopes.shape[1:]
-        step = max(1, _MOST_NUMBERS // (self.noise.weights.size * max(n_sets, n_modes * n_tangents)))
+        step = max(1, _MOST_ARRAY_ELEMENTS // (self.noise.weights.size * max(n_sets, n_modes * n_tangents)))
         for first in range(0, self.table.n_cells, step):
             part = self.table.some(slice(first, first + step))
             yield self if step >= self.table.n_cells else replace(self, table=part)
@@ -136,7 +140,7 @@ def log_sum(values: Floats) -> Floats:
     return np.asarray(top + np.log(np.exp(values - top).sum(axis=0)))
 
 
-def normalised(log_values: Floats) -> Floats:
+def normalised_weights(log_values: Floats) -> Floats:
     """Probabilities from logarithms of weights, summing to one over the first axis."""
     shares = np.exp(log_values - log_values.max(axis=0))
     return np.asarray(shares / shares.sum(axis=0))
@@ -144,11 +148,12 @@ def normalised(log_values: Floats) -> Floats:
 
 _LOW, _HIGH, _HIGHEST = -2.5, 3.5, 9.0
 _MARGIN = 1.5
-"""Standard deviations of the prior: a noise stands a few tenths off the rms, and is tried 1.5 times smaller."""
+"""Standard deviations of the prior above the rms: the noise may be a few tenths off it, and is also tried 1.5 times
+smaller."""
 _LEVELS, _FEW_LEVELS = {1: 9, 2: 5}, {1: 5, 2: 4}
-"""Along each of one or two setups."""
+"""Levels along each axis, by the number of setups."""
 _POINTS, _FEW_POINTS = 64, 32
-"""Of more setups together, whose product would grow without bound; powers of two, as Sobol's sequence wants them."""
+"""Points for more setups, where a grid would grow without bound; powers of two, as Sobol's sequence requires."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,45 +165,45 @@ class NoiseGrid:
 
 
 def noise_grid(board: Board, *, few: bool = False, reach: Sequence[float] = ()) -> NoiseGrid:
-    """Equidistant levels in the logarithm of the noise of one setup, each with each of two, and points among more.
+    """A grid of noise levels, equidistant in ln noise, for one or two setups, and scattered points for more.
 
     The points are the first of Sobol's sequence (USSR Comput. Math. Math. Phys. 7, 1967), each in the middle of its
-    share of the prior: as many for twenty setups as for three, so that the more setups, the coarser they lie; a `few`
-    for combinations of effects. The levels of one or two setups go up to `reach` at least, in standard coordinates: a
-    misfit of many times the noise is a large noise rather than one that no level comes near.
+    share of the prior: as many for twenty setups as for three, so that they are coarser with more setups. There are a
+    `few` levels or points for combinations of effects. The levels of one or two setups go up to `reach` at least, in
+    standard coordinates, so that a misfit of many times the noise has a level near it.
     """
     n_setups = len(board.setups)
     counts = _FEW_LEVELS if few else _LEVELS
     if n_setups in counts:
-        axes = [_levels(counts[n_setups], top) for top in reach or (_HIGH,) * n_setups]
+        axes = [_noise_levels(counts[n_setups], top) for top in reach or (_HIGH,) * n_setups]
         t = np.array(list(product(*axes)))
         weights = np.exp(-0.5 * (t**2).sum(axis=1))
     else:
-        t = _points(_FEW_POINTS if few else _POINTS, n_setups)
+        t = _normal_points(_FEW_POINTS if few else _POINTS, n_setups)
         weights = np.ones(len(t))
-    each = [setup.noise.median * np.exp(setup.noise.log_sd * t[:, i]) for i, setup in enumerate(board.setups)]
-    return NoiseGrid(np.stack(each, axis=1), weights / weights.sum())
+    levels = [setup.noise.median * np.exp(setup.noise.log_sd * t[:, i]) for i, setup in enumerate(board.setups)]
+    return NoiseGrid(np.stack(levels, axis=1), weights / weights.sum())
 
 
-def reach_of(board: Board, setup_index: Rows, residual: Floats) -> tuple[float, ...]:
-    """How far up each setup's noise levels have to go for its residual (ln f; NaN: no mode), standard coordinates."""
-    found = []
+def noise_reach(board: Board, setup_index: Indices, residual: Floats) -> tuple[float, ...]:
+    """The highest noise level that each setup needs for its residual (ln f; NaN: no mode), in standard coordinates."""
+    reaches = []
     for i, setup in enumerate(board.setups):
-        own = residual[(setup_index == i) & np.isfinite(residual)]
-        rms = float(np.sqrt(np.mean(own**2))) if own.size else 0.0
+        own_residual = residual[(setup_index == i) & np.isfinite(residual)]
+        rms = float(np.sqrt(np.mean(own_residual**2))) if own_residual.size else 0.0
         needed = np.log(rms / setup.noise.median) / setup.noise.log_sd + _MARGIN if rms > 0.0 else _HIGH
-        found.append(float(np.clip(needed, _HIGH, _HIGHEST)))
-    return tuple(found)
+        reaches.append(float(np.clip(needed, _HIGH, _HIGHEST)))
+    return tuple(reaches)
 
 
-def _levels(n_levels: int, top: float) -> Floats:
-    """So many levels up to where the prior ends for most boards, and more of the same distance up to the top."""
+def _noise_levels(n_levels: int, top: float) -> Floats:
+    """`n_levels` levels over the usual range of the prior, and more of the same distance up to the top."""
     step = (_HIGH - _LOW) / n_levels
     n_more = int(np.ceil((top - _HIGH) / step - 1e-9))
     return np.asarray(_LOW + step * (np.arange(n_levels + n_more) + 0.5))
 
 
-def _points(n_points: int, n_dim: int) -> Floats:
+def _normal_points(n_points: int, n_dim: int) -> Floats:
     """Standard normal coordinates of equally weighted points: (n_points, n_dim) array."""
     from scipy.special import ndtri
     from scipy.stats.qmc import Sobol

@@ -1,4 +1,4 @@
-"""What an ideal plate lacks: one protocol (`base.py`), one file per effect, and the library of them here.
+"""Effects that an ideal plate lacks: one protocol (`base.py`), one file per effect, and the library of them here.
 
 The list of effects is that of the words a card may use (`bayesplate.board.words.EFFECT_NAMES`); the file of an effect
 bears its name.
@@ -18,7 +18,7 @@ from bayesplate.errors import Fault
 def _effect_of(name: str) -> type[Effect]:
     """The effect that the file of that name defines."""
     defined = vars(import_module(f"bayesplate.effects.{name}")).values()
-    return next(one for one in defined if isinstance(one, type) and getattr(one, "name", "") == name)
+    return next(member for member in defined if isinstance(member, type) and getattr(member, "name", "") == name)
 
 
 EFFECTS: dict[str, type[Effect]] = {name: _effect_of(name) for name in EFFECT_NAMES}
@@ -29,31 +29,31 @@ __all__ = ["EFFECTS", "Effect", "declare", "effect_faults", "effects_of", "impli
 
 def effects_of(board: Board, setup: Setup) -> tuple[Effect, ...]:
     """The declared effects as they act in a setup, in the order of the library whatever that of their declaration."""
-    found = []
+    effects = []
     for name, effect in EFFECTS.items():
         if name not in board.effects:
             continue
-        if any(one.name == name for one in board.chosen):
-            found += _chosen(board, setup, name)
+        if any(choice.name == name for choice in board.chosen):
+            effects += _chosen_form(board, setup, name)
         elif not effect.refusal(board, setup):
-            found.append(effect.of(board, setup))
-    return tuple(found)
+            effects.append(effect.of(board, setup))
+    return tuple(effects)
 
 
-def _chosen(board: Board, setup: Setup, name: str) -> list[Effect]:
-    """The form of an effect that was chosen for a setup, or for the board."""
-    forms = {one.owner: one for one in board.chosen if one.name == name}
+def _chosen_form(board: Board, setup: Setup, name: str) -> list[Effect]:
+    """The form of an effect that was chosen for a setup, otherwise the form chosen for the board; none or one."""
+    forms = {form.owner: form for form in board.chosen if form.name == name}
     if setup.owner in forms:
         return [forms[setup.owner]]
-    of_board = next((one for one in forms.values() if one.scope == "board"), None)
+    of_board = next((form for form in forms.values() if form.scope == "board"), None)
     acting = None if of_board is None else of_board.in_setup(board, setup)
     return [] if acting is None else [acting]
 
 
 def implied_effects(board: Board) -> tuple[str, ...]:
-    """Effects that the card declares by what it states, where they can act or a setup wants them to.
+    """Effects that the card declares by what it states, where they can act or a setup states them.
 
-    None where it declares nothing in so many words, by an empty list of effects.
+    None where the card declares an empty list of effects.
     """
     if not board.implies:
         return ()
@@ -73,12 +73,12 @@ def declare(board: Board) -> Board:
 
 
 def notes(board: Board) -> tuple[str, ...]:
-    """What each effect has to say of a board with its declared effects."""
+    """Sentences of every effect on a board with its declared effects; see `Effect.notes`."""
     return tuple(sentence for effect in EFFECTS.values() for sentence in effect.notes(board))
 
 
 def effect_faults(board: Board) -> list[Fault]:
-    """Declared effects that act in no setup of the board, or not in the one that states them, with the reasons."""
+    """Declared effects that act in no setup of the board, or not in the setup that states them, with the reasons."""
     faults = []
     file = f"{board.name}.toml"
     for name in board.effects:

@@ -1,4 +1,4 @@
-"""Things that may be fixed to a board: what they weigh, how they resist turning, and where they are."""
+"""Items that may be fixed to a board: their mass, their rotary inertia, and their places."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesplate.board.attached import AttachedItem
-from bayesplate.board.board import Board, Values, density, vibrating_lengths
+from bayesplate.board.board import Board, Values, board_density, vibrating_lengths
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Floats
@@ -33,7 +33,7 @@ _GRID = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
 @dataclass(frozen=True)
-class Item:
+class PlacedItem:
     mass: Quantity
     source: str  # of the mass; empty if the card states it
     places: Fractions  # several are those over which it roved
@@ -54,66 +54,66 @@ def rotary_inertia(mass: Floats) -> Floats:
     return np.asarray(mass * _GYRATION * base_diameter(mass) ** 2)
 
 
-def item_on_board(board: Board, setup: Setup, item: AttachedItem) -> Item:
-    """A thing of the card: its mass, or the prior of its kind, and its places on the vibrating part."""
+def item_on_board(board: Board, setup: Setup, item: AttachedItem) -> PlacedItem:
+    """An item of the card: its mass, or the prior of its kind, and its places on the vibrating part."""
     mass, source = (item.mass, "") if item.mass is not None else _PRIORS[item.kind]
     base = 0.0 if item.kind == "shaker" else 0.5 * float(base_diameter(mass.median))
-    return Item(mass, source, fractions_on(board, setup, item.places), radius_on(board, setup, base), base)
+    return PlacedItem(mass, source, fractions_on(board, setup, item.places), radius_on(board, setup, base), base)
 
 
-def items_on_board(board: Board, setup: Setup, item: AttachedItem) -> list[Item]:
-    """A thing of the card at its places, or at each of the likely ones where nobody knows them."""
-    own = item_on_board(board, setup, item)
-    return [own] if item.places else [replace(own, places=(place,)) for place in _likely_places(setup)]
+def items_on_board(board: Board, setup: Setup, item: AttachedItem) -> list[PlacedItem]:
+    """An item of the card at its places, or at each of the likely places where the card states none."""
+    placed = item_on_board(board, setup, item)
+    return [placed] if item.places else [replace(placed, places=(place,)) for place in _likely_places(setup)]
 
 
 def fractions_on(board: Board, setup: Setup, places: Places) -> Fractions:
-    """Places as fractions of the sides that vibrate in a setup, at nominal sizes; what a clamp covers is at its rim."""
+    """Places as fractions of the sides that vibrate in a setup, at nominal sizes; clamped places are at the rim."""
     return tuple(fractions_of(setup, place, board.nominal()) for place in places)
 
 
 def fractions_of(setup: Setup, place: tuple[float, float], values: Values) -> tuple[float, float]:
     """One place as fractions of the sides that vibrate in a setup, at given sizes."""
-    starts, sides = _vibrating(values, setup)
+    starts, sides = _vibrating_range(values, setup)
     x, y = ((at - start) / side for at, start, side in zip(place, starts, sides, strict=True))
     return float(np.clip(x, 0.0, 1.0)), float(np.clip(y, 0.0, 1.0))
 
 
 def places_on(board: Board, setup: Setup, fractions: Fractions) -> Places:
     """Places on the whole board from fractions of the sides that vibrate in a setup; the inverse of `fractions_on`."""
-    starts, sides = _vibrating(board.nominal(), setup)
+    starts, sides = _vibrating_range(board.nominal(), setup)
     return tuple((starts[0] + s * sides[0], starts[1] + t * sides[1]) for s, t in fractions)
 
 
 def radius_on(board: Board, setup: Setup, base: float) -> tuple[float, float]:
     """The radius of a base over the two sides that vibrate in a setup."""
-    _, sides = _vibrating(board.nominal(), setup)
+    _, sides = _vibrating_range(board.nominal(), setup)
     return base / sides[0], base / sides[1]
 
 
-def _vibrating(values: Values, setup: Setup) -> tuple[tuple[float, float], tuple[float, float]]:
+def _vibrating_range(values: Values, setup: Setup) -> tuple[tuple[float, float], tuple[float, float]]:
     """Start and length of the vibrating part along x and y, m."""
     length_x, length_y = vibrating_lengths(values, setup)
     x, y = (float(values[setup.input_name(edge)]) if edge in setup.clamped else 0.0 for edge in ("x0", "y0"))
     return (x, y), (float(length_x), float(length_y))
 
 
-def forgotten_items(board: Board, setup: Setup) -> list[Item]:
-    """One small thing at each of the places where something forgotten might be."""
+def forgotten_items(board: Board, setup: Setup) -> list[PlacedItem]:
+    """One small item at each of the places where a forgotten item might be."""
     mass = Quantity.from_mean(0.0, _UNKNOWN_SHARE * board_mass(board), "normal", lower=0.0)
-    return [Item(mass, _UNKNOWN_SOURCE, (place,)) for place in _likely_places(setup)]
+    return [PlacedItem(mass, _UNKNOWN_SOURCE, (place,)) for place in _likely_places(setup)]
 
 
 def board_mass(board: Board) -> float:
     """Mass of the whole board at its nominal sizes, kg."""
     values = board.nominal()
-    return float(density(values) * values["length_x"] * values["length_y"] * values["thickness"])
+    return float(board_density(values) * values["length_x"] * values["length_y"] * values["thickness"])
 
 
 def _likely_places(setup: Setup) -> Fractions:
     """Places on a coarse grid, without those beside held edges and the mirror images of others."""
-    along = []
+    coordinates = []
     for low, high in (setup.ends_x, setup.ends_y):
         inside = [p for p in _GRID if (p > 0.1 or low == "free") and (p < 0.9 or high == "free")]
-        along.append([p for p in inside if p <= 0.5] if low == high else inside)
-    return tuple((x, y) for x in along[0] for y in along[1])
+        coordinates.append([p for p in inside if p <= 0.5] if low == high else inside)
+    return tuple((x, y) for x in coordinates[0] for y in coordinates[1])

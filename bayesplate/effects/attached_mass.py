@@ -16,7 +16,7 @@ from bayesplate.board.parameter import Parameter
 from bayesplate.board.setup import Setup
 from bayesplate.effects.attached_items import (
     Fractions,
-    Item,
+    PlacedItem,
     Places,
     board_mass,
     forgotten_items,
@@ -29,7 +29,7 @@ from bayesplate.effects.attached_items import (
 )
 from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, Mass, Scope
 from bayesplate.effects.part import vibrating_mass
-from bayesplate.plate.terms import Amount, AtPlaces
+from bayesplate.plate.terms import PointMotion, PointTerm
 
 HEAVIEST_ROVING = 0.02
 """Share of the board's mass up to which a roving item is computed; see `AttachedMass`."""
@@ -50,11 +50,11 @@ class AttachedMass(Effect):
     the mass: 1.7 percent of a cantilever err by up to 2.2 cents, 3.4 percent of a clamped board by 14, growing with the
     square; where two modes lie close, 0.6 percent err by 3.5. A roving item above 2 percent is refused.
 
-    A place that nobody knows is no continuous parameter: `forms` tries a few places instead. Places are fractions
-    of the nominal sides. An exciter is no point mass: its magnet hangs on a spring.
+    An unknown place is no continuous parameter: `forms` tries a few places instead. Places are fractions of the nominal
+    sides. An exciter is no point mass: its magnet hangs on a spring.
     """
 
-    items: tuple[Item, ...] = ()
+    items: tuple[PlacedItem, ...] = ()
 
     name: ClassVar[str] = "attached_mass"
     scope: ClassVar[Scope] = "setup"
@@ -64,10 +64,10 @@ class AttachedMass(Effect):
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> AttachedMass:
-        """All things where the effect is declared, by a list or by one mass; otherwise those of known mass, or all."""
-        placed = [item for item in _masses(setup) if item.places]
-        known = [item for item in placed if item.mass is not None]
-        items = placed if cls.name in board.effects or not known else known
+        """All items where the effect is declared or no mass is known; otherwise the items of known mass."""
+        placed_items = [item for item in _attached_items(setup) if item.places]
+        known_items = [item for item in placed_items if item.mass is not None]
+        items = placed_items if cls.name in board.effects or not known_items else known_items
         return cls(setup.owner, tuple(item_on_board(board, setup, item) for item in items))
 
     @classmethod
@@ -76,29 +76,40 @@ class AttachedMass(Effect):
 
     @classmethod
     def is_wanted(cls, setup: Setup) -> bool:
-        return any(item.mass is not None for item in _masses(setup))
+        return any(item.mass is not None for item in _attached_items(setup))
 
     @classmethod
     def candidates(cls, board: Board, setup: Setup) -> tuple[AttachedMass, ...]:
-        """Each thing of unknown mass beside those that are known, at each likely place where its own is not known."""
-        if not _masses(setup) or heaviest_roving(board, setup) > HEAVIEST_ROVING:
+        """Each item of unknown mass beside those of known mass, at each likely place where its own is not known."""
+        if not _attached_items(setup) or heaviest_roving(board, setup) > HEAVIEST_ROVING:
             return ()
-        known = tuple(item_on_board(board, setup, item) for item in _masses(setup) if item.mass is not None)
-        unknown = [one for item in _masses(setup) if item.mass is None for one in items_on_board(board, setup, item)]
-        return tuple(cls(setup.owner, (*known, item)) for item in unknown)
+        known_items = tuple(
+            item_on_board(board, setup, item) for item in _attached_items(setup) if item.mass is not None
+        )
+        unknown_items = [
+            placed
+            for item in _attached_items(setup)
+            if item.mass is None
+            for placed in items_on_board(board, setup, item)
+        ]
+        return tuple(cls(setup.owner, (*known_items, item)) for item in unknown_items)
 
     @classmethod
     def forms(cls, board: Board) -> tuple[EffectForm, ...]:
-        """Each thing of unknown mass; where nothing is attached, one that nobody mentioned at one of a few places."""
-        if any(map(_masses, board.setups)):
-            found = super().forms(board)
-            is_placed = all(item.places for setup in board.setups for item in _masses(setup))
-            return found if is_placed else tuple(replace(one, detail=_spot(board, one.effects[0])) for one in found)
-        tried = [[cls(setup.owner, (item,)) for item in forgotten_items(board, setup)] for setup in board.setups]
+        """Each item of unknown mass; where nothing is attached, a forgotten item at each of a few places."""
+        if any(map(_attached_items, board.setups)):
+            attached_forms = super().forms(board)
+            is_placed = all(item.places for setup in board.setups for item in _attached_items(setup))
+            return (
+                attached_forms
+                if is_placed
+                else tuple(replace(form, detail=_place_detail(board, form.effects[0])) for form in attached_forms)
+            )
+        trials = [[cls(setup.owner, (item,)) for item in forgotten_items(board, setup)] for setup in board.setups]
         forms = []
-        for effect in max(tried, key=len):
+        for effect in max(trials, key=len):
             effects = tuple(effect.in_setup(board, setup) for setup in board.setups)
-            forms.append(EffectForm(_spot(board, effect), effects))
+            forms.append(EffectForm(_place_detail(board, effect), effects))
         return tuple(forms)
 
     def in_setup(self, board: Board, setup: Setup) -> AttachedMass:
@@ -109,11 +120,11 @@ class AttachedMass(Effect):
         return replace(self, owner=setup.owner, items=items)
 
     def within(self, shaped: Effect) -> AttachedMass:
-        return replace(self, items=tuple(_within(item, shaped) for item in self.items))
+        return replace(self, items=tuple(_item_within(item, shaped) for item in self.items))
 
     def _places_on(self, board: Board) -> list[Places]:
-        own = board.setup(self.owner.name)
-        return [places_on(board, own, item.places) for item in self.items]
+        setup = board.setup(self.owner.name)
+        return [places_on(board, setup, item.places) for item in self.items]
 
     @classmethod
     def notes(cls, board: Board) -> tuple[str, ...]:
@@ -128,7 +139,7 @@ class AttachedMass(Effect):
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
-        if not any(item.places for item in _masses(setup)):
+        if not any(item.places for item in _attached_items(setup)):
             return "no [[setup.attached]] says what is fixed to the board and where"
         if heaviest_roving(board, setup) > HEAVIEST_ROVING:
             return f"something above {HEAVIEST_ROVING:.0%} of the board roved: give each place a setup of its own"
@@ -146,7 +157,7 @@ class AttachedMass(Effect):
         return ["mass"] if len(self.items) == 1 else [f"mass_{i}" for i in range(1, len(self.items) + 1)]
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
-        along_x, along_y = (all(_mirrors(item.places, axis) for item in self.items) for axis in (0, 1))
+        along_x, along_y = (all(_are_mirrored(item.places, axis) for item in self.items) for axis in (0, 1))
         return along_x, along_y
 
     def contributions(self) -> tuple[Contribution, ...]:
@@ -154,10 +165,10 @@ class AttachedMass(Effect):
         return tuple(
             contribution
             for key, item in zip(self._keys, self.items, strict=True)
-            for contribution in self._of_item(key, item)
+            for contribution in self._item_contributions(key, item)
         )
 
-    def _of_item(self, key: str, item: Item) -> Iterator[Contribution]:
+    def _item_contributions(self, key: str, item: PlacedItem) -> Iterator[Contribution]:
         def mass(values: Values, setup: Setup) -> Floats:
             return self.value(values, key) / vibrating_mass(values, setup)
 
@@ -165,33 +176,33 @@ class AttachedMass(Effect):
             side = vibrating_lengths(values, setup)[axis]
             return rotary_inertia(self.value(values, key)) / (vibrating_mass(values, setup) * side**2)
 
-        yield Mass(_mean_squares([Amount(((1.0, x, y),)) for x, y in item.places]), mass)
+        yield Mass(_mean_squares([PointMotion(((1.0, x, y),)) for x, y in item.places]), mass)
         if any(item.radius):
             for axis in (0, 1):
                 yield Mass(_mean_squares(_tilts(item, axis)), partial(inertia, axis=axis))
 
 
-def _masses(setup: Setup) -> tuple[AttachedItem, ...]:
-    """The things that move with the board as a whole."""
+def _attached_items(setup: Setup) -> tuple[AttachedItem, ...]:
+    """The items that move with the board as a whole: all but exciters."""
     return tuple(item for item in setup.attached if item.kind != "exciter")
 
 
-def _spot(board: Board, effect: Effect) -> str:
-    """The place of the last of the things, in words."""
+def _place_detail(board: Board, effect: Effect) -> str:
+    """The place of the last of the items, in words."""
     assert isinstance(effect, AttachedMass)
     x, y = effect._places_on(board)[-1][0]
     return f"at {1e3 * x:.0f}, {1e3 * y:.0f} mm"
 
 
 def heaviest_roving(board: Board, setup: Setup) -> float:
-    """Mass of the heaviest thing that roved in a setup, over the board's; 0 if none did."""
-    if not _masses(setup):
+    """Mass of the heaviest item that roved in a setup, over the board's; 0 if none did."""
+    if not _attached_items(setup):
         return 0.0
-    roved = [i.mass.median for i in AttachedMass.of(board, setup).items if len(i.places) > 1]
-    return max(roved, default=0.0) / board_mass(board)
+    masses = [item.mass.median for item in AttachedMass.of(board, setup).items if len(item.places) > 1]
+    return max(masses, default=0.0) / board_mass(board)
 
 
-def _within(item: Item, shaped: Effect) -> Item:
+def _item_within(item: PlacedItem, shaped: Effect) -> PlacedItem:
     outline = shaped.outline()
     assert outline is not None
     places = tuple(shaped.placed(*place) for place in item.places)
@@ -199,23 +210,23 @@ def _within(item: Item, shaped: Effect) -> Item:
     return replace(item, places=places, reach=tuple(zip(low.tolist(), high.tolist(), strict=True)))
 
 
-def _mirrors(places: Fractions, axis: int) -> bool:
-    there = Counter((round(x, 6), round(y, 6)) for x, y in places)
+def _are_mirrored(places: Fractions, axis: int) -> bool:
+    rounded = Counter((round(x, 6), round(y, 6)) for x, y in places)
     mirrored = [(1.0 - x, y) if axis == 0 else (x, 1.0 - y) for x, y in places]
-    return there == Counter((round(x, 6), round(y, 6)) for x, y in mirrored)
+    return rounded == Counter((round(x, 6), round(y, 6)) for x, y in mirrored)
 
 
-def _tilts(item: Item, axis: int) -> list[Amount]:
+def _tilts(item: PlacedItem, axis: int) -> list[PointMotion]:
     """Tilt along x (0) or y (1) of a base that touches the board at its rim, at each place."""
-    found = []
+    tilts = []
     for k, place in enumerate(item.places):
         first, last = item.reach[k] if axis == 1 and item.reach else (0.0, 1.0)
         ends = max(place[axis] - item.radius[axis], first), min(place[axis] + item.radius[axis], last)
         slope = 1.0 / (ends[1] - ends[0])
         low, high = ((end, place[1]) if axis == 0 else (place[0], end) for end in ends)
-        found.append(Amount(((-slope, *low), (slope, *high))))
-    return found
+        tilts.append(PointMotion(((-slope, *low), (slope, *high))))
+    return tilts
 
 
-def _mean_squares(amounts: Sequence[Amount]) -> AtPlaces:
-    return AtPlaces(tuple((1.0 / len(amounts), one, one) for one in amounts))
+def _mean_squares(motions: Sequence[PointMotion]) -> PointTerm:
+    return PointTerm(tuple((1.0 / len(motions), motion, motion) for motion in motions))

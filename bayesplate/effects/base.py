@@ -1,9 +1,9 @@
-"""What an effect is: something the ideal plate lacks, with parameters, physical priors, and a place in the problem.
+"""Protocol of an effect: a departure from the ideal plate, with parameters and physical priors.
 
-An effect adds terms to the budget of energies, stiffness or mass, each one object that holds its matrix and its weight,
-so that the two cannot fall out of step. It may also change the plate they are added to: another theory, a released
-edge, properties that vary over the plate, a term that is not even about the middle. Everything that an effect can do to
-a plate, and everything that the rest of the package must know of it, is a method or a class variable of `Effect`; each
+An effect adds terms to the budget of energies, stiffness or mass; each is one object that holds its matrix and its
+weight, so that the two always match. It may also change the plate they are added to: another theory, a released edge,
+properties that vary over the plate, a term that is not even about the middle. Everything that an effect can do to a
+plate, and everything that the rest of the package must know of it, is a method or a class variable of `Effect`; each
 has a default that does nothing. The file of an effect is all that an effect needs.
 """
 
@@ -19,22 +19,22 @@ import numpy as np
 
 from bayesplate.arrays import Floats as Floats
 from bayesplate.board.board import Board, Values
-from bayesplate.board.parameter import BOARD, Owner, Parameter, shown_name
+from bayesplate.board.parameter import BOARD_OWNER, Owner, Parameter, parameter_name
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
-from bayesplate.plate.fields import EdgeStrip, Field, Group, Outline
+from bayesplate.plate.fields import EdgeStrip, Field, Outline, TermGroup
 from bayesplate.plate.terms import Term, Weights
 
 Scope = Literal["board", "setup"]
 Theory = Literal["thin", "shear-flexible"]
 Release = Literal["", "value", "slope"]
-"""What clamped edges let go in the presence of an effect, whose springs then hold it: nothing, deflection or slope."""
-Weight = Callable[[Values, Setup], Floats]
-"""What a term weighs at values in a setup: a number or an (n_draws,) array; of several terms one more axis for them."""
+"""What clamped edges release in the presence of an effect, whose springs then hold it: nothing, deflection or slope."""
+WeightFunction = Callable[[Values, Setup], Floats]
+"""Weight of a term at values in a setup: a number or an (n_draws,) array; of several terms with one more axis."""
 
 
-Terms = Term | tuple[Term, ...] | Callable[[Values, Field | None], tuple[Term, ...]]
-"""A term; several whose weights are worked out together; or what makes these from the values at which the plate is
+ContributionTerms = Term | tuple[Term, ...] | Callable[[Values, Field | None], tuple[Term, ...]]
+"""A term; several terms with one weight function; or a function that makes these from the values at which the plate is
 solved and the field that its in-plane stiffness follows (None: uniform)."""
 
 
@@ -48,8 +48,8 @@ class Contribution:
         s^-2 of a stiffness, of a mass a fraction of the vibrating mass.
     """
 
-    terms: Terms
-    weight: Weight
+    terms: ContributionTerms
+    weight: WeightFunction
 
     def terms_at(self, values: Values, in_plane: Field | None) -> tuple[Term, ...]:
         """The terms of a plate that is solved at some values."""
@@ -73,7 +73,7 @@ class Mass(Contribution):
 
 @dataclass(frozen=True)
 class Variation:
-    """A field over the plate that one of its own properties follows, and the weight with which it does.
+    """A field over the plate that one of the plate's properties follows, and its weight.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Variation:
     weight : callable or None
         From the values to a number or an (n_draws,) array; None is one.
     order : int
-        Of smallness: an expansion that ends with the second order leaves out higher ones, and so do products of two.
+        Order of smallness: an expansion to second order leaves out higher orders, also in products of two variations.
     """
 
     field: Field | EdgeStrip | None
@@ -92,12 +92,12 @@ class Variation:
 
 @dataclass(frozen=True)
 class EffectForm:
-    """One way in which a search may try an effect on a board.
+    """One form in which a search may try an effect on a board.
 
     Attributes
     ----------
     detail : str
-        What tells it from the effect's other forms; empty if there are none.
+        What distinguishes it from the effect's other forms; empty if there are none.
     effects : tuple of Effect
         One per setup in which it acts.
     """
@@ -135,7 +135,7 @@ class Effect(ABC):
         Of its parameters: the setup it acts in, the board, or a group that shares them.
     """
 
-    owner: Owner = BOARD
+    owner: Owner = BOARD_OWNER
 
     name: ClassVar[str]
     scope: ClassVar[Scope]
@@ -152,7 +152,7 @@ class Effect(ABC):
     ratios: ClassVar[Mapping[str, Ratio]] = {}
     """Parameters that boards of one species may share as ratios to their own moduli, by key."""
     refines: ClassVar[float] = 1.0
-    """Factor on the elements a side of a thin plate, for what its mesh would show."""
+    """Factor on the number of elements per side of a thin plate, where the effect needs a finer mesh."""
 
     @classmethod
     @abstractmethod
@@ -203,14 +203,14 @@ class Effect(ABC):
     @classmethod
     def forms(cls, board: Board) -> tuple[EffectForm, ...]:
         """The forms in which a search should try the effect on a board, each in all setups where it can act."""
-        acting = [found for setup in board.setups if (found := cls.candidates(board, setup))]
+        acting = [candidates for setup in board.setups if (candidates := cls.candidates(board, setup))]
         together = zip_longest(*acting)
-        chosen = (tuple(one or found[0] for one, found in zip(each, acting, strict=True)) for each in together)
-        return tuple(EffectForm(effects[0].detail, effects) for effects in chosen)
+        rows = (tuple(form or candidates[0] for form, candidates in zip(row, acting, strict=True)) for row in together)
+        return tuple(EffectForm(effects[0].detail, effects) for effects in rows)
 
     @property
     def detail(self) -> str:
-        """What tells this form of the effect from its others; empty if there are none."""
+        """What distinguishes this form of the effect from its other forms; empty if there are none."""
         return ""
 
     def in_setup(self, board: Board, setup: Setup) -> Effect | None:
@@ -237,8 +237,8 @@ class Effect(ABC):
         words : str
             What people call it, if not its key.
         """
-        said = f"{words or key} of {self.name.replace('_', ' ')}"
-        return Parameter(key, self.owner, prior, unit, null, self.name, source=source, words=said)
+        phrase = f"{words or key} of {self.name.replace('_', ' ')}"
+        return Parameter(key, self.owner, prior, unit, null, self.name, source=source, words=phrase)
 
     def value(self, values: Values, key: str) -> Floats:
         """Value of a parameter: a number or an (n_draws,) array."""
@@ -246,7 +246,7 @@ class Effect(ABC):
 
     def name_of(self, key: str) -> str:
         """Name of a parameter among the values of a board."""
-        return shown_name(key, self.owner, self.name)
+        return parameter_name(key, self.owner, self.name)
 
     def adjusted(self, values: Values) -> Values:
         """The values as all weights take them in the presence of the effect, which may correct sizes and density."""
@@ -259,7 +259,7 @@ class Effect(ABC):
     def placed(self, x: float, y: float) -> tuple[float, float]:
         """Where on the plate's rectangle a place lies, given and returned as fractions of the vibrating sides.
 
-        Given are fractions of the nominal sides from the corner of x0 and y0; what lies off the plate is at its rim.
+        x and y are fractions of the nominal sides from the corner of x0 and y0; a place off the plate moves to its rim.
         """
         return x, y
 
@@ -271,7 +271,7 @@ class Effect(ABC):
         """The effect on a plate whose outline another effect gives: its places lie on that, its own terms end there."""
         return self
 
-    def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
+    def variations(self) -> Mapping[TermGroup, tuple[Variation, ...]]:
         """Fields that the plate's own terms follow instead of being uniform, by group of terms.
 
         The part of E_x alone follows the fields of "along" where there are any, and those of "bending" otherwise.
@@ -284,7 +284,7 @@ class Effect(ABC):
         return ()
 
     def also_at(self) -> tuple[Mapping[str, float], ...]:
-        """Where an exact law is made too, beyond the two ends of each parameter: shares of their reach by name."""
+        """Further points at which an exact law is made, beside the ends of each parameter: shares of reach by name."""
         return ()
 
     def stations(self) -> tuple[Effect, ...]:

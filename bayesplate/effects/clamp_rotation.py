@@ -10,7 +10,7 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.effects.base import Contribution, Release
 from bayesplate.effects.clamps import CompliantClamp
 
-STIFFEST = 1e-5
+LEAST_COMPLIANCE = 1e-5
 """Compliance that is left where the parameter is 0: such a clamp is ideal to a twentieth of a cent."""
 
 _PRIOR = Quantity.from_mean(0.0, 0.04, "normal", lower=0.0)
@@ -37,4 +37,4 @@ class ClampRotation(CompliantClamp):
 
     def contributions(self) -> tuple[Contribution, ...]:
         """The squared turning along the clamped edges of each side, with k_R over rho h and the cube of the side."""
-        return self.springs(("turn_x", "turn_y"), STIFFEST, power=3)
+        return self.springs(("turn_x", "turn_y"), LEAST_COMPLIANCE, power=3)

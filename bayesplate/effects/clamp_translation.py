@@ -10,7 +10,7 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.effects.base import Contribution, Release
 from bayesplate.effects.clamps import CompliantClamp
 
-STIFFEST = 1e-7
+LEAST_COMPLIANCE = 1e-7
 """Compliance that is left where the parameter is 0: such a clamp is ideal to a tenth of a cent."""
 
 _PRIOR = Quantity.from_mean(0.0, 1e-4, "normal", lower=0.0)
@@ -37,4 +37,4 @@ class ClampTranslation(CompliantClamp):
 
     def contributions(self) -> tuple[Contribution, ...]:
         """The squared deflection along the clamped edges of each side, with k_T over rho h and the side."""
-        return self.springs(("w", "w"), STIFFEST, power=1)
+        return self.springs(("w", "w"), LEAST_COMPLIANCE, power=1)

@@ -1,4 +1,4 @@
-"""What the two clamp effects share: which edges are clamped, and springs of one stiffness along them."""
+"""Base of the two clamp effects: which edges are clamped, and springs of one stiffness along them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from bayesplate.board.board import Board, Values, density, vibrating_lengths
+from bayesplate.board.board import Board, Values, board_density, vibrating_lengths
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Contribution, Effect, Floats, Scope, Stiffness
-from bayesplate.plate.terms import AlongEdges
+from bayesplate.plate.terms import EdgeTerm
 
 ClampedEnds = tuple[tuple[bool, bool], tuple[bool, bool]]
 """Whether x0 and x1, y0 and y1 are clamped."""
@@ -56,10 +56,10 @@ class CompliantClamp(Effect):
             sides = vibrating_lengths(values, setup)
             compliance = np.maximum(self.value(values, "compliance"), 0.0) + stiffest
             stiffness = values["D_x" if first == 0 else "D_y"] / (compliance * sides[first] ** (4 - power))
-            return stiffness / (density(values) * values["thickness"] * sides[side] ** power)
+            return stiffness / (board_density(values) * values["thickness"] * sides[side] ** power)
 
         return tuple(
-            Stiffness(AlongEdges(side, at, strain), partial(weight, side=side))
+            Stiffness(EdgeTerm(side, at, strain), partial(weight, side=side))
             for side, (at, strain) in enumerate(zip(self.clamped, strains, strict=True))
             if any(at)
         )

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from bayesplate.board.quantity import Quantity
 from bayesplate.effects.gradients import GradientAlongX
-from bayesplate.plate.fields import Group
+from bayesplate.plate.fields import TermGroup
 
 
 @dataclass(frozen=True)
@@ -24,4 +24,4 @@ class DensityGradient(GradientAlongX):
         "normal: density varies by a few per cent along one plank; a board is not heavier at a known end"
     )
 
-    groups: ClassVar[tuple[Group, ...]] = ("mass", "rotary")
+    groups: ClassVar[tuple[TermGroup, ...]] = ("mass", "rotary")

@@ -1,4 +1,4 @@
-"""What an exciter is as a board carries it: its masses, its spring, and the places where it may be."""
+"""An exciter as a board carries it: its masses, its spring, and the places where it may be."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from bayesplate.board.attached import AttachedItem
 from bayesplate.board.board import Board
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.setup import Ends, Setup
+from bayesplate.board.setup import EdgeConditions, Setup
 from bayesplate.effects.attached_items import Fractions, fractions_on
 from bayesplate.effects.base import Floats
 
@@ -23,7 +23,7 @@ _PLACES_A_SIDE = 8
 
 
 @dataclass(frozen=True)
-class Spot:
+class PlaceRange:
     """Range along one side where an exciter may be, as fractions of the vibrating part; one place where it is known."""
 
     low: float
@@ -39,7 +39,7 @@ class Spot:
         return np.asarray(self.low + 0.5 * (self.high - self.low) * (1.0 - steps))
 
     def shares(self, at: Floats) -> Floats:
-        """What each node has of a polynomial's value at places: (..., n_nodes) array, summing to one.
+        """Share of each node in a polynomial's value at places: (..., n_nodes) array, summing to one.
 
         A place beyond the ends, where the prior is zero but a proposal may fall, counts as the end: far from its nodes
         a polynomial loses all digits. Lagrange's polynomials in their barycentric form (Berrut and Trefethen, SIAM
@@ -50,16 +50,16 @@ class Spot:
         nodes = self.nodes
         signs = (-1.0) ** np.arange(self.n_nodes)
         signs[[0, -1]] *= 0.5
-        apart = np.clip(at, self.low, self.high)[..., None] - nodes
-        is_node = np.abs(apart) < 1e-12
-        weights = signs / np.where(is_node, 1.0, apart)
+        distances = np.clip(at, self.low, self.high)[..., None] - nodes
+        is_node = np.abs(distances) < 1e-12
+        weights = signs / np.where(is_node, 1.0, distances)
         weights = np.where(is_node.any(axis=-1, keepdims=True), is_node, weights)
         return np.asarray(weights / weights.sum(axis=-1, keepdims=True))
 
 
 @dataclass(frozen=True)
 class Drive:
-    """One exciter: what it weighs and how it hangs; a source is empty where the card states the value."""
+    """One exciter: its masses and its suspension; a source is empty where the card states the value."""
 
     mass: tuple[Quantity, str]  # kg, of the whole
     coil: tuple[Quantity, str]  # kg, with what is glued to the board
@@ -70,7 +70,7 @@ class Drive:
 
 
 def drive_of(board: Board, setup: Setup, item: AttachedItem) -> Drive:
-    """An exciter of the card, with the priors of its kind for what the card does not say."""
+    """An exciter of the card, with the priors of its kind for what the card does not state."""
     suspension = item.suspension if item.resonance is None else item.resonance
     return Drive(
         mass=_MASS if item.mass is None else (item.mass, ""),
@@ -82,7 +82,7 @@ def drive_of(board: Board, setup: Setup, item: AttachedItem) -> Drive:
     )
 
 
-def is_stated(item: AttachedItem) -> bool:
+def has_stated_mass(item: AttachedItem) -> bool:
     return item.mass is not None or (item.magnet == "held" and item.coil is not None)
 
 
@@ -92,17 +92,17 @@ def with_known_coil(drive: Drive) -> Drive:
     return replace(drive, coil=(Quantity.exact(coil.median), "")) if source else drive
 
 
-def at_station(places: Fractions, k: int) -> Fractions:
-    """The k-th place of what roved; what stayed where it was has one."""
+def places_at_station(places: Fractions, k: int) -> Fractions:
+    """The k-th place of an exciter that roved; one that stayed has a single place."""
     return (places[k % len(places)],) if places else ()
 
 
-def all_over(low: float, high: float) -> list[float]:
+def place_shares(low: float, high: float) -> list[float]:
     """Shares of a range of places, so dense that the modes that are read hardly change from one to the next."""
     n_places = round(_PLACES_A_SIDE * (high - low))
     return [(k + 1) / n_places for k in range(n_places)]
 
 
-def range_of(ends: Ends) -> tuple[float, float]:
-    """Range along a side where something may be, mirror places once, as fractions of what vibrates."""
+def place_range(ends: EdgeConditions) -> tuple[float, float]:
+    """Range along a side where an exciter may be, mirror places once, as fractions of the vibrating part."""
     return (0.0, 0.5) if ends[0] == ends[1] else (0.0, 1.0)

@@ -12,21 +12,30 @@ import numpy as np
 from bayesplate.board.board import Board, Values
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.setup import Ends, Setup
+from bayesplate.board.setup import EdgeConditions, Setup
 from bayesplate.effects.attached_items import fractions_on, places_on
 from bayesplate.effects.base import Contribution, Effect, Floats, Mass, Scope, Stiffness
-from bayesplate.effects.drives import Drive, Spot, all_over, at_station, drive_of, is_stated, range_of, with_known_coil
+from bayesplate.effects.drives import (
+    Drive,
+    PlaceRange,
+    drive_of,
+    has_stated_mass,
+    place_range,
+    place_shares,
+    places_at_station,
+    with_known_coil,
+)
 from bayesplate.effects.part import vibrating_mass
-from bayesplate.plate.terms import Amount, AtPlaces
+from bayesplate.plate.terms import PointMotion, PointTerm
 
-_ANYWHERE = "nearly uniform over the board, mirror places once"
-_LEAST_MAGNET = 0.05
-"""Share of the whole that is left to the magnet, however heavy a draw makes the coil."""
-_STANDS_STILL = 1e-3
+_PLACE_SOURCE = "nearly uniform over the board, mirror places once"
+_LEAST_MAGNET_SHARE = 0.05
+"""Least share of the exciter's mass that is the magnet's, however heavy a draw makes the coil."""
+_LOWEST_RESONANCE = 1e-3
 """Lowest resonance, Hz: on no spring at all the magnet still has a frequency of its own, far below every mode."""
-_ACROSS = 4.0
-_FEWEST_ORDER = 2
-_QUADRATURE = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
+_EXTRA_NODES = 4.0
+_LEAST_ORDER = 2
+_GAUSS_POINTS = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
 
 
 @dataclass(frozen=True)
@@ -37,17 +46,17 @@ class Exciter(Effect):
     ground, which raises low modes; below it the magnet is a mass. The magnet's own motion is one more mode. A magnet
     that is held is no coordinate.
 
-    An exciter that roved is one plate for each place (`stations`), and what is read is the mean of the frequencies. One
-    of which nobody says where it is has its place as two parameters: the squared deflection there is a polynomial
+    An exciter that roved is one plate for each place (`stations`), and what is read is the mean of the frequencies. An
+    exciter whose place is not stated has its place as two parameters: the squared deflection there is a polynomial
     between a few places, so that the place is a weight like any other. Where both ends of a side are alike, mirror
-    places are one.
+    places count once.
     """
 
     drives: tuple[Drive, ...] = ()
-    ends_x: Ends = ("free", "free")
-    ends_y: Ends = ("free", "free")
+    ends_x: EdgeConditions = ("free", "free")
+    ends_y: EdgeConditions = ("free", "free")
     # highest of the beam functions that are read along x and y
-    orders: tuple[int, int] = (_FEWEST_ORDER, _FEWEST_ORDER)
+    orders: tuple[int, int] = (_LEAST_ORDER, _LEAST_ORDER)
 
     name: ClassVar[str] = "exciter"
     scope: ClassVar[Scope] = "setup"
@@ -61,7 +70,7 @@ class Exciter(Effect):
     @classmethod
     def of(cls, board: Board, setup: Setup) -> Exciter:
         drives = tuple(drive_of(board, setup, item) for item in setup.attached if item.kind == cls.name)
-        return cls(setup.owner, drives, setup.ends_x, setup.ends_y, _orders(setup))
+        return cls(setup.owner, drives, setup.ends_x, setup.ends_y, _highest_orders(setup))
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
@@ -76,39 +85,45 @@ class Exciter(Effect):
     @classmethod
     def is_wanted(cls, setup: Setup) -> bool:
         """Whether the setup states what moves of an exciter: the whole, or the coil alone where the magnet is held."""
-        return any(item.kind == cls.name and is_stated(item) for item in setup.attached)
+        return any(item.kind == cls.name and has_stated_mass(item) for item in setup.attached)
 
     @classmethod
     def candidates(cls, board: Board, setup: Setup) -> tuple[Exciter, ...]:
         """The setup's exciters, with the usual coil: a search need not try others."""
         if cls.refusal(board, setup):
             return ()
-        whole = cls.of(board, setup)
-        return (replace(whole, drives=tuple(with_known_coil(drive) for drive in whole.drives)),)
+        exciters = cls.of(board, setup)
+        return (replace(exciters, drives=tuple(with_known_coil(drive) for drive in exciters.drives)),)
 
     def in_setup(self, board: Board, setup: Setup) -> Exciter | None:
-        """The exciters at their places of the board, held another way; none where none is fixed to it."""
+        """The exciters at their places on the board as another setup holds it; None where it has no exciter."""
         if self.refusal(board, setup):
             return None
-        own = board.setup(self.owner.name)
+        origin = board.setup(self.owner.name)
         drives = tuple(
-            replace(drive, places=fractions_on(board, setup, places_on(board, own, drive.places)))
+            replace(drive, places=fractions_on(board, setup, places_on(board, origin, drive.places)))
             for drive in self.drives
         )
-        return Exciter(setup.owner, drives, setup.ends_x, setup.ends_y, _orders(setup))
+        return Exciter(setup.owner, drives, setup.ends_x, setup.ends_y, _highest_orders(setup))
 
     @classmethod
     def at_known_size(cls, board: Board, setup: Setup) -> Exciter | None:
-        """The setup's exciters; places that nobody knows are four, those of Gauss's rule over the board."""
+        """The setup's exciters; an unknown place becomes the four places of Gauss's rule over the board."""
         if cls.refusal(board, setup):
             return None
-        whole = cls.of(board, setup)
-        along_x, along_y = ([low + share * (high - low) for share in _QUADRATURE] for low, high in whole._ranges)
-        four = tuple((float(x), float(y)) for x in along_x for y in along_y)
-        return replace(whole, drives=tuple(replace(drive, places=drive.places or four) for drive in whole.drives))
+        exciters = cls.of(board, setup)
+        along_x, along_y = (
+            [low + share * (high - low) for share in _GAUSS_POINTS] for low, high in exciters._side_ranges
+        )
+        gauss_places = tuple((float(x), float(y)) for x in along_x for y in along_y)
+        return replace(
+            exciters, drives=tuple(replace(drive, places=drive.places or gauss_places) for drive in exciters.drives)
+        )
 
     def within(self, shaped: Effect) -> Exciter:
-        drives = (replace(one, places=tuple(shaped.placed(*each) for each in one.places)) for one in self.drives)
+        drives = (
+            replace(drive, places=tuple(shaped.placed(*place) for place in drive.places)) for drive in self.drives
+        )
         return replace(self, drives=tuple(drives))
 
     def stations(self) -> tuple[Exciter, ...]:
@@ -116,56 +131,59 @@ class Exciter(Effect):
         if n_places < 2:
             return (self,)
         return tuple(
-            replace(self, drives=tuple(replace(one, places=at_station(one.places, k)) for one in self.drives))
+            replace(
+                self, drives=tuple(replace(drive, places=places_at_station(drive.places, k)) for drive in self.drives)
+            )
             for k in range(n_places)
         )
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Mass, coil and suspension (or resonance) of each exciter, and its place where nobody knows it."""
+        """Mass, coil and suspension (or resonance) of each exciter, and its place where it is not stated."""
         return tuple(parameter for i in range(len(self.drives)) for parameter in self._parameters_of(i))
 
     def _parameters_of(self, i: int) -> tuple[Parameter, ...]:
         drive = self.drives[i]
-        found = [self._parameter(i, "coil", drive.coil, "kg", 0.0, "mass of the coil")]
+        parameters = [self._parameter(i, "coil", drive.coil, "kg", 0.0, "mass of the coil")]
         if drive.is_resonance or not drive.is_held:
-            found.append(self._parameter(i, "mass", drive.mass, "kg", drive.mass[0].median, "mass"))
+            parameters.append(self._parameter(i, "mass", drive.mass, "kg", drive.mass[0].median, "mass"))
         key, unit = ("resonance", "Hz") if drive.is_resonance else ("suspension", "N/m")
-        found.append(self._parameter(i, key, drive.suspension, unit, 0.0, key))
+        parameters.append(self._parameter(i, key, drive.suspension, unit, 0.0, key))
         if not drive.places:
-            for axis, (low, high) in zip("xy", self._ranges, strict=True):
+            for axis, (low, high) in zip("xy", self._side_ranges, strict=True):
                 middle, words = 0.5 * (low + high), f"place along {axis}"
                 prior = Quantity.from_mean(middle, 2.0 * (high - low), "normal", lower=low, upper=high)
-                place = self._parameter(i, f"place_{axis}", (prior, _ANYWHERE), "1", middle, words)
-                found.append(replace(place, usual=middle))
-        return tuple(found)
+                place = self._parameter(i, f"place_{axis}", (prior, _PLACE_SOURCE), "1", middle, words)
+                parameters.append(replace(place, usual=middle))
+        return tuple(parameters)
 
     def _parameter(
-        self, i: int, key: str, stated: tuple[Quantity, str], unit: str, null: float, words: str
+        self, i: int, key: str, prior_and_source: tuple[Quantity, str], unit: str, null: float, words: str
     ) -> Parameter:
-        prior, source = stated
+        prior, source = prior_and_source
         return self.parameter(self._key(i, key), prior, unit, null, source, words)
 
     def _key(self, i: int, key: str) -> str:
         return key if len(self.drives) == 1 else f"{key}_{i + 1}"
 
     @property
-    def _ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
+    def _side_ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Ranges along both sides where an exciter may be, mirror places once."""
-        return (range_of(self.ends_x), range_of(self.ends_y))
+        return (place_range(self.ends_x), place_range(self.ends_y))
 
-    def _spots(self, drive: Drive) -> tuple[Spot, Spot]:
+    def _place_ranges(self, drive: Drive) -> tuple[PlaceRange, PlaceRange]:
         if drive.places:
             x, y = drive.places[0]
-            return Spot(x, x), Spot(y, y)
+            return PlaceRange(x, x), PlaceRange(y, y)
         return tuple(  # type: ignore[return-value]
-            Spot(low, high, int(np.ceil(np.pi * (order + 1) * (high - low) + _ACROSS)))
-            for (low, high), order in zip(self._ranges, self.orders, strict=True)
+            PlaceRange(low, high, int(np.ceil(np.pi * (order + 1) * (high - low) + _EXTRA_NODES)))
+            for (low, high), order in zip(self._side_ranges, self.orders, strict=True)
         )
 
     def also_at(self) -> tuple[Mapping[str, float], ...]:
-        """Places all over where it may be, on its stiffest spring: a plate gives way there alone, as at no other place.
+        """Places all over the range of an exciter, on its stiffest spring, which changes the plate's shapes most there.
 
-        Ends of the place alone would leave out what the middle does, and a usual spring most of what a stiff one does.
+        The ends of the range alone would leave out the shapes of its middle, and a usual spring most of those of a
+        stiff one.
         """
         return tuple(
             {
@@ -175,7 +193,7 @@ class Exciter(Effect):
             }
             for i, drive in enumerate(self.drives)
             if not drive.places
-            for x, y in product(*(all_over(*each) for each in self._ranges))
+            for x, y in product(*(place_shares(*limits) for limits in self._side_ranges))
         )
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
@@ -192,68 +210,68 @@ class Exciter(Effect):
     def _contributions_of(self, i: int, coordinate: int) -> tuple[Contribution, ...]:
         """The magnet's coordinate is its rise times the root of its share in the vibrating mass.
 
-        So it keeps a frequency of its own, and does not vanish from the problem where the spring or the magnet does.
+        So the magnet keeps a frequency of its own, and stays in the problem where its spring or its mass vanishes.
         """
         drive = self.drives[i]
-        spots = self._spots(drive)
+        ranges = self._place_ranges(drive)
 
-        at_nodes = [Amount(((1.0, x, y),)) for x in spots[0].nodes.tolist() for y in spots[1].nodes.tolist()]
-        magnet_rises = Amount(beside=coordinate)
-        squares = tuple(AtPlaces(((1.0, one, one),)) for one in at_nodes)
-        between = tuple(AtPlaces(((2.0, magnet_rises, one),)) for one in at_nodes)
-        of_magnet = AtPlaces(((1.0, magnet_rises, magnet_rises),))
-        springs = squares if drive.is_held else (*squares, *between, of_magnet)
-        inertias = squares if drive.is_held else (*squares, of_magnet)
+        node_motions = [PointMotion(((1.0, x, y),)) for x in ranges[0].nodes.tolist() for y in ranges[1].nodes.tolist()]
+        magnet_rises = PointMotion(beside=coordinate)
+        squares = tuple(PointTerm(((1.0, motion, motion),)) for motion in node_motions)
+        couplings = tuple(PointTerm(((2.0, magnet_rises, motion),)) for motion in node_motions)
+        magnet_square = PointTerm(((1.0, magnet_rises, magnet_rises),))
+        springs = squares if drive.is_held else (*squares, *couplings, magnet_square)
+        inertias = squares if drive.is_held else (*squares, magnet_square)
 
         def stiffness(values: Values, setup: Setup) -> Floats:
-            whole, shares = vibrating_mass(values, setup), self._shares(i, spots, values)
-            magnet = self._magnet(i, values)
-            pulsation = self._pulsation(i, values, magnet)
-            spring = (magnet * pulsation**2 / whole)[..., None] * shares
+            mass, shares = vibrating_mass(values, setup), self._node_shares(i, ranges, values)
+            magnet = self._magnet_mass(i, values)
+            pulsation = self._angular_resonance(i, values, magnet)
+            spring = (magnet * pulsation**2 / mass)[..., None] * shares
             if drive.is_held:
                 return spring
-            pull = -(np.sqrt(magnet / whole) * pulsation**2)[..., None] * shares
-            return _joined(spring, pull, (pulsation**2)[..., None])
+            pull = -(np.sqrt(magnet / mass) * pulsation**2)[..., None] * shares
+            return _join_columns(spring, pull, (pulsation**2)[..., None])
 
         def inertia(values: Values, setup: Setup) -> Floats:
-            whole, shares = vibrating_mass(values, setup), self._shares(i, spots, values)
-            coil = (self.value(values, self._key(i, "coil")) / whole)[..., None] * shares
-            return coil if drive.is_held else _joined(coil, np.ones(1))
+            mass, shares = vibrating_mass(values, setup), self._node_shares(i, ranges, values)
+            coil = (self.value(values, self._key(i, "coil")) / mass)[..., None] * shares
+            return coil if drive.is_held else _join_columns(coil, np.ones(1))
 
         return Stiffness(springs, stiffness), Mass(inertias, inertia)
 
-    def _magnet(self, i: int, values: Values) -> Floats:
+    def _magnet_mass(self, i: int, values: Values) -> Floats:
         if self.drives[i].is_held and not self.drives[i].is_resonance:
             return np.ones(1)
         mass = self.value(values, self._key(i, "mass"))
-        return np.maximum(mass - self.value(values, self._key(i, "coil")), _LEAST_MAGNET * mass)
+        return np.maximum(mass - self.value(values, self._key(i, "coil")), _LEAST_MAGNET_SHARE * mass)
 
-    def _pulsation(self, i: int, values: Values, magnet: Floats) -> Floats:
+    def _angular_resonance(self, i: int, values: Values, magnet: Floats) -> Floats:
         """Angular frequency of the magnet on its suspension, 1/s."""
-        least = 2.0 * np.pi * _STANDS_STILL
+        least = 2.0 * np.pi * _LOWEST_RESONANCE
         if self.drives[i].is_resonance:
             return np.maximum(2.0 * np.pi * self.value(values, self._key(i, "resonance")), least)
         return np.maximum(np.sqrt(self.value(values, self._key(i, "suspension")) / magnet), least)
 
-    def _shares(self, i: int, spots: Sequence[Spot], values: Values) -> Floats:
-        """What the squared deflection at each node has of that at the exciter's place: (..., n_x * n_y) array."""
-        along = []
-        for axis, spot in zip("xy", spots, strict=True):
-            at = spot.low if self.drives[i].places else self.value(values, self._key(i, f"place_{axis}"))
-            along.append(spot.shares(np.asarray(at)))
-        each = along[0][..., :, None] * along[1][..., None, :]
-        return np.asarray(each.reshape(*each.shape[:-2], -1))
+    def _node_shares(self, i: int, ranges: Sequence[PlaceRange], values: Values) -> Floats:
+        """Share of each node in the squared deflection at the exciter's place: (..., n_x * n_y) array."""
+        shares = []
+        for axis, side in zip("xy", ranges, strict=True):
+            at = side.low if self.drives[i].places else self.value(values, self._key(i, f"place_{axis}"))
+            shares.append(side.shares(np.asarray(at)))
+        products = shares[0][..., :, None] * shares[1][..., None, :]
+        return np.asarray(products.reshape(*products.shape[:-2], -1))
 
 
-def _orders(setup: Setup) -> tuple[int, int]:
+def _highest_orders(setup: Setup) -> tuple[int, int]:
     """Highest orders of the beam functions among the readings."""
     beams = [reading.beams for reading in setup.readings]
-    highest = [max((one[axis] for one in beams), default=0) for axis in (0, 1)]
-    return max(highest[0], _FEWEST_ORDER), max(highest[1], _FEWEST_ORDER)
+    highest = [max((orders[axis] for orders in beams), default=0) for axis in (0, 1)]
+    return max(highest[0], _LEAST_ORDER), max(highest[1], _LEAST_ORDER)
 
 
-def _joined(*parts: Floats) -> Floats:
-    """Columns of several terms side by side, one draw where all have one."""
-    n_draws = max((one.shape[0] for one in parts if one.ndim > 1), default=0)
-    wide = [np.broadcast_to(one, (n_draws, one.shape[-1])) for one in parts] if n_draws else list(parts)
+def _join_columns(*columns: Floats) -> Floats:
+    """Weights of several terms side by side, of one draw where all are of one."""
+    n_draws = max((column.shape[0] for column in columns if column.ndim > 1), default=0)
+    wide = [np.broadcast_to(column, (n_draws, column.shape[-1])) for column in columns] if n_draws else list(columns)
     return np.concatenate(wide, axis=-1)

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesplate.board.board import Board, Values, density, vibrating_lengths
+from bayesplate.board.board import Board, Values, board_density, vibrating_lengths
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
@@ -16,7 +16,7 @@ from bayesplate.effects.base import Contribution, Effect, Floats, Mass, Scope
 from bayesplate.effects.part import aspect_ratio_of
 from bayesplate.plate.air import air_mass
 from bayesplate.plate.fields import Outline
-from bayesplate.plate.terms import OnDeflections
+from bayesplate.plate.terms import ProjectedTerms
 
 DEFAULT_DENSITY = Quantity.exact(1.2)
 UNKNOWN_BAFFLE = Quantity.from_mean(0.5, 1.0, "normal", lower=0.0, upper=1.0)
@@ -51,16 +51,16 @@ class FluidLoading(Effect):
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> FluidLoading:
-        declared = setup.fluid
+        fluid = setup.fluid
         return cls(
             owner=setup.owner,
             aspect_ratio=aspect_ratio_of(board.nominal(), setup),
-            density=declared.density if declared and declared.density else DEFAULT_DENSITY,
-            baffle=BAFFLES[declared.baffle] if declared and declared.baffle else UNKNOWN_BAFFLE,
+            density=fluid.density if fluid and fluid.density else DEFAULT_DENSITY,
+            baffle=BAFFLES[fluid.baffle] if fluid and fluid.baffle else UNKNOWN_BAFFLE,
         )
 
     def in_setup(self, board: Board, setup: Setup) -> FluidLoading:
-        """This fluid around the board of another setup, unless that states its own."""
+        """This fluid around the board in another setup, unless that states its own fluid."""
         if setup.fluid is not None:
             return self.of(board, setup)
         return replace(self, owner=setup.owner, aspect_ratio=aspect_ratio_of(board.nominal(), setup))
@@ -82,19 +82,19 @@ class FluidLoading(Effect):
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Density of the fluid and share of the baffle; without density there is no fluid, whatever the baffle."""
-        stated = self.density is not DEFAULT_DENSITY, self.baffle is not UNKNOWN_BAFFLE
-        sources = ("" if is_stated else source for is_stated, source in zip(stated, _SOURCES, strict=True))
-        of_density, of_baffle = sources
+        flags = self.density is not DEFAULT_DENSITY, self.baffle is not UNKNOWN_BAFFLE
+        sources = ("" if is_stated else source for is_stated, source in zip(flags, _SOURCES, strict=True))
+        density_source, baffle_source = sources
         return (
-            self.parameter("density", self.density, "kg/m^3", 0.0, of_density, f"density of the {self.fluid}"),
-            self.parameter("baffle", self.baffle, "1", 0.0, of_baffle),
+            self.parameter("density", self.density, "kg/m^3", 0.0, density_source, f"density of the {self.fluid}"),
+            self.parameter("baffle", self.baffle, "1", 0.0, baffle_source),
         )
 
     def within(self, shaped: Effect) -> FluidLoading:
         return replace(self, edge=shaped.outline())
 
     def contributions(self) -> tuple[Contribution, ...]:
-        """The fluid of a plate in the open and of one in a wall, each with its share; one of them where that is known.
+        """The fluid of a plate in the open and of one in a wall, each with its share; one alone where that is known.
 
         The mass of the fluid in a volume of the area to the power 3/2, relative to the plate's.
         """
@@ -102,16 +102,18 @@ class FluidLoading(Effect):
         def weight(values: Values, setup: Setup, is_baffled: bool) -> Floats:
             length_x, length_y = vibrating_lengths(values, setup)
             fluid = (
-                self.value(values, "density") * np.sqrt(length_x * length_y) / (density(values) * values["thickness"])
+                self.value(values, "density")
+                * np.sqrt(length_x * length_y)
+                / (board_density(values) * values["thickness"])
             )
             baffle = self.value(values, "baffle")
             return fluid * (baffle if is_baffled else 1.0 - baffle)
 
-        known = self.baffle.is_exact and self.baffle.mean in (0.0, 1.0)
-        cases = (bool(self.baffle.mean),) if known else (False, True)
+        is_baffle_known = self.baffle.is_exact and self.baffle.mean in (0.0, 1.0)
+        cases = (bool(self.baffle.mean),) if is_baffle_known else (False, True)
         return tuple(
             Mass(
-                OnDeflections(
+                ProjectedTerms(
                     partial(air_mass, aspect_ratio=self.aspect_ratio, is_baffled=is_baffled, outline=self.edge)
                 ),
                 partial(weight, is_baffled=is_baffled),

@@ -1,4 +1,4 @@
-"""What two effects share: a property of the wood that grows along the board, so that its two ends differ."""
+"""A property of the wood that grows along the board, so that its two ends differ: the base of two effects."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Effect, Floats, Scope, Variation
-from bayesplate.effects.part import WHOLE, Part, vibrating_part
-from bayesplate.plate.fields import Group
+from bayesplate.effects.part import WHOLE_SIDE, VibratingPart, vibrating_part
+from bayesplate.plate.fields import TermGroup
 
 
 @dataclass(frozen=True)
 class GradientAlongX(Effect):
     """A property 1 + g (s - 1/2) times its mean, s from 0 to 1 along the whole board."""
 
-    part: Part = WHOLE  # what vibrates of the board along x
+    part: VibratingPart = WHOLE_SIDE  # the vibrating part along x
 
     scope: ClassVar[Scope] = "board"
     default: ClassVar[Quantity]
     source: ClassVar[str]
-    groups: ClassVar[tuple[Group, ...]]  # of terms that the property is a factor of
+    groups: ClassVar[tuple[TermGroup, ...]]  # of terms that the property is a factor of
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> Self:
@@ -39,7 +39,7 @@ class GradientAlongX(Effect):
     def keeps_symmetry(self) -> tuple[bool, bool]:
         return False, True
 
-    def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
+    def variations(self) -> Mapping[TermGroup, tuple[Variation, ...]]:
         """The property as at the middle of the vibrating part, and what grows along x from there."""
         at_middle = Variation(None, lambda values: 1.0 + self.value(values, "gradient") * self.part.middle)
         growing = Variation(_from_middle, lambda values: self.value(values, "gradient") * self.part.share)

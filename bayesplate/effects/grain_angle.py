@@ -30,12 +30,12 @@ class GrainAngle(Effect):
     All terms keep their form, with weights that are functions of the angle; the coupling of bending with twist (D_16,
     D_26), and of the two shear strains, joins them. Q' = T^-1 Q R T R^-1: Mascia and Lahr (2006).
 
-    Where the plate mirrors about a middle line both signs ring alike, and one stands for both. A thing at a corner, or
-    a thickness that was read at places, tells them apart: with 3 g on 250 g the signs are up to 50 cents apart at 3
-    degrees. A search tries both there, and `notes` says of a fit that it has one.
+    Where the plate mirrors about a middle line both signs give the same frequencies, and one sign stands for both. An
+    item at a corner, or a thickness that was read at places, makes them differ: with 3 g on 250 g the signs are up to
+    50 cents apart at 3 degrees. A search tries both there, and `notes` says that a fit has tried one sign only.
     """
 
-    sign: int = 0  # 1 or -1 where each is tried, from x towards y or away from it; 0: one stands for both
+    sign: int = 0  # 1 or -1, from x towards y or away from it, where both signs are tried; 0: one stands for both
 
     name: ClassVar[str] = "grain_angle"
     scope: ClassVar[Scope] = "board"
@@ -63,13 +63,13 @@ class GrainAngle(Effect):
 
     @property
     def detail(self) -> str:
-        """Which way the grain is turned, where that is told."""
+        """Which way the grain is turned, where the signs differ."""
         return {0: "", 1: "from x towards y", -1: "from x away from y"}[self.sign]
 
     @classmethod
     def notes(cls, board: Board) -> tuple[str, ...]:
-        """A sentence that the other sign of the angle is another board, where nothing mirrors."""
-        are_both_tried = any(one.sign for one in board.chosen if isinstance(one, cls))
+        """A sentence that the other sign of the angle is another board, where the plate has no mirror line."""
+        are_both_tried = any(form.sign for form in board.chosen if isinstance(form, cls))
         if cls.name not in board.effects or are_both_tried or not _signs_differ(board):
             return ()
         return (
@@ -79,10 +79,10 @@ class GrainAngle(Effect):
         )
 
     def parameters(self) -> tuple[Parameter, ...]:
-        return (self.parameter(self._key, DEFAULT_ANGLE, "rad", 0.0, _SOURCE, self._key.replace("_", " ")),)
+        return (self.parameter(self._angle_key, DEFAULT_ANGLE, "rad", 0.0, _SOURCE, self._angle_key.replace("_", " ")),)
 
     @property
-    def _key(self) -> str:
+    def _angle_key(self) -> str:
         return "angle_away_from_y" if self.sign < 0 else "angle"
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
@@ -93,17 +93,17 @@ class GrainAngle(Effect):
         """Weights of the plate's own terms turned by the angle, then those of the coupling terms."""
         length_x, length_y = vibrating_lengths(values, setup)
         ratio = length_x / length_y
-        angle = self.value(values, self._key)
+        angle = self.value(values, self._angle_key)
         cosine, sine = np.cos(angle), (-1.0 if self.sign < 0 else 1.0) * np.sin(angle)
         cc, ss, cs = cosine**2, sine**2, cosine * sine
         xx, yy, mix, xy = base.stiffness[:, : len(THIN_TERMS)].T
         # Rigidities over m L_x L_y, with D_66 = D_s / 4.
         d_11, d_22, d_12, d_66 = xx * ratio**2, yy / ratio**2, mix, xy / 4.0
-        both = d_12 + 2.0 * d_66
-        left, right = d_11 - both, both - d_22
+        mixed = d_12 + 2.0 * d_66
+        left, right = d_11 - mixed, mixed - d_22
         turned = [
-            (d_11 * cc**2 + 2.0 * both * cs**2 + d_22 * ss**2) / ratio**2,
-            (d_11 * ss**2 + 2.0 * both * cs**2 + d_22 * cc**2) * ratio**2,
+            (d_11 * cc**2 + 2.0 * mixed * cs**2 + d_22 * ss**2) / ratio**2,
+            (d_11 * ss**2 + 2.0 * mixed * cs**2 + d_22 * cc**2) * ratio**2,
             d_12 + (left - right) * cs**2,
             4.0 * (d_66 + (left - right) * cs**2),
         ]
@@ -118,16 +118,18 @@ class GrainAngle(Effect):
 
 def _signs_differ(board: Board) -> bool:
     """Whether a plate of the board has no line to mirror about, in one setup at least."""
-    return any(_mirrors_nowhere(board, setup) for setup in board.setups)
+    return any(_lacks_mirror_line(board, setup) for setup in board.setups)
 
 
-def _mirrors_nowhere(board: Board, setup: Setup) -> bool:
-    """Whether edges, attached things and profiles that were read leave a plate without a line to mirror about.
+def _lacks_mirror_line(board: Board, setup: Setup) -> bool:
+    """Whether edges, attached items and profiles that were read leave a plate without a line to mirror about.
 
-    A taper or gradient that nothing was read of may as well be the mirrored one.
+    A taper or gradient that was not read may as well be the mirrored one.
     """
     from bayesplate.effects import effects_of
 
-    acting = [one for one in effects_of(board, setup) if one.name == AttachedMass.name or one.is_implied(board)]
+    effects = [
+        effect for effect in effects_of(board, setup) if effect.name == AttachedMass.name or effect.is_implied(board)
+    ]
     edges = (setup.ends_x[0] == setup.ends_x[1], setup.ends_y[0] == setup.ends_y[1])
-    return not any(edges[axis] and all(one.keeps_symmetry()[axis] for one in acting) for axis in (0, 1))
+    return not any(edges[axis] and all(effect.keeps_symmetry()[axis] for effect in effects) for axis in (0, 1))

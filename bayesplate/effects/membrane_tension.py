@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import ClassVar, Literal, get_args
 
-from bayesplate.board.board import Board, Values, density, vibrating_lengths
+from bayesplate.board.board import Board, Values, board_density, vibrating_lengths
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.setup import Ends, Setup
+from bayesplate.board.setup import EdgeConditions, Setup
 from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, Scope, Stiffness
 from bayesplate.plate.fields import Outline
-from bayesplate.plate.terms import OverPlate
+from bayesplate.plate.terms import PlateTerm
 
 Axis = Literal["both", "x", "y"]
 
@@ -37,24 +37,24 @@ class MembraneTension(Effect):
     @classmethod
     def of(cls, board: Board, setup: Setup) -> MembraneTension:
         """Equal tension along all sides of the setup that are held at both ends."""
-        held = _held(setup)
-        return cls(setup.owner, held[0] if len(held) == 1 else "both")
+        sides = _held_sides(setup)
+        return cls(setup.owner, sides[0] if len(sides) == 1 else "both")
 
     @classmethod
     def forms(cls, board: Board) -> tuple[EffectForm, ...]:
-        """Equal tension, and tension along x or along y alone, in the setups that are held so; none of them twice."""
-        found: list[EffectForm] = []
+        """Equal tension, and tension along x or along y alone, in the setups that are held so; each form once."""
+        forms: list[EffectForm] = []
         for axis in get_args(Axis):
-            acting = (cls(setup.owner, axis).in_setup(board, setup) for setup in board.setups)
-            effects = tuple(one for one in acting if one is not None)
-            if effects and all(effects != one.effects for one in found):
-                is_same = len({one.detail for one in effects}) == 1
-                found.append(EffectForm(effects[0].detail if is_same else "", effects))
-        return tuple(found)
+            in_setups = (cls(setup.owner, axis).in_setup(board, setup) for setup in board.setups)
+            effects = tuple(effect for effect in in_setups if effect is not None)
+            if effects and all(effects != form.effects for form in forms):
+                is_same = len({effect.detail for effect in effects}) == 1
+                forms.append(EffectForm(effects[0].detail if is_same else "", effects))
+        return tuple(forms)
 
     def in_setup(self, board: Board, setup: Setup) -> MembraneTension | None:
-        """Tension along the same side of another setup, or along all that is held there."""
-        if self.refusal(board, setup) or (self.axis != "both" and self.axis not in _held(setup)):
+        """Tension along the same side in another setup, or along all sides that are held there."""
+        if self.refusal(board, setup) or (self.axis != "both" and self.axis not in _held_sides(setup)):
             return None
         return self.of(board, setup) if self.axis == "both" else replace(self, owner=setup.owner)
 
@@ -78,16 +78,16 @@ class MembraneTension(Effect):
         """The squared slope along each side that is stretched, with N over rho h and the square of the side."""
 
         def weight(values: Values, setup: Setup, side: int) -> Floats:
-            areal = density(values) * values["thickness"]
+            areal = board_density(values) * values["thickness"]
             return self.value(values, "N") / (areal * vibrating_lengths(values, setup)[side] ** 2)
 
         sides = {"x": (0,), "y": (1,), "both": (0, 1)}[self.axis]
         slopes = "slope_x", "slope_y"
         return tuple(
-            Stiffness(OverPlate((slopes[side], slopes[side]), self.edge), partial(weight, side=side)) for side in sides
+            Stiffness(PlateTerm((slopes[side], slopes[side]), self.edge), partial(weight, side=side)) for side in sides
         )
 
 
-def _held(setup: Setup) -> tuple[Axis, ...]:
-    sides: tuple[tuple[Axis, Ends], ...] = (("x", setup.ends_x), ("y", setup.ends_y))
+def _held_sides(setup: Setup) -> tuple[Axis, ...]:
+    sides: tuple[tuple[Axis, EdgeConditions], ...] = (("x", setup.ends_x), ("y", setup.ends_y))
     return tuple(axis for axis, ends in sides if "free" not in ends)

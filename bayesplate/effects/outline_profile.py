@@ -9,41 +9,41 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesplate.board.board import Board, Values, density
-from bayesplate.board.parameter import BOARD, Parameter
-from bayesplate.board.random_field import conditioned, width_readings
-from bayesplate.board.setup import Ends, Setup
+from bayesplate.board.board import Board, Values, board_density
+from bayesplate.board.parameter import BOARD_OWNER, Parameter
+from bayesplate.board.random_field import condition_field, width_readings
+from bayesplate.board.setup import EdgeConditions, Setup
 from bayesplate.effects.base import Effect, Floats, Scope, Variation
-from bayesplate.effects.field_components import FieldProfile, field_parameters, field_profile, held_in
-from bayesplate.effects.part import WHOLE, Part, vibrating_part
-from bayesplate.plate.fields import EdgeStrip, Group, Outline
+from bayesplate.effects.field_components import FieldProfile, field_parameters, field_profile, mountings
+from bayesplate.effects.part import WHOLE_SIDE, VibratingPart, vibrating_part
+from bayesplate.plate.fields import EdgeStrip, Outline, TermGroup
 
 _SOURCE = "normal: what the readings leave open of a smooth width, in standard deviations"
-_GROUPS: tuple[Group, ...] = ("bending", "shear", "mass", "rotary")
+_GROUPS: tuple[TermGroup, ...] = ("bending", "shear", "mass", "rotary")
 _N_POINTS = 400
-_STRIP_SDS, _FURTHEST = 3.0, 2.94
-"""Width of the strip of an only component in its steps, and the steps at which a component ends: there the strip still
-weighs something, and beyond less than nothing."""
-_FIRST_ORDER_ALONE = 2
-"""Order of smallness at which what an outline gains is counted: its second is left out, and so are products with it."""
+_STRIP_SDS, _FURTHEST_STEP = 3.0, 2.94
+"""Width of the strip of a single component in its steps, and the steps at which a component ends: there the strip still
+has a positive weight, beyond a negative one."""
+_STRIP_ORDER = 2
+"""Order of smallness as which a strip counts: its own second order is left out, and so are products with it."""
 
 
 @dataclass(frozen=True)
 class OutlineProfile(Effect):
     """The energies of the true outline: a width W (w0(s) + sum z_k psi_k(s)), s from 0 to 1 along the whole board.
 
-    The widths read at stations condition a random field (`FieldProfile`): w0 is what is expected, with a mean of one,
-    and enters exactly; what is open enters to first order, as the energies of a strip along the edge, which gain or
-    lose weight.
+    The widths read at stations condition a random field (`FieldProfile`): w0 is the expected width, with a mean of one,
+    and enters exactly; the uncertain components enter to first order, as the energies of a strip along the edge, which
+    gain or lose weight.
 
     The functions are those of the rectangle as wide as the widest place; what lies outside the outline is all but
     removed. Where both edges along x are free the board is taken to narrow from both alike (readings of a width do not
     say which edge recedes), otherwise from the free one. The mean width is taken to be known apart from the field.
     """
 
-    ends_y: Ends = ("free", "free")
-    part_x: Part = WHOLE
-    part_y: Part = WHOLE  # of its mean width
+    ends_y: EdgeConditions = ("free", "free")
+    part_x: VibratingPart = WHOLE_SIDE
+    part_y: VibratingPart = WHOLE_SIDE  # of its mean width
     profile: FieldProfile | None = None  # of the width, along x; None: a rectangle
 
     name: ClassVar[str] = "outline_profile"
@@ -52,31 +52,31 @@ class OutlineProfile(Effect):
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> OutlineProfile:
-        profile = _profile(board)
+        profile = _width_profile(board)
         is_rectangle = profile is None or profile.is_uniform
         parts = vibrating_part(board, setup, "x"), vibrating_part(board, setup, "y")
-        return cls(BOARD, setup.ends_y, *parts, None if is_rectangle else profile)
+        return cls(BOARD_OWNER, setup.ends_y, *parts, None if is_rectangle else profile)
 
     @classmethod
     def is_implied(cls, board: Board) -> bool:
         """Whether the card's width was read at stations along the board, and these support that it varies."""
-        profile = _profile(board)
+        profile = _width_profile(board)
         return profile is not None and not profile.is_uniform
 
     @classmethod
     def is_known(cls, board: Board) -> bool:
-        """Never: the readings tell a field, whose width between them is uncertain and not a size."""
+        """Never: the readings determine a field, whose width between them is uncertain, and not a size."""
         return False
 
     @classmethod
     def notes(cls, board: Board) -> tuple[str, ...]:
         if not board.inputs["length_y"].has_profile:
             return ()
-        told = "the length_y was read at several places: its mean is used"
-        profile = _profile(board)
+        remark = "the length_y was read at several places: its mean is used"
+        profile = _width_profile(board)
         if profile is None or profile.is_uniform:
-            return (f"{told}, their differences support no {cls.name}",)
-        return () if cls.name in board.effects else (f"{told}, the {cls.name} is not part of this model",)
+            return (f"{remark}, their differences support no {cls.name}",)
+        return () if cls.name in board.effects else (f"{remark}, the {cls.name} is not part of this model",)
 
     @classmethod
     def candidates(cls, board: Board, setup: Setup) -> tuple[Effect, ...]:
@@ -104,29 +104,31 @@ class OutlineProfile(Effect):
         return False, self.ends_y[0] == self.ends_y[1]
 
     def outline(self) -> Outline | None:
-        return None if self.profile is None else _Limits(self)
+        return None if self.profile is None else _ProfileOutline(self)
 
     def adjusted(self, values: Values) -> Values:
         """The widest width for the sides of the rectangle, and the density that the mean width gives to a mass."""
         if self.profile is None:
             return values
-        return {**values, "length_y": values["length_y"] * self._widest, "density": density(values)}
+        return {**values, "length_y": values["length_y"] * self._widest, "density": board_density(values)}
 
-    def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
-        """What every energy gains at the edges where the outline moves, besides what it is."""
+    def variations(self) -> Mapping[TermGroup, tuple[Variation, ...]]:
+        """The uniform plate, and the strips along its edges by which the components move the outline."""
         if self.profile is None or not self.profile.components:
             return {}
-        moved = tuple(
-            Variation(EdgeStrip(_Limits(self, k), _Direction(self, k)), partial(self._share, k=k), _FIRST_ORDER_ALONE)
+        strips = tuple(
+            Variation(
+                EdgeStrip(_ProfileOutline(self, k), _WideningSign(self, k)), partial(self._share, k=k), _STRIP_ORDER
+            )
             for k in range(len(self.profile.components))
         )
-        return dict.fromkeys(_GROUPS, (Variation(None), *moved))
+        return dict.fromkeys(_GROUPS, (Variation(None), *strips))
 
     def _share(self, values: Values, k: int) -> Floats:
-        """Weight of the strip of a component that is gained."""
+        """Weight that a component adds to its strip."""
         assert self.profile is not None
         steps = self.value(values, self.parameters()[k].key)
-        return np.asarray(np.clip(steps, -_FURTHEST, _FURTHEST) / self._strip_steps)
+        return np.asarray(np.clip(steps, -_FURTHEST_STEP, _FURTHEST_STEP) / self._strip_steps)
 
     def direction(self, x: Floats, y: Floats, k: int) -> Floats:
         """1 where a component widens the board, -1 where it narrows it."""
@@ -151,7 +153,7 @@ class OutlineProfile(Effect):
 
     @property
     def _strip_steps(self) -> float:
-        """Width of a strip in steps of its component: where all strips overlap, all at their end leave some weight."""
+        """Width of a strip in steps of its component: so wide that overlapping strips never remove all the weight."""
         assert self.profile is not None
         return _STRIP_SDS * len(self.profile.components)
 
@@ -162,11 +164,11 @@ class OutlineProfile(Effect):
 
     @property
     def _widest_part(self) -> float:
-        """What vibrates of the widest place over the mean width: what a clamp covers is as wide everywhere."""
+        """Vibrating width at the widest place, over the mean width: the clamps cover the same width everywhere."""
         return self._widest - 1.0 + self.part_y.share
 
     def limits(self, x: Floats, inside: int | None = None) -> tuple[Floats, Floats]:
-        """The outline, or the one within by the strip of a component."""
+        """The outline, or the one inside it by the strip of a component."""
         at = self.part_x.on_whole(x)
         strip = 0.0 if inside is None else self._strip_steps * np.abs(self._step(at, inside))
         missing = (self._widest - np.minimum(self._widths(at), self._widest) + strip) / self._widest_part
@@ -188,8 +190,8 @@ class OutlineProfile(Effect):
 
 
 @dataclass(frozen=True)
-class _Limits:
-    """The outline of an effect, or the one within by the strip of a component; equal where the effects are."""
+class _ProfileOutline:
+    """The outline of an effect, or the one inside it by the strip of a component; equal where the effects are."""
 
     effect: OutlineProfile
     inside: int | None = None
@@ -199,7 +201,7 @@ class _Limits:
 
 
 @dataclass(frozen=True)
-class _Direction:
+class _WideningSign:
     effect: OutlineProfile
     k: int
 
@@ -207,8 +209,10 @@ class _Direction:
         return self.effect.direction(x, y, self.k)
 
 
-def _profile(board: Board) -> FieldProfile | None:
-    """What the board's readings tell of its width along it; None where they have no places."""
+def _width_profile(board: Board) -> FieldProfile | None:
+    """Profile of the board's width from its readings along x; None where they have no places."""
     width, length = board.inputs["length_y"], board.inputs["length_x"]
-    read = width_readings(width, length)
-    return None if read is None else field_profile(conditioned(read), held_in(board), 1, mean_is_known=True)
+    readings = width_readings(width, length)
+    return (
+        None if readings is None else field_profile(condition_field(readings), mountings(board), 1, mean_is_known=True)
+    )

@@ -9,7 +9,7 @@ from bayesplate.board.board import Board
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.effects.gradients import GradientAlongX
-from bayesplate.plate.fields import Group
+from bayesplate.plate.fields import TermGroup
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class StiffnessGradient(GradientAlongX):
     default: ClassVar[Quantity] = Quantity.from_mean(0.0, 0.08, "normal")
     source: ClassVar[str] = "normal: E_x varies by some per cent along one plank; a board is not stiffer at a known end"
 
-    groups: ClassVar[tuple[Group, ...]] = ("along",)
+    groups: ClassVar[tuple[TermGroup, ...]] = ("along",)
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:

@@ -15,7 +15,7 @@ from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Contribution, Effect, Floats, Mass, Scope
 from bayesplate.effects.part import vibrating_mass
 from bayesplate.plate.fields import Outline
-from bayesplate.plate.terms import Deflections, OnDeflections
+from bayesplate.plate.terms import Deflections, ProjectedTerms
 
 _PRIOR = Quantity.from_median(8.0, 3.0)
 _SOURCE = "log-normal: frames of wood or steel for boards of this size weigh 3-25 kg"
@@ -66,7 +66,7 @@ class SupportMass(Effect):
             vibrating = vibrating_mass(values, setup)
             return vibrating / (self.value(values, "mass") + self.share * vibrating)
 
-        return (Mass(OnDeflections(partial(_mean_products, outline=self.edge)), weight),)
+        return (Mass(ProjectedTerms(partial(_mean_products, outline=self.edge)), weight),)
 
 
 def _mean_products(deflections: Deflections, outline: Outline | None) -> Floats:

@@ -7,13 +7,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesplate.board.board import Board, Values, density
+from bayesplate.board.board import Board, Values, board_density
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Contribution, Effect, Floats, Scope, Stiffness
 from bayesplate.plate.fields import Outline
-from bayesplate.plate.terms import OverPlate
+from bayesplate.plate.terms import PlateTerm
 
 _PRIOR = Quantity.from_mean(0.0, 2e4, "normal", lower=0.0)
 _SOURCE = "half-normal: a board of 1-2 kg/m2 bounces at 5 Hz on soft bands (2e3 N/m3), at 15-25 Hz on foam (2e4)"
@@ -36,7 +36,7 @@ class SupportStiffness(Effect):
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> SupportStiffness:
-        """The effect under the whole board, as stiff as the frequency says at which the board bounces."""
+        """The effect under the whole board, as stiff as the frequency implies at which the board bounces, if stated."""
         return cls(setup.owner, stiffness=_PRIOR if setup.bounce is None else stiffness_of(board, setup.bounce))
 
     @classmethod
@@ -65,15 +65,15 @@ class SupportStiffness(Effect):
 
     def contributions(self) -> tuple[Contribution, ...]:
         def weight(values: Values, setup: Setup) -> Floats:
-            return self.value(values, "stiffness") / (density(values) * values["thickness"])
+            return self.value(values, "stiffness") / (board_density(values) * values["thickness"])
 
-        return (Stiffness(OverPlate(("w", "w"), self.edge), weight),)
+        return (Stiffness(PlateTerm(("w", "w"), self.edge), weight),)
 
 
 def stiffness_of(board: Board, bounce: Quantity) -> Quantity:
     """Stiffness per area, N/m^3, of a support on which the board bounces at a frequency, Hz: rho h (2 pi f)^2."""
     nominal = board.nominal()
-    scale = float(density(nominal) * nominal["thickness"]) * (2.0 * np.pi) ** 2
+    scale = float(board_density(nominal) * nominal["thickness"]) * (2.0 * np.pi) ** 2
     if bounce.is_exact:
         return Quantity.exact(scale * bounce.mean**2)
     return Quantity.from_median(scale * bounce.median**2, bounce.factor**2)

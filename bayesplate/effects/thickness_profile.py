@@ -12,19 +12,25 @@ from typing import ClassVar
 import numpy as np
 
 from bayesplate.board.board import Board, Values
-from bayesplate.board.parameter import BOARD, Parameter
+from bayesplate.board.parameter import BOARD_OWNER, Parameter
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.random_field import conditioned, thickness_readings
+from bayesplate.board.random_field import condition_field, thickness_readings
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Effect, Floats, Scope, Variation
-from bayesplate.effects.field_components import FieldProfile, coordinates, field_parameters, field_profile, held_in
-from bayesplate.effects.part import WHOLE, Part, vibrating_part
-from bayesplate.plate.fields import Field, Group
+from bayesplate.effects.field_components import (
+    FieldProfile,
+    field_parameters,
+    field_profile,
+    mountings,
+    standard_coordinates,
+)
+from bayesplate.effects.part import WHOLE_SIDE, VibratingPart, vibrating_part
+from bayesplate.plate.fields import Field, TermGroup
 
 DEFAULT_TAPER = Quantity.from_mean(0.0, 0.05, "normal")
 _SOURCE = "normal: hand-planed and belt-sanded boards of 3-5 mm differ by 0.1-0.2 mm from end to end, either way"
 _FIELD_SOURCE = "normal: what the readings leave open of a smooth thickness, in standard deviations"
-_POWERS: dict[Group, int] = {"bending": 3, "shear": 1, "mass": 1, "rotary": 3}
+_POWERS: dict[TermGroup, int] = {"bending": 3, "shear": 1, "mass": 1, "rotary": 3}
 """How each group of terms goes with the thickness."""
 _MOST_FACTORS = 2
 """Components that a term of the expansion of a power multiplies: with three, terms of third order would be there."""
@@ -34,18 +40,19 @@ _MOST_FACTORS = 2
 class ThicknessProfile(Effect):
     """Thickness h p(x, y) in stiffness and mass, p with a mean of one over the board.
 
-    With readings at places p = p0 + sum z_k phi_k is a random field that they condition (`FieldProfile`): p0 is what is
-    expected, each component phi_k has a standard normal parameter, and one more goes with the mean thickness h itself.
-    Powers of p are expanded to second order in the components, so each product of them is a term of its own; rotary
-    inertia is small already, a thousandth of the kinetic energy, and follows them as the mass does.
+    With readings at places p = p0 + sum z_k phi_k is a random field that they condition (`FieldProfile`): p0 is the
+    expected profile, each component phi_k has a standard normal parameter z_k, and one more component goes with the
+    mean thickness h itself. Powers of p are expanded to second order in the components, so each product of them is a
+    term of its own; rotary inertia is small already, a thousandth of the kinetic energy, and follows them as the mass
+    does.
 
-    Without, p = 1 + alpha_x (s - 1/2) + alpha_y (t - 1/2), s and t from 0 to 1 along the whole sides: a taper around
-    the mean thickness. Powers of p are polynomials in both tapers, so each power of s and t is a term of its own and
-    the sum is exact.
+    Without readings, p = 1 + alpha_x (s - 1/2) + alpha_y (t - 1/2), s and t from 0 to 1 along the whole sides: a taper
+    around the mean thickness. Powers of p are polynomials in both tapers, so each power of s and t is a term of its own
+    and the sum is exact.
     """
 
-    part_x: Part = WHOLE
-    part_y: Part = WHOLE
+    part_x: VibratingPart = WHOLE_SIDE
+    part_y: VibratingPart = WHOLE_SIDE
     profile: FieldProfile | None = None  # None: free tapers
 
     name: ClassVar[str] = "thickness_profile"
@@ -55,33 +62,33 @@ class ThicknessProfile(Effect):
     @classmethod
     def of(cls, board: Board, setup: Setup) -> ThicknessProfile:
         parts = vibrating_part(board, setup, "x"), vibrating_part(board, setup, "y")
-        return cls(BOARD, *parts, _profile(board))
+        return cls(BOARD_OWNER, *parts, _thickness_profile(board))
 
     @classmethod
     def is_implied(cls, board: Board) -> bool:
-        """Whether the card's thickness was read at places, and these tell or leave open that it varies."""
-        profile = _profile(board)
+        """Whether the card's thickness was read at places, and these readings do not rule out that it varies."""
+        profile = _thickness_profile(board)
         return profile is not None and not profile.is_uniform
 
     @classmethod
     def is_known(cls, board: Board) -> bool:
-        """Never: the readings tell a field, whose thickness between them is uncertain and not a size."""
+        """Never: the readings determine a field, whose thickness between them is uncertain, and not a size."""
         return False
 
     @classmethod
     def notes(cls, board: Board) -> tuple[str, ...]:
         if not board.inputs["thickness"].has_profile:
             return ()
-        told = "the thickness was read at several places: its mean is used"
+        remark = "the thickness was read at several places: its mean is used"
         if cls.name not in board.effects:
-            return (f"{told}, the {cls.name} is not part of this model",)
-        profile = _profile(board)
-        return (f"{told}, their differences support no {cls.name}",) if profile and profile.is_uniform else ()
+            return (f"{remark}, the {cls.name} is not part of this model",)
+        profile = _thickness_profile(board)
+        return (f"{remark}, their differences support no {cls.name}",) if profile and profile.is_uniform else ()
 
     @classmethod
     def candidates(cls, board: Board, setup: Setup) -> tuple[Effect, ...]:
         """No form where the readings say that the board is equally thick everywhere."""
-        profile = _profile(board)
+        profile = _thickness_profile(board)
         return () if profile is not None and profile.is_uniform else super().candidates(board, setup)
 
     def in_setup(self, board: Board, setup: Setup) -> ThicknessProfile:
@@ -105,22 +112,24 @@ class ThicknessProfile(Effect):
     def goes_with(self) -> tuple[str, ...]:
         return ("thickness",) if self.profile is not None and self.profile.with_mean is not None else ()
 
-    def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
+    def variations(self) -> Mapping[TermGroup, tuple[Variation, ...]]:
         """Powers of the expanded field, or of a taper: (c + a u + b v)^n by the multinomial theorem."""
         if self.profile is not None:
             if self.profile.is_uniform:
                 return {}
-            expanded = {n: self._expanded(n) for n in set(_POWERS.values())}
-            return {group: expanded[n] for group, n in _POWERS.items()} | {"rotary": self._rotary()}
+            expanded = {n: self._expand_power(n) for n in set(_POWERS.values())}
+            return {group: expanded[n] for group, n in _POWERS.items()} | {"rotary": self._rotary_variations()}
         fields: dict[tuple[int, int], Field | None] = {
             (i, j): partial(_monomial, i=i, j=j) if i + j else None for i, j in _exponents(max(_POWERS.values()))
         }
         return {
-            group: tuple(Variation(fields[i, j], partial(self._coefficient, n=n, i=i, j=j)) for i, j in _exponents(n))
+            group: tuple(
+                Variation(fields[i, j], partial(self._taper_coefficient, n=n, i=i, j=j)) for i, j in _exponents(n)
+            )
             for group, n in _POWERS.items()
         }
 
-    def _expanded(self, n: int) -> tuple[Variation, ...]:
+    def _expand_power(self, n: int) -> tuple[Variation, ...]:
         """p^n to second order in the components: p0^(n - k) with each product of k of them."""
         assert self.profile is not None
         products = [
@@ -128,32 +137,36 @@ class ThicknessProfile(Effect):
             for k in range(min(n, _MOST_FACTORS) + 1)
             for chosen in combinations_with_replacement(range(len(self.profile.open)), k)
         ]
-        keys = tuple(one.key for one in self.parameters())
+        keys = tuple(parameter.key for parameter in self.parameters())
 
         def share(values: Values, chosen: tuple[int, ...], factor: int) -> Floats:
             assert self.profile is not None
-            at = coordinates(self.profile, values["thickness"], [self.value(values, key) for key in keys])
-            return np.asarray(factor * prod((at[k] for k in chosen), start=np.ones(1)))
+            z = standard_coordinates(self.profile, values["thickness"], [self.value(values, key) for key in keys])
+            return np.asarray(factor * prod((z[k] for k in chosen), start=np.ones(1)))
 
         return tuple(
             Variation(
-                _Expanded(self.part_x, self.part_y, self.profile, n - len(chosen), chosen),
+                _ExpandedField(self.part_x, self.part_y, self.profile, n - len(chosen), chosen),
                 partial(share, chosen=chosen, factor=comb(n, len(chosen)) * len(set(permutations(chosen)))),
                 len(chosen),
             )
             for chosen in products
         )
 
-    def _rotary(self) -> tuple[Variation, ...]:
-        """p0^2 (p0 + d): the mass follows the components d, the radius of gyration what is expected alone.
+    def _rotary_variations(self) -> tuple[Variation, ...]:
+        """p0^2 (p0 + d): the mass follows the components d, the radius of gyration the expected profile alone.
 
-        To first order p^3 would be negative where d < -p0 / 3, and strains that carry no other mass with it.
+        To first order p^3 would be negative where d < -p0 / 3, and so would the mass of strains without other mass.
         """
-        cube = self._expanded(_POWERS["rotary"])
-        first = (replace(one, weight=_a_third(one.weight), order=2) for one in cube if one.order == 1)
-        return (*(replace(one, order=1) for one in cube if one.order == 0), *first)
+        cube = self._expand_power(_POWERS["rotary"])
+        first = (
+            replace(variation, weight=_third_of_weight(variation.weight), order=2)
+            for variation in cube
+            if variation.order == 1
+        )
+        return (*(replace(variation, order=1) for variation in cube if variation.order == 0), *first)
 
-    def _coefficient(self, values: Values, n: int, i: int, j: int) -> Floats:
+    def _taper_coefficient(self, values: Values, n: int, i: int, j: int) -> Floats:
         """Coefficient of u^i v^j in the n-th power of the taper, u and v from the middle of the vibrating part."""
         taper_x, taper_y = self.value(values, "taper_x"), self.value(values, "taper_y")
         middle = 1.0 + taper_x * self.part_x.middle + taper_y * self.part_y.middle
@@ -161,17 +174,17 @@ class ThicknessProfile(Effect):
         return comb(n, i) * comb(n - i, j) * middle ** (n - i - j) * along_x**i * along_y**j
 
 
-def _a_third(weight: Callable[[Values], Floats] | None) -> Callable[[Values], Floats]:
+def _third_of_weight(weight: Callable[[Values], Floats] | None) -> Callable[[Values], Floats]:
     assert weight is not None
     return lambda values: weight(values) / _POWERS["rotary"]
 
 
 @dataclass(frozen=True)
-class _Expanded:
-    """A power of what is expected of a profile, times some of its components: one field of an expanded power."""
+class _ExpandedField:
+    """A power of the expected profile, times some of its components: one field of an expanded power."""
 
-    part_x: Part
-    part_y: Part
+    part_x: VibratingPart
+    part_y: VibratingPart
     profile: FieldProfile
     power: int
     chosen: tuple[int, ...]
@@ -182,13 +195,13 @@ class _Expanded:
         return prod(factors, start=(1.0 + self.profile.expected(*at)) ** self.power)
 
 
-def _profile(board: Board) -> FieldProfile | None:
-    """What the board's readings tell of its thickness; None where they have no places."""
+def _thickness_profile(board: Board) -> FieldProfile | None:
+    """Profile of the board's thickness from its readings; None where they have no places."""
     thickness, length_x, length_y = (board.inputs[name] for name in ("thickness", "length_x", "length_y"))
-    read = thickness_readings(thickness, length_x, length_y)
-    if read is None:
+    readings = thickness_readings(thickness, length_x, length_y)
+    if readings is None:
         return None
-    return field_profile(conditioned(read), held_in(board), max(_POWERS.values()), thickness.is_exact)
+    return field_profile(condition_field(readings), mountings(board), max(_POWERS.values()), thickness.is_exact)
 
 
 def _exponents(degree: int) -> tuple[tuple[int, int], ...]:

@@ -13,7 +13,7 @@ from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Effect, Ratio, Scope, Theory
 
 _SOURCE = "spruce, log-normal around published values of G_xz 0.5-0.75 GPa and G_yz 20-40 MPa, widened for other woods"
-_RIGID = 1e13
+_RIGID_MODULUS = 1e13
 """A modulus, Pa, at which the frequencies are those of the thin plate to a hundredth of a cent."""
 
 DEFAULT_XZ = Quantity.from_median(0.62e9, 1.5)
@@ -55,19 +55,19 @@ class TransverseShear(Effect):
 
     @classmethod
     def is_known(cls, board: Board) -> bool:
-        """Always: what the card does not state of the moduli is published."""
+        """Always: moduli that the card does not state are published."""
         return True
 
     def parameters(self) -> tuple[Parameter, ...]:
         """G_xz and G_yz, where they are not G_xy; a plate stiffer than any solid does not give way in shear."""
-        given = (("G_xz", self.xz, DEFAULT_XZ), ("G_yz", self.yz, DEFAULT_YZ))
+        moduli = (("G_xz", self.xz, DEFAULT_XZ), ("G_yz", self.yz, DEFAULT_YZ))
         return tuple(
-            self.parameter(key, prior, "Pa", _RIGID, _SOURCE if prior is default else "")
-            for key, prior, default in given
+            self.parameter(key, prior, "Pa", _RIGID_MODULUS, _SOURCE if prior is default else "")
+            for key, prior, default in moduli
             if prior is not None
         )
 
     def adjusted(self, values: Values) -> Values:
         """The values with the moduli that are not G_xy under the names that the shear-flexible plate knows."""
-        given = (key for key, one in (("G_xz", self.xz), ("G_yz", self.yz)) if one is not None)
-        return {**values, **{key: self.value(values, key) for key in given}}
+        keys = (key for key, modulus in (("G_xz", self.xz), ("G_yz", self.yz)) if modulus is not None)
+        return {**values, **{key: self.value(values, key) for key in keys}}

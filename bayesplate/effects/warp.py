@@ -9,26 +9,26 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesplate.board.board import Board, Values, density
-from bayesplate.board.parameter import BOARD, Parameter
+from bayesplate.board.board import Board, Values, board_density
+from bayesplate.board.parameter import BOARD_OWNER, Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, Scope, Stiffness
 from bayesplate.effects.part import aspect_ratio_of
 from bayesplate.plate.fields import Field
 from bayesplate.plate.membrane import MODULI, Curvature, curvature_pairs, membrane_terms
-from bayesplate.plate.terms import OnDeflections, Term
+from bayesplate.plate.terms import ProjectedTerms, Term
 
 RISES: tuple[Curvature, ...] = ("cup", "bow", "twist")
 """The rises that a maker reads: across the width, along the length, of the fourth corner."""
 
-_SPREADS = {"cup": 0.005, "bow": 0.004, "twist": 0.01}
-_WORDS = {
+_PRIOR_SPREADS = {"cup": 0.005, "bow": 0.004, "twist": 0.01}
+_PRIOR_SOURCES = {
     "cup": "half-normal: half a per cent of the width; turning the board over changes nothing",
     "bow": "normal: 0.4 per cent of the length; below zero the board is a saddle, above a dome",
     "twist": "half-normal: one per cent of the longer side; turning the board over changes nothing",
 }
-_SEEN = 2.0 * np.log(2.0) / 1200.0
+_ONE_CENT = 2.0 * np.log(2.0) / 1200.0
 """Relative rise of omega^2 that is one cent of frequency."""
 
 
@@ -61,9 +61,9 @@ class Warp(Effect):
     @classmethod
     def of(cls, board: Board, setup: Setup) -> Warp:
         """The effect with what the board states of its rises, and priors for the others."""
-        rises = ((name, *_rise(board, name)) for name in RISES)
-        kept = tuple(one for one in rises if not (one[1].is_exact and one[1].mean == 0.0))
-        return cls(BOARD, kept, aspect_ratio_of(board.nominal(), setup))
+        rises = ((name, *_rise_prior(board, name)) for name in RISES)
+        nonzero = tuple(rise for rise in rises if not (rise[1].is_exact and rise[1].mean == 0.0))
+        return cls(BOARD_OWNER, nonzero, aspect_ratio_of(board.nominal(), setup))
 
     @classmethod
     def is_implied(cls, board: Board) -> bool:
@@ -71,19 +71,22 @@ class Warp(Effect):
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
-        if board.warp or _shows(board):
+        if board.warp or _can_shift_modes(board):
             return ""
         return "the board is so thick that the warp of a sawn board would move no mode by a cent"
 
     @classmethod
     def forms(cls, board: Board) -> tuple[EffectForm, ...]:
-        """Curved along and across, or twisted; as stated where anything is."""
+        """Two forms, cup with bow and twist alone; one form of all rises where the card states any."""
         acting = [setup for setup in board.setups if not cls.refusal(board, setup)]
         if board.warp or not acting:
             return super().forms(board)
-        whole = [cls.of(board, setup) for setup in acting]
+        warps = [cls.of(board, setup) for setup in acting]
         return tuple(
-            EffectForm(words, tuple(replace(one, rises=tuple(r for r in one.rises if r[0] in names)) for one in whole))
+            EffectForm(
+                words,
+                tuple(replace(warp, rises=tuple(rise for rise in warp.rises if rise[0] in names)) for warp in warps),
+            )
             for words, names in (("cup and bow", ("cup", "bow")), ("twist", ("twist",)))
         )
 
@@ -101,7 +104,7 @@ class Warp(Effect):
         return tuple(self.parameter(name, rise, "m", 0.0, source) for name, rise, source in self.rises)
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
-        """The halves stay alike, but for a twist with a curvature beside it: together they tell corners apart."""
+        """The halves stay alike, except with a twist and another curvature: together they make the corners differ."""
         is_both = len(self.rises) > 1 and any(name == "twist" for name, *_ in self.rises)
         return not is_both, not is_both
 
@@ -114,20 +117,20 @@ class Warp(Effect):
         pairs = curvature_pairs(curvatures)
 
         def terms(values: Values, field: Field | None) -> tuple[Term, ...]:
-            moduli = tuple(float(one) for one in np.ravel(_moduli(values)[..., :4]))
+            moduli = tuple(float(modulus) for modulus in np.ravel(_moduli(values)[..., :4]))
             membrane = partial(
                 membrane_terms,
                 aspect_ratio=self.aspect_ratio,
-                moduli=tuple(round(one / max(moduli), 6) for one in moduli),
+                moduli=tuple(round(modulus / max(moduli), 6) for modulus in moduli),
                 curvatures=curvatures,
                 thickness=field,
             )
-            return (OnDeflections(membrane, len(pairs) * len(MODULI)),)
+            return (ProjectedTerms(membrane, len(pairs) * len(MODULI)),)
 
         def weight(values: Values, setup: Setup) -> Floats:
-            moduli = _moduli(values) / np.asarray(density(values))[..., None]
-            bent = self._curvatures(values)
-            columns = [np.asarray(bent[one] * bent[other])[..., None] * moduli for one, other in pairs]
+            moduli = _moduli(values) / np.asarray(board_density(values))[..., None]
+            curvature = self._curvatures(values)
+            columns = [np.asarray(curvature[first] * curvature[second])[..., None] * moduli for first, second in pairs]
             return np.concatenate(np.broadcast_arrays(*columns), axis=-1)
 
         return (Stiffness(terms, weight),)
@@ -139,26 +142,26 @@ class Warp(Effect):
         return {name: self.value(values, name) * per_rise[name] for name, *_ in self.rises}
 
 
-def _rise(board: Board, name: Curvature) -> tuple[Quantity, str]:
+def _rise_prior(board: Board, name: Curvature) -> tuple[Quantity, str]:
     """A rise as stated, or the prior of a sawn board."""
     if name in board.warp:
         return board.warp[name], ""
     length_x, length_y = (board.inputs[f"length_{axis}"].mean for axis in "xy")
     side = {"cup": length_y, "bow": length_x, "twist": max(length_x, length_y)}[name]
     lower = -np.inf if name == "bow" else 0.0
-    return Quantity.from_mean(0.0, _SPREADS[name] * side, "normal", lower=lower), _WORDS[name]
+    return Quantity.from_mean(0.0, _PRIOR_SPREADS[name] * side, "normal", lower=lower), _PRIOR_SOURCES[name]
 
 
-def _shows(board: Board) -> bool:
-    """Whether a rise c of its prior's spread stiffens a section, by (4/45) c^2 / (h^2 / 12), as much as one cent."""
+def _can_shift_modes(board: Board) -> bool:
+    """Whether a rise c of its prior's spread stiffens a section, by (4/45) c^2 / (h^2 / 12), by more than one cent."""
     length_x, length_y, thickness = (board.inputs[name].mean for name in ("length_x", "length_y", "thickness"))
-    rise = max(_SPREADS["cup"] * length_y, _SPREADS["bow"] * length_x)
-    return bool(4.0 / 45.0 * 12.0 * (rise / thickness) ** 2 > _SEEN)
+    rise = max(_PRIOR_SPREADS["cup"] * length_y, _PRIOR_SPREADS["bow"] * length_x)
+    return bool(4.0 / 45.0 * 12.0 * (rise / thickness) ** 2 > _ONE_CENT)
 
 
 def _moduli(values: Values) -> Floats:
     """Q_11, Q_12, Q_22 and Q_66 of plane stress, Pa: (..., 4) array."""
     cube = 12.0 / np.asarray(values["thickness"]) ** 3
     D_x, D_y, D_s = (np.asarray(values[name]) for name in ("D_x", "D_y", "D_s"))
-    parts = (D_x * cube, np.asarray(values["poisson_xy"]) * D_y * cube, D_y * cube, 0.25 * D_s * cube)
-    return np.stack(np.broadcast_arrays(*parts), axis=-1)
+    columns = (D_x * cube, np.asarray(values["poisson_xy"]) * D_y * cube, D_y * cube, 0.25 * D_s * cube)
+    return np.stack(np.broadcast_arrays(*columns), axis=-1)

@@ -10,9 +10,9 @@ def effect_name(name: str) -> str:
 
 
 def effect_names(names: Sequence[str], last: str = "and") -> str:
-    return joined([effect_name(name) for name in names], last)
+    return join_words([effect_name(name) for name in names], last)
 
 
-def joined(words: Sequence[str], last: str = "and") -> str:
+def join_words(words: Sequence[str], last: str = "and") -> str:
     """A list in prose."""
     return f" {last} ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)

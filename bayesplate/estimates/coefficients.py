@@ -17,21 +17,28 @@ from bayesplate.board.words import setup_places
 from bayesplate.effects.part import aspect_ratio_of
 from bayesplate.effects.words import effect_names
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
-from bayesplate.frequencies.columns import columns
+from bayesplate.frequencies.columns import modal_coefficients
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.frequencies.terms import shear_moduli
 from bayesplate.labels import Label
 from bayesplate.plate.beams import Beams
-from bayesplate.plate.naming import find
-from bayesplate.plate.training import FACTORS, Theory, TrainingConstants, train, training_matrices, training_weights
+from bayesplate.plate.naming import find_named_modes
+from bayesplate.plate.training import (
+    MODULUS_FACTORS,
+    Theory,
+    TrainingConstants,
+    train,
+    training_matrices,
+    training_weights,
+)
 
 CoefficientSource = Literal["sensitivity", "training", "published"]
 SAME_ASPECT = 0.01
 """Relative difference up to which a table counts as made for the aspect ratio of a board."""
 SAME_POISSON = 0.01
 """Difference up to which a table counts as made for the Poisson ratio of a board; it moves E_y by 0.1 %."""
-_OF_TRAINING = ("transverse_shear", "poisson_ratio")
-"""Effects that the plates of a training have where the board has them."""
+_TRAINING_EFFECTS = ("transverse_shear", "poisson_ratio")
+"""Effects that the plates of a training include where the board has them."""
 _GPA = 1e9
 
 
@@ -43,7 +50,7 @@ class CoefficientRows:
     # (n_modes,): readings of the setup; a printed table may lack modes of peaks without a sure label
     readings: Indices
     coefficients: Floats  # (n_modes, 3): a, b, c
-    # (n_modes,), N m: what effects make of omega^2 / lambda; training and table have shear in a, b, c
+    # (n_modes,), N m: part of omega^2 / lambda due to effects; training and table have shear in a, b, c
     rest: Floats
     aspect_ratio: float  # L_x / L_y
     theory: str
@@ -72,18 +79,18 @@ def coefficient_rows(
         return _by_sensitivity(model, values)
     if source == "training":
         return _by_training(model, values)
-    return _published(board_name, model, values, compared)
+    return _by_published_table(board_name, model, values, compared)
 
 
 def _by_sensitivity(model: SetupModel, values: Values) -> CoefficientRows:
-    found = columns(model.system, values, model.linear.stiffness)
+    modal = modal_coefficients(model.system, values, model.linear.stiffness)
     ratio = aspect_ratio_of(values, model.setup)
     theory = model.system.theory
     sentence = f"energy shares of one solve at the weighted least-squares estimate, {theory} plate, ratio {ratio:.4g}"
-    if found.rest.any():
+    if modal.rest.any():
         sentence += "; what the effects give is taken off first"
-    every = np.arange(len(model.setup.readings))
-    return CoefficientRows("sensitivity", every, found.coefficients, found.rest, ratio, theory, sentence, {})
+    readings = np.arange(len(model.setup.readings))
+    return CoefficientRows("sensitivity", readings, modal.coefficients, modal.rest, ratio, theory, sentence, {})
 
 
 def _by_training(model: SetupModel, values: Values) -> CoefficientRows:
@@ -95,36 +102,36 @@ def _by_training(model: SetupModel, values: Values) -> CoefficientRows:
     rows = np.array([[trained[b].a, trained[b].b, trained[b].c] for b in beams])
     counts = [trained[b].n_plates for b in beams]
     sentence = (
-        f"non-negative planes through {min(counts)} to {max(counts)} of {len(FACTORS) ** 2} computed plates, {theory}, "
-        f"ratio {ratio:.4g}, around E_x {centre.E_x / _GPA:.3g}, E_y {centre.E_y / _GPA:.3g}, "
+        f"non-negative planes through {min(counts)} to {max(counts)} of {len(MODULUS_FACTORS) ** 2} computed plates, "
+        f"{theory}, ratio {ratio:.4g}, around E_x {centre.E_x / _GPA:.3g}, E_y {centre.E_y / _GPA:.3g}, "
         f"G_xy {centre.G_xy / _GPA:.3g} GPa ({origin})"
-        f"{_without(model)}"
+        f"{_lacking_effects(model)}"
     )
     r_squared = {reading.label: trained[reading.beams].r_squared for reading in setup.readings}
-    every = np.arange(len(beams))
-    return CoefficientRows("training", every, rows, np.zeros(len(beams)), ratio, theory, sentence, r_squared)
+    readings = np.arange(len(beams))
+    return CoefficientRows("training", readings, rows, np.zeros(len(beams)), ratio, theory, sentence, r_squared)
 
 
 def _centre_of_training(model: SetupModel, values: Values) -> tuple[TrainingConstants, str]:
-    """Plate in the middle of the training: that of the named table, else the estimate itself.
+    """Plate in the middle of the training: that of the named table, otherwise the estimate itself; and its origin.
 
-    Its Poisson ratio and shear moduli are the board's own: the coefficients go with them, and so do the moduli.
+    Its Poisson ratio and shear moduli are the board's own, because the coefficients depend on them.
     """
-    there = model.system.adjusted(values)
-    moduli_of_shear = zip(("G_xz", "G_yz"), shear_moduli(there), strict=True)
-    shear = {name: float(one) for name, one in moduli_of_shear if model.system.theory == "shear-flexible"}
+    adjusted = model.system.adjusted(values)
+    moduli_of_shear = zip(("G_xz", "G_yz"), shear_moduli(adjusted), strict=True)
+    shear = {name: float(modulus) for name, modulus in moduli_of_shear if model.system.theory == "shear-flexible"}
     E_x, E_y, G_xy = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
-    own = TrainingConstants(float(E_x), float(E_y), float(G_xy), float(values["poisson_xy"]), **shear)
+    centre = TrainingConstants(float(E_x), float(E_y), float(G_xy), float(values["poisson_xy"]), **shear)
     table = model.setup.published_coefficients
     printed = None if table is None else _constants_of(table)
     if table is None or printed is None:
-        return own, "the weighted least-squares estimate"
-    return replace(own, E_x=printed.E_x, E_y=printed.E_y, G_xy=printed.G_xy), f"those of {table.name}"
+        return centre, "the weighted least-squares estimate"
+    return replace(centre, E_x=printed.E_x, E_y=printed.E_y, G_xy=printed.G_xy), f"those of {table.name}"
 
 
-def _without(model: SetupModel) -> str:
-    """What the plates of a training and of a printed table lack: the board's effects but shear, which they may have."""
-    lacking = [one.name for one in model.system.effects if one.name not in _OF_TRAINING]
+def _lacking_effects(model: SetupModel) -> str:
+    """Clause on the board's effects that the plates of a training or of a printed table lack; empty if none."""
+    lacking = [effect.name for effect in model.system.effects if effect.name not in _TRAINING_EFFECTS]
     return f"; its plates have no {effect_names(lacking, 'or')}, which the board has" if lacking else ""
 
 
@@ -137,27 +144,29 @@ def _constants_of(card: CoefficientCard) -> TrainingConstants | None:
     return TrainingConstants(t.E_x_gpa * _GPA, t.E_y_gpa * _GPA, t.G_xy_gpa * _GPA, t.nu_xy, G_xz, G_yz)
 
 
-def _published(board_name: str, model: SetupModel, values: Values, compared: bool) -> CoefficientRows:
+def _by_published_table(board_name: str, model: SetupModel, values: Values, compared: bool) -> CoefficientRows:
     setup = model.setup
     card = named_table(board_name, setup)
-    own = [_label_in_table(card, setup, label) for label in setup.labels]
-    known = np.array([i for i, label in enumerate(own) if label in card.table], dtype=np.intp)
-    there = {setup.labels[i]: own[i] for i in known}
-    rows = np.array([card.table[one] for one in there.values()]).reshape(-1, len(RIGIDITIES))
-    beams = [setup.readings[i].beams for i in known]
-    distances = _distances(card, setup, beams, rows, _thickness_ratio(values, setup)) if compared and beams else {}
+    table_labels = [_label_in_table(card, setup, label) for label in setup.labels]
+    readings = np.array([i for i, label in enumerate(table_labels) if label in card.table], dtype=np.intp)
+    table_label_of = {setup.labels[i]: table_labels[i] for i in readings}
+    rows = np.array([card.table[entry] for entry in table_label_of.values()]).reshape(-1, len(RIGIDITIES))
+    beams = [setup.readings[i].beams for i in readings]
+    distances = (
+        _table_distances(card, setup, beams, rows, _thickness_ratio(values, setup)) if compared and beams else {}
+    )
     theory = min(distances.items(), key=lambda item: item[1])[0] if distances else "not stated"
     sentence = f"printed table {card.name}: {card.title}"
     if distances:
-        told = " and ".join(f"{rms:.1f} cents from {name} plates" for name, rms in distances.items())
-        sentence += f"; at its own material it lies {told} solved here, so it holds for the {theory} plate"
+        distance_words = " and ".join(f"{rms:.1f} cents from {name} plates" for name, rms in distances.items())
+        sentence += f"; at its own material it lies {distance_words} solved here, so it holds for the {theory} plate"
     nu_xy = float(values["poisson_xy"])
     if card.training.nu_xy is not None and abs(card.training.nu_xy - nu_xy) > SAME_POISSON:
         sentence += f"; its nu_xy is {card.training.nu_xy:.3g}, the board's {nu_xy:.3g}"
-    sentence += _without(model)
-    r_squared = {label: card.r_squared[one] for label, one in there.items() if one in card.r_squared}
+    sentence += _lacking_effects(model)
+    r_squared = {label: card.r_squared[entry] for label, entry in table_label_of.items() if entry in card.r_squared}
     rest = np.zeros(len(rows))
-    return CoefficientRows("published", known, rows, rest, card.aspect_ratio, theory, sentence, r_squared)
+    return CoefficientRows("published", readings, rows, rest, card.aspect_ratio, theory, sentence, r_squared)
 
 
 def named_table(board_name: str, setup: Setup) -> CoefficientCard:
@@ -174,7 +183,7 @@ def coefficient_faults(board: Board) -> list[Fault]:
     faults = []
     for setup, where in zip(board.setups, places, strict=True):
         if setup.published_coefficients is not None:
-            faults += _misfits(setup.published_coefficients, setup, board, f"{where} published_coefficients")
+            faults += _table_faults(setup.published_coefficients, setup, board, f"{where} published_coefficients")
     return faults
 
 
@@ -194,45 +203,45 @@ def require_sides(board: Board) -> None:
             raise NotIdentifiableError(Fault(place, wanted, f"{ratio * table.aspect_ratio:.3g}", remedy))
 
 
-def _misfits(card: CoefficientCard, setup: Setup, board: Board, place: str) -> list[Fault]:
+def _table_faults(card: CoefficientCard, setup: Setup, board: Board, place: str) -> list[Fault]:
     faults = []
     if card.edges.words != setup.edges:
-        wanted = f"a table for the edges {_words(setup.edges)}"
-        faults.append(Fault(place, wanted, f"{card.name}, made for {_words(card.edges.words)}"))
+        wanted = f"a table for the edges {_edge_words(setup.edges)}"
+        faults.append(Fault(place, wanted, f"{card.name}, made for {_edge_words(card.edges.words)}"))
     length_x, length_y = (float(side) for side in vibrating_lengths(board.nominal(), setup))
-    is_board = min(length_x, length_y) > 0.0  # nothing left by the clamps is a fault of its own
+    is_board = min(length_x, length_y) > 0.0  # clamps that cover the whole board are a fault of their own
     if is_board and abs(card.aspect_ratio * length_y / length_x - 1.0) > SAME_ASPECT:
         wanted = f"a table of aspect ratio {length_x / length_y:.4g}"
         faults.append(Fault(place, wanted, f"{card.name}, made for {card.aspect_ratio:.4g}"))
     missing = [str(label) for label in setup.labels if _label_in_table(card, setup, label) not in card.table]
     if missing:
         m, n = setup.first_label.m - card.first_label.m, setup.first_label.n - card.first_label.n
-        known = ", ".join(f"({label.m + m},{label.n + n})" for label in card.table)
-        faults.append(Fault(place, f"a table with the labels {', '.join(missing)}", f"{card.name} with {known}"))
+        labels = ", ".join(f"({label.m + m},{label.n + n})" for label in card.table)
+        faults.append(Fault(place, f"a table with the labels {', '.join(missing)}", f"{card.name} with {labels}"))
     return faults
 
 
 def _label_in_table(card: CoefficientCard, setup: Setup, label: Label) -> Label:
-    """What a table calls the mode of a setup's label: each counts from a first label of its own."""
+    """Label in a table of the mode that a setup's label names: each counts from a first label of its own."""
     return Label(label.m - setup.first_label.m + card.first_label.m, label.n - setup.first_label.n + card.first_label.n)
 
 
-def _distances(
+def _table_distances(
     card: CoefficientCard, setup: Setup, beams: Sequence[Beams], rows: Floats, thickness_ratio: float
 ) -> dict[Theory, float]:
-    """How far a table's frequencies lie from plates of each theory in the middle of its training: rms, cents."""
+    """Distance of a table's frequencies from plates of each theory in the middle of its training: rms, cents."""
     constants = _constants_of(card)
     if constants is None:
         return {}
-    own = card.training
-    if own.thickness_mm is not None and own.length_x_mm is not None:
-        thickness_ratio = own.thickness_mm / own.length_x_mm
+    training = card.training
+    if training.thickness_mm is not None and training.length_x_mm is not None:
+        thickness_ratio = training.thickness_mm / training.length_x_mm
     theories: tuple[Theory, ...] = ("thin",) if constants.G_xz is None or constants.G_yz is None else get_args(Theory)
     distances: dict[Theory, float] = {}
     for theory in theories:
         weights = training_weights(card.aspect_ratio, thickness_ratio, constants, theory)
         p, q = weights.stiffness[0] * card.aspect_ratio**2, weights.stiffness[1] / card.aspect_ratio**2
-        solved = find(training_matrices(setup.ends_x, setup.ends_y, theory), weights, beams)
+        solved = find_named_modes(training_matrices(setup.ends_x, setup.ends_y, theory), weights, beams)
         ratios = rows @ np.array([p, q, 1.0]) / np.array([solved[b].eigenvalue for b in beams])
         distances[theory] = float(np.sqrt(np.mean((600.0 * np.log2(ratios)) ** 2)))
     return distances
@@ -242,5 +251,5 @@ def _thickness_ratio(values: Values, setup: Setup) -> float:
     return float(values["thickness"] / vibrating_lengths(values, setup)[0])
 
 
-def _words(edges: Mapping[str, str]) -> str:
+def _edge_words(edges: Mapping[str, str]) -> str:
     return ", ".join(f"{edge} {word}" for edge, word in edges.items())

@@ -10,19 +10,19 @@ import numpy as np
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.material import ORTHOTROPIC, Symmetry
-from bayesplate.effects.words import joined
+from bayesplate.effects.words import join_words
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.leave_one_out import HIGH_LEVERAGE
 
-WITHIN_A_FACTOR = 2.0
+IDENTIFIABLE_FACTOR = 2.0
 """A constant is identifiable if its 95 % interval at the expected noise stays within this factor of the estimate."""
 
-OTHERS_WITHIN = 10.0
-"""Factor within which the other constants of wood are taken to be known, where it is asked which of them are told."""
+OTHERS_FACTOR = 10.0
+"""Factor within which the other constants are taken to be known, when each constant is judged by itself."""
 LOW_SHARE_PERCENT = 60.0
-_HELD = {"clamped", "supported"}
+_HELD_EDGES = {"clamped", "supported"}
 """Edges that do not move: where all are, the integral of w_xx w_yy is that of w_xy^2."""
-_HELP = {
+_HELPFUL_MODES = {
     "D_x": "a mode that bends along the grain",
     "D_y": "a mode that bends across the grain",
     "D_s": "a mode that twists",
@@ -39,8 +39,8 @@ class Identifiability:
     leverages: Floats  # (n_modes,): share of each reading in its own prediction; their sum is n_constants
     shares: Floats  # (n_modes, 3): of D_x, D_y, D_s in each mode's energy; rows sum to 1
     symmetry: Symmetry = ORTHOTROPIC
-    # (n_constants,) standard errors of ln D where the others are known within `OTHERS_WITHIN`: a constant that hardly
-    # enters a mode does not spoil what the mode tells of another
+    # (n_constants,) standard errors of ln D where the others are known within `OTHERS_FACTOR`: so that a constant that
+    # hardly enters the modes does not make another look undetermined
     errors_beside_known: Floats | None = None
 
     @property
@@ -60,8 +60,8 @@ class Identifiability:
         return np.sqrt(np.diagonal(self.of_rigidities))
 
     def blind(self) -> tuple[str, ...]:
-        """Constants that the readings do not determine within the factor `WITHIN_A_FACTOR`."""
-        limit = np.log(WITHIN_A_FACTOR) / 1.96
+        """Constants that the readings do not determine within the factor `IDENTIFIABLE_FACTOR`."""
+        limit = np.log(IDENTIFIABLE_FACTOR) / 1.96
         return tuple(n for n, error in zip(self.symmetry.free, self.standard_errors, strict=True) if not error <= limit)
 
 
@@ -73,25 +73,25 @@ def identifiability(sensitivities: Floats, scales: Floats, symmetry: Symmetry = 
     n = symmetry.n
     weighted = symmetry.along(sensitivities) / scales[:, None]
     left, singular, right = np.linalg.svd(weighted, full_matrices=False)
-    seen = singular > 1e-10 * singular[0]
-    tells_all = seen.sum() == n
+    is_seen = singular > 1e-10 * singular[0]
+    tells_all = is_seen.sum() == n
     covariance = (right.T * (1.0 / singular) ** 2) @ right if tells_all else np.diag(np.full(n, np.inf))
     condition = float(singular[0] / singular[-1]) if tells_all else float("inf")
-    leverages = np.sum(left[:, seen] ** 2, axis=1)
-    beside = _errors_beside_known(weighted.T @ weighted)
-    return Identifiability(condition, covariance, leverages, 2.0 * sensitivities, symmetry, beside)
+    leverages = np.sum(left[:, is_seen] ** 2, axis=1)
+    beside_known = _errors_beside_known(weighted.T @ weighted)
+    return Identifiability(condition, covariance, leverages, 2.0 * sensitivities, symmetry, beside_known)
 
 
 def _errors_beside_known(information: Floats) -> Floats:
-    """Standard error of ln of each constant where the others have a 95 % interval of `OTHERS_WITHIN`."""
-    precision = (1.96 / np.log(OTHERS_WITHIN)) ** 2
+    """Standard error of ln of each constant where the others have a 95 % interval of `OTHERS_FACTOR`."""
+    precision = (1.96 / np.log(OTHERS_FACTOR)) ** 2
     errors = []
     for i in range(len(information)):
-        others = np.delete(np.arange(len(information)), i)
-        of_others = information[np.ix_(others, others)] + precision * np.eye(len(others))
-        across = information[i, others]
-        left = information[i, i] - across @ np.linalg.solve(of_others, across) if len(others) else information[i, i]
-        errors.append(1.0 / np.sqrt(left) if left > 0.0 else np.inf)
+        rest = np.delete(np.arange(len(information)), i)
+        block = information[np.ix_(rest, rest)] + precision * np.eye(len(rest))
+        across = information[i, rest]
+        remaining = information[i, i] - across @ np.linalg.solve(block, across) if len(rest) else information[i, i]
+        errors.append(1.0 / np.sqrt(remaining) if remaining > 0.0 else np.inf)
     return np.array(errors)
 
 
@@ -100,8 +100,8 @@ def require_labels(board: Board) -> None:
     for setup in board.setups:
         if not setup.readings:
             n = len(setup.peaks)
-            are = "is" if n == 1 else "are"
-            peaks = f"and its {n} peak{'s' * (n != 1)} {are} none with certainty" if n else "it has no peaks either"
+            verb = "is" if n == 1 else "are"
+            peaks = f"and its {n} peak{'s' * (n != 1)} {verb} none with certainty" if n else "it has no peaks either"
             raise NotIdentifiableError(
                 f"{board.name}: setup {setup.name!r} has no labelled mode, {peaks}; give at least one label"
             )
@@ -117,56 +117,59 @@ def require_identifiable(board: Board, found: Identifiability) -> None:
     """Refuse (NotIdentifiableError) readings that leave a constant open, naming it and what would help."""
     if not found.blind():
         return
-    spread = _factors(found.standard_errors)
-    beside = spread if found.errors_beside_known is None else _factors(found.errors_beside_known)
-    told = {n for n, factor in zip(found.symmetry.free, beside, strict=True) if factor <= WITHIN_A_FACTOR}
-    if len(told) == found.symmetry.n:  # each is told beside the others, and not all of them together
-        told, beside = set(), spread
-    parts = []
-    for name, modulus, factor in zip(found.symmetry.free, found.symmetry.moduli, beside, strict=True):
-        if name not in told:
+    joint_reaches = _interval_factors(found.standard_errors)
+    reaches = joint_reaches if found.errors_beside_known is None else _interval_factors(found.errors_beside_known)
+    well_known = {n for n, factor in zip(found.symmetry.free, reaches, strict=True) if factor <= IDENTIFIABLE_FACTOR}
+    if len(well_known) == found.symmetry.n:  # each is known beside the others, but not all of them together
+        well_known, reaches = set(), joint_reaches
+    clauses = []
+    for name, modulus, factor in zip(found.symmetry.free, found.symmetry.moduli, reaches, strict=True):
+        if name not in well_known:
             reach = f"only within a factor {factor:.3g}" if np.isfinite(factor) and factor < 1e6 else "not at all"
-            parts.append(f"{name} (so {modulus}) {reach}; add {_HELP[name]}")
-    known = [
+            clauses.append(f"{name} (so {modulus}) {reach}; add {_HELPFUL_MODES[name]}")
+    known_clauses = [
         f"{modulus} they tell"
         for n, modulus in zip(found.symmetry.free, found.symmetry.moduli, strict=True)
-        if n in told
+        if n in well_known
     ]
     raise NotIdentifiableError(
-        f"{board.name}: the modes {_modes(board)} determine " + "; ".join([*parts, *known]) + f" (condition number "
+        f"{board.name}: the modes {_mode_names(board)} determine "
+        + "; ".join([*clauses, *known_clauses])
+        + f" (condition number "
         f"{found.condition_number:.3g})"
     )
 
 
-def _factors(errors: Floats) -> Floats:
-    """Factor within which 95 % lie, from standard errors of logarithms."""
+def _interval_factors(errors: Floats) -> Floats:
+    """Factors that a 95 % interval spans on either side, from standard errors of logarithms."""
     with np.errstate(over="ignore"):
         return np.asarray(np.exp(1.96 * errors))
 
 
-def _modes(board: Board) -> str:
+def _mode_names(board: Board) -> str:
     """Labels of the readings, setup by setup where there are several: two sessions may have the same ones."""
     by_setup = {setup.name: ", ".join(str(label) for label in setup.labels) for setup in board.setups}
     if len(by_setup) == 1:
         return "".join(by_setup.values())
-    return joined([f"{labels} of {name}" for name, labels in by_setup.items()])
+    return join_words([f"{labels} of {name}" for name, labels in by_setup.items()])
 
 
-def remarks(board: Board, found: Identifiability, carrying: str | None = None) -> tuple[str, ...]:
-    """Sentences on what is weakly known, for the table and the summary.
+def identifiability_remarks(board: Board, found: Identifiability, carrying: str | None = None) -> tuple[str, ...]:
+    """Sentences on constants that are weakly known, for the table and the summary.
 
-    `carrying` is what a fit says of modes that alone carry something; before there is one, their leverages here say it.
+    `carrying` is the sentence of a fit on modes that alone carry a parameter; None before a fit: then the leverages of
+    `found` give it.
     """
-    sentences = [_weakest(found)]
+    sentences = [_weakest_constant_sentence(found)]
     names = [
         (f"{label}" if len(board.setups) == 1 else f"{label} of {setup.name}")
         for setup in board.setups
         for label in setup.labels
     ]
     if len(names) == found.symmetry.n:
-        fix = "one mode fixes the one constant" if found.symmetry.is_isotropic else "three modes fix three constants"
+        clause = "one mode fixes the one constant" if found.symmetry.is_isotropic else "three modes fix three constants"
         sentences.append(
-            f"{fix} exactly: nothing is left to check the model with, and the noise comes from its prior alone"
+            f"{clause} exactly: nothing is left to check the model with, and the noise comes from its prior alone"
         )
     elif carrying is not None:
         sentences += [carrying] if carrying else []
@@ -176,26 +179,26 @@ def remarks(board: Board, found: Identifiability, carrying: str | None = None) -
                 sentences.append(
                     f"mode {name} alone carries a constant (leverage {leverage:.2f}): an error in it cannot be seen"
                 )
-    if all(set(setup.edges.values()) <= _HELD for setup in board.setups):
+    if all(set(setup.edges.values()) <= _HELD_EDGES for setup in board.setups):
         for setup in board.setups:
             held = "clamped" if set(setup.edges.values()) == {"clamped"} else "held"
-            sentences.append(f"setup {setup.name} is {held} all round: {_seen_where_held(found.symmetry)}")
+            sentences.append(f"setup {setup.name} is {held} all round: {_held_edges_clause(found.symmetry)}")
     return tuple(sentences)
 
 
-def _seen_where_held(symmetry: Symmetry) -> str:
-    """What a plate whose edges do not move shows of its constants: the integral of w_xx w_yy is that of w_xy^2."""
+def _held_edges_clause(symmetry: Symmetry) -> str:
+    """Which combination a plate with edges that do not move determines: int w_xx w_yy equals int w_xy^2 there."""
     if symmetry.is_isotropic:
         return "only D is seen, whatever nu is, so E = 12 (1 - nu^2) D / h^3 depends on nu"
     return "only D_s + 2 nu_xy D_y is seen, so G_xy depends on nu_xy"
 
 
-def _weakest(found: Identifiability) -> str:
-    errors: Mapping[str, float] = dict(zip(found.symmetry.moduli, found.standard_errors, strict=True))
+def _weakest_constant_sentence(result: Identifiability) -> str:
+    errors: Mapping[str, float] = dict(zip(result.symmetry.moduli, result.standard_errors, strict=True))
     weakest = max(errors, key=lambda name: errors[name])
-    if found.symmetry.is_isotropic:
+    if result.symmetry.is_isotropic:
         return f"all modes tell one modulus: the expected noise alone leaves it {_per_cent(errors[weakest])} uncertain"
-    share = 100 * found.shares[:, found.symmetry.moduli.index(weakest)].max()
+    share = 100 * result.shares[:, result.symmetry.moduli.index(weakest)].max()
     sentence = (
         f"the modes tell {weakest} least well: the expected noise alone leaves it {_per_cent(errors[weakest])} "
         "uncertain"

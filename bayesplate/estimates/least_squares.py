@@ -1,7 +1,7 @@
 """Relative weighted least squares: the constants that bring all frequencies closest in relative terms.
 
 Gauss-Newton on the logarithms of D_x, D_y, D_s with the law made anew at each step, so that the result is the
-least-squares estimate of the exact frequencies; the sensitivities come with each solve for nothing.
+least-squares estimate of the exact frequencies; the sensitivities come with each solve at no cost.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from bayesplate.plate.beams import product_coefficients
 
 MOST_STEPS = 40
 _LONGEST_STEP = 0.7
-_CONVERGED = 1e-7
-"""Of ln D: a frequency is then off by less than a ten-thousandth of a cent."""
-_SMALL = 1e-5
-"""A hundredth of a cent; steps below it that no longer shrink are rounding errors of the eigen-solves."""
-_BACK = 0.05
-"""Of the longest step in between: steps that come back as near to where they were before go round for ever."""
-_PULL = 1e-3
+_CONVERGED_STEP = 1e-7
+"""Step of ln D at which the estimate has converged: a frequency is then off by less than 1e-4 cents."""
+_SMALL_STEP = 1e-5
+"""Step of ln D, a hundredth of a cent: smaller steps that no longer shrink are rounding errors of the eigen-solves."""
+_CYCLE_SHARE = 0.05
+"""Share of the longest step in between: steps that return this near to an earlier estimate go round for ever."""
+_PULL_WEIGHT = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class Estimate:
 
     rigidities: Floats  # (3,), N m
     values: Mapping[str, Floats]  # the rigidities and the nominal inputs
-    models: tuple[SetupModel, ...]  # one a setup, solved at the estimate, settled or not
+    models: tuple[SetupModel, ...]  # one per setup, solved at the estimate, converged or not
     # (n_modes, 3) d ln f / d ln D, setup after setup; see `Symmetry.along` for an isotropic board
     sensitivities: Floats
     residuals: Floats  # (n_modes,): ln measured - ln predicted
@@ -57,23 +57,23 @@ def log_measured(board: Board) -> Floats:
 
 
 def weighted_least_squares(
-    board: Board, most_steps: int = MOST_STEPS, start: Floats | None = None, accepted: float = _CONVERGED
+    board: Board, most_steps: int = MOST_STEPS, start: Floats | None = None, accepted: float = _CONVERGED_STEP
 ) -> Estimate:
     """Rigidities that minimise the weighted squares of relative frequency errors over all setups.
 
     Steps begin at `start` (N m), by default rough rigidities from the readings, and end where ln D is off by less than
-    `accepted`. Where they go round, as at a veering whose names swap back and forth, the best of the round is the
-    estimate. A direction that the readings do not determine keeps its starting value.
+    `accepted`. Where they cycle, as at a veering whose names swap back and forth, the best estimate of the cycle is
+    returned. A direction that the readings do not determine keeps its starting value.
     """
     inputs, symmetry = board.nominal(), board.symmetry
     nu_xy = inputs["poisson_xy"]
     systems = [system_of(board, setup) for setup in board.setups]
-    begin = starting_rigidities(board) if start is None else start
-    log_next = np.log(symmetry.free_of(dict(zip(RIGIDITIES, begin, strict=True))))
+    start_rigidities = starting_rigidities(board) if start is None else start
+    log_next = np.log(symmetry.free_of(dict(zip(RIGIDITIES, start_rigidities, strict=True))))
     target, scales = log_measured(board), reading_scales(board)
-    settled, previous = False, np.inf
-    tried: list[Estimate] = []
-    before: tuple[Floats, Floats] | None = None
+    is_settled, previous_size = False, np.inf
+    estimates: list[Estimate] = []
+    last_step: tuple[Floats, Floats] | None = None
     for _ in range(most_steps):
         values = inputs | symmetry.rigidities(np.exp(log_next), nu_xy)
         rigidities = np.array([float(values[name]) for name in RIGIDITIES])
@@ -81,49 +81,51 @@ def weighted_least_squares(
         predicted = np.concatenate([m.log_frequencies(values, "linear")[0] for m in models])
         sensitivities = np.concatenate([m.sensitivities(values) for m in models])
         residuals = target - predicted
-        tried.append(Estimate(rigidities, values, models, sensitivities, residuals, scales, settled))
-        if settled:
+        estimates.append(Estimate(rigidities, values, models, sensitivities, residuals, scales, is_settled))
+        if is_settled:
             break
-        if of_round := _round(tried):
-            return min(of_round, key=lambda one: float(np.sum((one.residuals / scales) ** 2)))
+        if cycle := _find_cycle(estimates):
+            return min(cycle, key=lambda estimate: float(np.sum((estimate.residuals / scales) ** 2)))
         slopes = symmetry.along(sensitivities)
-        wanted = np.linalg.lstsq(slopes / scales[:, None], residuals / scales, rcond=1e-8)[0]
-        step = wanted / (_overshoot(before, wanted) if before and _are_at_same_places(tried[-2:]) else 1.0)
+        full_step = np.linalg.lstsq(slopes / scales[:, None], residuals / scales, rcond=1e-8)[0]
+        step = full_step / (
+            _overshoot(last_step, full_step) if last_step and _have_same_places(estimates[-2:]) else 1.0
+        )
         step *= min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
-        while np.abs(step).max() > _CONVERGED:
+        while np.abs(step).max() > _CONVERGED_STEP:
             if _is_material(symmetry.rigidities(np.exp(log_next + step), nu_xy), inputs):
                 break
             step *= 0.5
         log_next = log_next + step
-        before = wanted, step
+        last_step = full_step, step
         size = float(np.abs(step).max())
-        settled, previous = has_settled(size, previous, accepted), size
-    return tried[-1]
+        is_settled, previous_size = has_settled(size, previous_size, accepted), size
+    return estimates[-1]
 
 
-def _round(tried: Sequence[Estimate]) -> Sequence[Estimate]:
-    """The last estimates, if the steps between them have come back to where they began; otherwise none."""
-    log_rigidities = np.log([one.rigidities for one in tried])
+def _find_cycle(estimates: Sequence[Estimate]) -> Sequence[Estimate]:
+    """The last estimates, if the steps between them have returned to where they began; otherwise none."""
+    log_rigidities = np.log([estimate.rigidities for estimate in estimates])
     steps = np.abs(np.diff(log_rigidities, axis=0)).max(axis=1)
-    for first in range(len(tried) - 2):
-        if np.abs(log_rigidities[-1] - log_rigidities[first]).max() < _BACK * steps[first:].max():
-            return tried[first + 1 :]
+    for first in range(len(estimates) - 2):
+        if np.abs(log_rigidities[-1] - log_rigidities[first]).max() < _CYCLE_SHARE * steps[first:].max():
+            return estimates[first + 1 :]
     return ()
 
 
-def _overshoot(before: tuple[Floats, Floats], wanted: Floats) -> float:
-    """Factor, at least 1, by which a step is too long, from what the last one left of what was wanted.
+def _overshoot(last_step: tuple[Floats, Floats], full_step: Floats) -> float:
+    """Factor, at least 1, by which a full step is too long: from the last full step and the step taken in its place.
 
     Near a veering the slopes turn within a step; where the residuals are large there, steps go to and fro and hardly
-    shrink. The secant through the last two of them tells by how much they overshoot.
+    shrink. The secant through the last two steps gives the factor by which they overshoot.
     """
-    wanted_before, taken = before
-    return max(1.0, float((wanted_before - wanted) @ taken / (taken @ taken)))
+    last_full_step, step = last_step
+    return max(1.0, float((last_full_step - full_step) @ step / (step @ step)))
 
 
-def _are_at_same_places(two: Sequence[Estimate]) -> bool:
+def _have_same_places(estimates: Sequence[Estimate]) -> bool:
     """Whether all labels are at the same places among the modes of both estimates: no names were exchanged."""
-    first, second = ([(p.parity, p.rank) for model in one.models for p in model.places] for one in two)
+    first, second = ([(p.parity, p.rank) for model in estimate.models for p in model.places] for estimate in estimates)
     return first == second
 
 
@@ -132,20 +134,20 @@ def _is_material(rigidities: Values, inputs: Values) -> bool:
     return bool(inputs["poisson_xy"] ** 2 * rigidities["D_y"] / rigidities["D_x"] < 1.0)
 
 
-def has_settled(step: float, previous: float, accepted: float = _CONVERGED) -> bool:
-    """Whether steps of ln D end here: what they leave is too small to count, or they are small and shrink no more.
+def has_settled(step: float, previous: float, accepted: float = _CONVERGED_STEP) -> bool:
+    """Whether steps of ln D end here: the remaining distance is too small, or steps are small and shrink no more.
 
-    They shrink evenly, so that after one of them there remains about as much of it as there was of the one before.
-    Stiff shear strains and fields of thickness cost the eigen-solves half their digits, so that steps stay at 1e-6.
+    Steps shrink by a constant ratio, so that about step^2 / previous remains after a step. Stiff shear strains and
+    fields of thickness cost the eigen-solves half their digits, so that steps stay at 1e-6.
     """
     remaining = step * min(1.0, step / previous) if np.isfinite(previous) else step
-    return remaining < accepted or previous <= step < _SMALL
+    return remaining < accepted or previous <= step < _SMALL_STEP
 
 
 def starting_rigidities(board: Board) -> Floats:
     """Rough rigidities from Rayleigh quotients of beam-function products, which need no constants: (3,) array, N m.
 
-    A weak pull towards a plate that bends alike both ways keeps within reach what the modes do not tell.
+    A weak pull towards a plate that bends alike both ways keeps constants finite that the modes do not determine.
     """
     from scipy.optimize import nnls
 
@@ -153,11 +155,11 @@ def starting_rigidities(board: Board) -> Floats:
     columns = board.symmetry.columns(inputs["poisson_xy"])
     rows = np.concatenate([_rayleigh_rows(setup, inputs) for setup in board.setups]) @ columns
     squared = np.exp(2.0 * (log_measured(board) + np.log(2.0 * np.pi)))
-    alike = 1.0 / np.mean(rows.sum(axis=1) / squared)
-    weighted = np.concatenate([alike * rows / squared[:, None], _PULL * np.eye(board.symmetry.n)])
-    wanted = np.concatenate([np.ones(squared.size), np.full(board.symmetry.n, _PULL)])
-    constants, _ = nnls(weighted, wanted)
-    return np.asarray(columns @ (alike * np.maximum(constants, 1e-2 * constants.max())))
+    rigidity = 1.0 / np.mean(rows.sum(axis=1) / squared)
+    matrix = np.concatenate([rigidity * rows / squared[:, None], _PULL_WEIGHT * np.eye(board.symmetry.n)])
+    observations = np.concatenate([np.ones(squared.size), np.full(board.symmetry.n, _PULL_WEIGHT)])
+    constants, _ = nnls(matrix, observations)
+    return np.asarray(columns @ (rigidity * np.maximum(constants, 1e-2 * constants.max())))
 
 
 def _rayleigh_rows(setup: Setup, inputs: Values) -> Floats:

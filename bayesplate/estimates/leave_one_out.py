@@ -1,8 +1,8 @@
 """Leave one mode out: refit without it by the exact law, and see how far its frequency is missed.
 
-A mode of leverage above `HIGH_LEVERAGE` alone carries a constant or a size: without it that number is told by nothing,
-and the prediction of the mode, hundreds of cents off, says nothing about the model. Such a mode counts in no error of
-modes left out, and no score; where models are compared, in that of none of them.
+A mode of leverage above `HIGH_LEVERAGE` alone carries a constant or a size: without it no reading determines that
+parameter, and the prediction of the mode, hundreds of cents off, says nothing about the model. Such a mode counts in no
+left-out error and in no score; where models are compared, it counts for none of them.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board
 from bayesplate.effects import EFFECTS
-from bayesplate.effects.words import effect_name, joined
+from bayesplate.effects.words import effect_name, join_words
 from bayesplate.estimates.refit import (
     Bounds,
     Misfit,
@@ -35,34 +35,34 @@ HIGH_LEVERAGE = 0.9
 class Leverages:
     """How much each reading decides its own prediction, to first order."""
 
-    # (n_readings,), 0 to 1; of a mode that was read in several sessions, of these readings together
+    # (n_readings,), 0 to 1; for a mode that was read in several sessions, of these readings together
     values: Floats
     # (n_readings,): parameter that the mode alone carries, constants first; -1: none, or too few modes to leave one out
     carries: Indices
 
 
 @dataclass(frozen=True, eq=False)
-class Errors:
+class PredictionErrors:
     """ln measured - ln predicted of every mode, by one estimator."""
 
     in_sample: Floats  # (n_modes,)
-    # (n_modes,): by a refit without the mode; nan where the others leave a constant open, and everywhere if there are
-    # no more modes than constants
+    # (n_modes,): by a refit without the mode; nan where the other modes leave a constant open, and everywhere if there
+    # are no more modes than constants
     left_out: Floats
     leverages: Leverages  # at the fit of all modes
 
-    def at(self, readings: Indices, n_readings: int) -> Errors:
-        """The errors among those of more readings, by their indices; what the others have is not a number."""
-        in_sample, left_out, values = (np.full(n_readings, none) for none in (np.nan, np.nan, 0.0))
+    def at(self, readings: Indices, n_readings: int) -> PredictionErrors:
+        """The errors placed among those of `n_readings` readings, by their indices; nan for the other readings."""
+        in_sample, left_out, values = (np.full(n_readings, fill) for fill in (np.nan, np.nan, 0.0))
         carries = np.full(n_readings, -1, dtype=np.intp)
         in_sample[readings], left_out[readings] = self.in_sample, self.left_out
         values[readings], carries[readings] = self.leverages.values, self.leverages.carries
-        return Errors(in_sample, left_out, Leverages(values, carries))
+        return PredictionErrors(in_sample, left_out, Leverages(values, carries))
 
 
 @dataclass(frozen=True)
 class CarryingMode:
-    """A mode that alone carries a constant or a size, so that it is left out of every error of modes left out.
+    """A mode that alone carries a constant or a size, so that it does not count in left-out errors.
 
     Attributes
     ----------
@@ -84,7 +84,8 @@ def leverages_of(
     """Leverages of readings that are fitted by weighted squares; zero where the fit has no slopes.
 
     `columns` is (n_readings, n_free): d ln f by ln of the `n_open` free rigidities, and by the standard coordinates of
-    what else is free, whose priors count as one more observation each. A scale is infinite where a reading is not used.
+    the other free parameters, whose priors count as one more observation each. A scale is infinite where a reading is
+    not used.
     """
     weighted = np.nan_to_num(columns / scales[:, None])
     if not np.isfinite(weighted.T @ weighted).all():
@@ -97,10 +98,10 @@ def leverages_of(
     for mode in map(list, modes):
         shares, directions = np.linalg.eigh(hat[np.ix_(mode, mode)])
         values[mode] = shares[-1]
-        if shares[-1] > HIGH_LEVERAGE and len(modes) > n_open:  # of fewer none is left out
-            # what it alone carries is what would be known least well without it
-            told = covariance @ weighted[mode].T @ directions[:, -1]
-            carries[mode] = np.argmax(told**2 / np.maximum(np.diagonal(covariance), np.finfo(float).tiny))
+        if shares[-1] > HIGH_LEVERAGE and len(modes) > n_open:  # of fewer modes none is left out
+            # the mode carries the parameter that would be known least well without it
+            gains = covariance @ weighted[mode].T @ directions[:, -1]
+            carries[mode] = np.argmax(gains**2 / np.maximum(np.diagonal(covariance), np.finfo(float).tiny))
     return Leverages(values, carries)
 
 
@@ -108,39 +109,39 @@ def carrying_modes(board: Board, found: Leverages, names: Sequence[str]) -> tupl
     """The modes of a board that alone carry one of the named parameters, of which the constants come first."""
     return tuple(
         CarryingMode(setup, label, float(leverage), names[column])
-        for (setup, label), leverage, column in zip(_readings(board), found.values, found.carries, strict=True)
+        for (setup, label), leverage, column in zip(_reading_names(board), found.values, found.carries, strict=True)
         if column >= 0
     )
 
 
-def united(*found: Iterable[CarryingMode]) -> tuple[CarryingMode, ...]:
-    """Modes that alone carry something under any of several models: they count under none, told as the first has it."""
+def unite_carrying_modes(*found: Iterable[CarryingMode]) -> tuple[CarryingMode, ...]:
+    """Modes that alone carry a parameter under any of several models, each as under the first: none of them counts."""
     modes: dict[tuple[str, str], CarryingMode] = {}
-    for one in chain.from_iterable(found):
-        modes.setdefault((one.setup, one.label), one)
+    for mode in chain.from_iterable(found):
+        modes.setdefault((mode.setup, mode.label), mode)
     return tuple(modes.values())
 
 
 def indices_of(modes: Iterable[CarryingMode], board: Board) -> tuple[int, ...]:
     """Indices of the readings of some modes among all readings of a board."""
-    named = {(one.setup, one.label) for one in modes}
-    return tuple(i for i, reading in enumerate(_readings(board)) if reading in named)
+    names = {(mode.setup, mode.label) for mode in modes}
+    return tuple(i for i, reading in enumerate(_reading_names(board)) if reading in names)
 
 
 def carrying_sentence(modes: Sequence[CarryingMode]) -> str:
-    """Which modes alone carry what, and what follows; empty where none does."""
+    """Sentence on the modes that alone carry a parameter, and what follows; empty where there are none."""
     if not modes:
         return ""
-    several = len({one.setup for one in modes}) > 1
-    parts = []
-    for one in modes:
-        what = f"the size of {effect_name(one.carries)}" if one.carries in EFFECTS else one.carries
-        parts.append(f"mode {one.label}{f' of {one.setup}' if several else ''} alone carries {what}")
-    those = "it does" if len(modes) == 1 else "they do"
-    return f"{joined(parts)}: {those} not count in the left-out error"
+    has_several_setups = len({mode.setup for mode in modes}) > 1
+    clauses = []
+    for mode in modes:
+        carried = f"the size of {effect_name(mode.carries)}" if mode.carries in EFFECTS else mode.carries
+        clauses.append(f"mode {mode.label}{f' of {mode.setup}' if has_several_setups else ''} alone carries {carried}")
+    verb = "it does" if len(modes) == 1 else "they do"
+    return f"{join_words(clauses)}: {verb} not count in the left-out error"
 
 
-def _readings(board: Board) -> list[tuple[str, str]]:
+def _reading_names(board: Board) -> list[tuple[str, str]]:
     return [(setup.name, str(label)) for setup in board.setups for label in setup.labels]
 
 
@@ -152,38 +153,38 @@ def prediction_errors(
     bounds: Bounds | None = None,
     modes: Sequence[Sequence[int]] | None = None,
     scales: Floats | None = None,
-) -> Errors:
+) -> PredictionErrors:
     """Errors of the most likely constants, in sample and with each mode left out in turn.
 
-    Each fit begins at that of (n_starts, n_free) starts where its own sum of squares is lowest, or at the fit of all
+    Each fit begins where its own sum of squares is lowest, among the (n_starts, n_free) `starts` and the fit of all
     modes: Student's likelihood may have another peak without the mode. `target` is ln of the measured frequencies,
     `modes` the readings of each mode, by default one each, and `scales` weigh the readings in the leverages, by default
     as normal errors.
     """
     n = n_constants(predict)
 
-    def best(starts: Floats, squares: Floats) -> Floats:
-        lost = squares.sum(axis=1) + np.sum(starts[:, n:] ** 2, axis=1)
-        return np.asarray(starts[np.argmin(np.where(np.isfinite(lost), lost, np.inf))])
+    def best_start(starts: Floats, squares: Floats) -> Floats:
+        totals = squares.sum(axis=1) + np.sum(starts[:, n:] ** 2, axis=1)
+        return np.asarray(starts[np.argmin(np.where(np.isfinite(totals), totals, np.inf))])
 
-    def squared(x: Floats) -> Floats:
+    def squared_misfit(x: Floats) -> Floats:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a start may be no plate
             return misfit(predict(x))[0] ** 2
 
-    squares = squared(starts)
-    whole = most_likely(predict, misfit, best(starts, squares), bounds)
-    in_sample = np.asarray(target - predict(whole[None, :])[0])
+    squares = squared_misfit(starts)
+    fit = most_likely(predict, misfit, best_start(starts, squares), bounds)
+    in_sample = np.asarray(target - predict(fit[None, :])[0])
     left_out = np.full(target.size, np.nan)
     modes = [(reading,) for reading in range(target.size)] if modes is None else modes
     if len(modes) > n:
-        starts, squares = (np.concatenate(both) for both in ((starts, whole[None]), (squares, squared(whole[None]))))
-        without = np.stack([best(starts, np.delete(squares, list(mode), axis=1)) for mode in modes])
+        starts, squares = (np.concatenate(pair) for pair in ((starts, fit[None]), (squares, squared_misfit(fit[None]))))
+        fit_starts = np.stack([best_start(starts, np.delete(squares, list(mode), axis=1)) for mode in modes])
         fitted = np.stack(
-            [most_likely(predict, misfit, at, bounds, mode) for at, mode in zip(without, modes, strict=True)]
+            [most_likely(predict, misfit, start, bounds, mode) for start, mode in zip(fit_starts, modes, strict=True)]
         )
-        fitted[~has_come_to_rest(fitted, without, n)] = np.nan
+        fitted[~has_come_to_rest(fitted, fit_starts, n)] = np.nan
         for mode, predicted in zip(map(list, modes), predict(fitted), strict=True):
             left_out[mode] = (target - predicted)[mode]
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # the fit may have run where no plate is
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # the fit may be no plate
         scales = 1.0 / np.abs(misfit(target)[1]) if scales is None else scales
-        return Errors(in_sample, left_out, leverages_of(sensitivities(predict, whole), scales, modes, n))
+        return PredictionErrors(in_sample, left_out, leverages_of(sensitivities(predict, fit), scales, modes, n))

@@ -18,17 +18,17 @@ from bayesplate.frequencies.columns import inverse_lambda
 class PaperSystem:
     """The linear system psi = X d of a board."""
 
-    # (n_modes,), N m: measured omega^2 / lambda, lambda = 1 / (rho h A^2), less what effects give of it
+    # (n_modes,), N m: measured omega^2 / lambda, lambda = 1 / (rho h A^2), less the part due to effects
     psi: Floats
     coefficients: Floats  # X, (n_modes, 3): a, b, c
     values: Values  # nominal inputs, for the moduli
-    origins: tuple[CoefficientRows, ...] = ()  # one a setup
+    origins: tuple[CoefficientRows, ...] = ()  # one per setup
 
     def solve(self, rows: Indices | slice = slice(None)) -> Floats:
         """Unweighted least squares of the modes `rows`, (..., n_some) for many subsets: (..., 3) d_x, d_y, d_s in N m.
 
-        Ducceschi et al., eq. (13). The shortest solution where a subset leaves something open; not a number where it
-        has fewer modes than three, as an isotropic board may.
+        Ducceschi et al., eq. (13). The shortest solution where a subset leaves a constant open; not a number where it
+        has fewer than three modes, as an isotropic board may.
         """
         coefficients, psi = self.coefficients[rows], self.psi[rows]
         if psi.shape[-1] < coefficients.shape[-1]:

@@ -18,7 +18,7 @@ from bayesplate.arrays import Bools, Floats
 from bayesplate.board.material import MODULI
 from bayesplate.estimates.paper import PaperSystem
 
-LOW, HIGH = 20.0, 80.0
+LOW_PERCENTILE, HIGH_PERCENTILE = 20.0, 80.0
 MOST_MODES = 16
 """Beyond this number the subsets (65 399 at 16 modes) are too many to enumerate."""
 
@@ -50,19 +50,19 @@ def percentile_estimate(system: PaperSystem) -> PercentileEstimate | None:
     D_x, D_y, _ = system.solve()
     nu_yx = float(system.values["poisson_xy"]) * D_y / D_x
     estimates = np.stack(system.moduli(constants, nu_yx=nu_yx), axis=-1)
-    kept = np.stack([_trimmed(column) for column in estimates.T], axis=-1)
+    is_kept = np.stack([_trim_mask(column) for column in estimates.T], axis=-1)
     means, sds = {}, {}
-    for name, column, inside in zip(MODULI, estimates.T, kept.T, strict=True):
+    for name, column, inside in zip(MODULI, estimates.T, is_kept.T, strict=True):
         values = column[inside]
         means[name] = float(values.mean()) if values.size else float("nan")
         sds[name] = float(values.std(ddof=1)) if values.size > 1 else float("nan")
-    return PercentileEstimate(estimates, kept, means, sds)
+    return PercentileEstimate(estimates, is_kept, means, sds)
 
 
-def _trimmed(values: Floats) -> Bools:
+def _trim_mask(values: Floats) -> Bools:
     """Which values are positive and lie between the two percentiles of the positive ones."""
     positive = values > 0
     if not positive.any():
         return positive
-    low, high = np.percentile(values[positive], [LOW, HIGH], method="hazen")
+    low, high = np.percentile(values[positive], [LOW_PERCENTILE, HIGH_PERCENTILE], method="hazen")
     return np.asarray(positive & (values >= low) & (values <= high))

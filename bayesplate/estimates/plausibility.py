@@ -1,4 +1,4 @@
-"""What a board's prior foretells of its frequencies, and the one mistake that makes all of them wrong together."""
+"""Prior predictions of a board's frequencies, and mistakes in a card that make all of them wrong together."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from bayesplate.arrays import Floats
-from bayesplate.board.board import Board, density
+from bayesplate.board.board import Board, board_density
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.reading import NO_OFFSET, Reading
@@ -20,20 +20,20 @@ from bayesplate.frequencies.terms import term_weights
 from bayesplate.labels import Label
 from bayesplate.plate.beams import N_BEAMS, product_coefficients
 
-FASTEST = 15_000.0
+FASTEST_SOUND = 15_000.0
 """Speed of sound in m/s that stiffness and density may imply: 5,000 in spruce and steel, 13,000 in carbon fibre."""
 
-SLOWEST = 50.0
+SLOWEST_SOUND = 50.0
 """The same from below, in the stiffer direction: foams have some hundreds."""
 
 
 @dataclass(frozen=True)
-class Suspect:
-    """One mistake that makes all readings wrong together, and the question to ask."""
+class CardMistake:
+    """A mistake that makes all readings wrong together, and the question to ask."""
 
     question: str
-    frequency: float = 1.0  # what the frequencies on the card are, over what they would be in Hz
-    wrong: tuple[tuple[str, float], ...] = ()  # inputs, and what the card says of each over what it would be
+    frequency: float = 1.0  # frequencies as stated by the card, over the true ones in Hz
+    wrong: tuple[tuple[str, float], ...] = ()  # inputs, and the value that the card states over the true value
     exchanged: tuple[str, ...] = ()  # two inputs, or two rigidities
     is_transposed: bool = False  # labels (m,n) are written as (n,m)
     first_label: Label = NO_OFFSET  # where the labels begin, if not where the card says
@@ -44,16 +44,16 @@ class Suspect:
 
     @property
     def speed(self) -> float:
-        """The speed of sound that the card implies, over what it would be: of the side's square over the thickness."""
+        """Speed of sound that the card implies, over the true one: it goes with length^2 / thickness."""
         wrong = dict(self.wrong)
         return float(self.frequency * wrong.get("length_x", 1.0) ** 2 / wrong.get("thickness", 1.0))
 
     def mended(self, values: Mapping[str, Floats]) -> dict[str, Floats]:
-        stated = {name: value for name, value in values.items() if name not in RIGIDITIES or "E_x" not in values}
-        found = with_rigidities(stated | {name: values[name] / factor for name, factor in self.wrong})
-        coupling = found["poisson_xy"] * found["D_y"]
-        found |= dict(zip(self.exchanged, [found[name] for name in reversed(self.exchanged)], strict=True))
-        return found | {"poisson_xy": coupling / found["D_y"]}
+        stated_values = {name: value for name, value in values.items() if name not in RIGIDITIES or "E_x" not in values}
+        inputs = with_rigidities(stated_values | {name: values[name] / factor for name, factor in self.wrong})
+        coupling = inputs["poisson_xy"] * inputs["D_y"]
+        inputs |= dict(zip(self.exchanged, [inputs[name] for name in reversed(self.exchanged)], strict=True))
+        return inputs | {"poisson_xy": coupling / inputs["D_y"]}
 
     def beams(self, reading: Reading, first: Label) -> tuple[int, int]:
         """Orders of the beam functions that a label would name; negative where there is no such mode."""
@@ -65,50 +65,52 @@ class Suspect:
 
 _SIDES = ("length_x", "length_y")
 _LENGTHS = (*_SIDES, "thickness")
-SUSPECTS = (
-    Suspect("in rad/s? in Hz they are that over 2 pi = 6.28", frequency=2.0 * np.pi),
-    Suspect("in kHz? 1 kHz is 1000 Hz", frequency=1e-3),
-    Suspect("are length_x_mm and length_y_mm in cm? 1 cm is 10 mm", wrong=tuple((side, 0.1) for side in _SIDES)),
-    Suspect("are length_x_mm and length_y_mm ten times too large?", wrong=tuple((side, 10.0) for side in _SIDES)),
-    Suspect("is thickness_mm ten times too large?", wrong=(("thickness", 10.0),)),
-    Suspect("is thickness_mm ten times too small?", wrong=(("thickness", 0.1),)),
-    Suspect("are all three lengths in cm?", wrong=tuple((size, 0.1) for size in _LENGTHS)),
-    Suspect("are all three lengths ten times too large?", wrong=tuple((size, 10.0) for size in _LENGTHS)),
-    Suspect(
+CARD_MISTAKES = (
+    CardMistake("in rad/s? in Hz they are that over 2 pi = 6.28", frequency=2.0 * np.pi),
+    CardMistake("in kHz? 1 kHz is 1000 Hz", frequency=1e-3),
+    CardMistake("are length_x_mm and length_y_mm in cm? 1 cm is 10 mm", wrong=tuple((side, 0.1) for side in _SIDES)),
+    CardMistake("are length_x_mm and length_y_mm ten times too large?", wrong=tuple((side, 10.0) for side in _SIDES)),
+    CardMistake("is thickness_mm ten times too large?", wrong=(("thickness", 10.0),)),
+    CardMistake("is thickness_mm ten times too small?", wrong=(("thickness", 0.1),)),
+    CardMistake("are all three lengths in cm?", wrong=tuple((size, 0.1) for size in _LENGTHS)),
+    CardMistake("are all three lengths ten times too large?", wrong=tuple((size, 10.0) for size in _LENGTHS)),
+    CardMistake(
         "are length_x_mm and length_y_mm in inches? 1 inch is 25.4 mm", wrong=tuple((side, 1 / 25.4) for side in _SIDES)
     ),
-    Suspect("are all three lengths in inches? 1 inch is 25.4 mm", wrong=tuple((size, 1 / 25.4) for size in _LENGTHS)),
-    Suspect("is thickness_mm in thousandths of an inch? 118 of them are 3 mm", wrong=(("thickness", 1 / 0.0254),)),
-    Suspect("are the constants of the prior in MPa? 1 GPa is 1000 MPa", frequency=1e-3**0.5),
-    Suspect("are length_x_mm and length_y_mm exchanged? x is along the grain", exchanged=_SIDES),
-    Suspect("is y along the grain in all of the card? x should be", exchanged=("D_x", "D_y")),
-    Suspect("are all labels (m,n) written as (n,m)?", is_transposed=True),
-    Suspect("does m count from 1 in all labels? then first_label = [1, 0]", first_label=Label(1, 0)),
-    Suspect("does n count from 1 in all labels? then first_label = [0, 1]", first_label=Label(0, 1)),
-    Suspect("do m and n count from 1 in all labels? then first_label = [1, 1]", first_label=Label(1, 1)),
+    CardMistake(
+        "are all three lengths in inches? 1 inch is 25.4 mm", wrong=tuple((size, 1 / 25.4) for size in _LENGTHS)
+    ),
+    CardMistake("is thickness_mm in thousandths of an inch? 118 of them are 3 mm", wrong=(("thickness", 1 / 0.0254),)),
+    CardMistake("are the constants of the prior in MPa? 1 GPa is 1000 MPa", frequency=1e-3**0.5),
+    CardMistake("are length_x_mm and length_y_mm exchanged? x is along the grain", exchanged=_SIDES),
+    CardMistake("is y along the grain in all of the card? x should be", exchanged=("D_x", "D_y")),
+    CardMistake("are all labels (m,n) written as (n,m)?", is_transposed=True),
+    CardMistake("does m count from 1 in all labels? then first_label = [1, 0]", first_label=Label(1, 0)),
+    CardMistake("does n count from 1 in all labels? then first_label = [0, 1]", first_label=Label(0, 1)),
+    CardMistake("do m and n count from 1 in all labels? then first_label = [1, 1]", first_label=Label(1, 1)),
 )
-"""What makes all frequencies wrong by one mistake, and lengths and constants that one mistake exchanges."""
+"""Mistakes that make all frequencies wrong, and mistakes that exchange lengths or constants."""
 
-_AS_STATED = Suspect("")
+_NO_MISTAKE = CardMistake("")
 
 _SLACK = 0.1
-"""Relative error of a Rayleigh quotient, of the noise, and of what an effect that is not modelled does, in all."""
+"""Relative error of Rayleigh quotients, noise and unmodelled effects together."""
 
 _IMPROBABLE, _PROBABLE = 1e-4, 1e-2
-_AS_NEAR = 6.0  # a factor 20 of the density
+_NEAR_DISTANCE = 6.0  # a factor 20 of the density
 _N_DRAWS = 4000
 _FEWEST_POSSIBLE = 0.05
-"""Share of the draws that must be of a material: elsewhere those few say nothing of the others."""
+"""Least share of draws that are a possible material: fewer do not represent the prior."""
 
 _FEWEST_OTHERS, _MOST_STRAYS = 4, 2
-"""Readings beside one that is asked about, at least; and readings asked about, at most: more say nothing."""
+"""Least number of other readings for a question about a single reading, and most readings to ask about together."""
 
-_WITHIN = (0.025, 0.975)
+_BAND = (0.025, 0.975)
 
 
 @dataclass(frozen=True, eq=False)
 class PriorPredictive:
-    """What the prior of a board foretells of its readings."""
+    """Prior predictive distribution of a board's readings."""
 
     draws: Floats  # (n_draws, n_readings) ln f (Hz), setup after setup; a row shares its constants
 
@@ -125,16 +127,16 @@ class PriorPredictive:
 
         About chi-squared with a degree of freedom for each reading where the prior holds.
         """
-        off = log_frequencies - self.draws.mean(axis=0)
-        return float(off @ np.linalg.solve(self._covariance, off))
+        offsets = log_frequencies - self.draws.mean(axis=0)
+        return float(offsets @ np.linalg.solve(self._covariance, offsets))
 
     def without(self, reading: int, log_frequencies: Floats) -> tuple[float, float]:
-        """Distance of all readings but one, and ln f that they expect of that one."""
-        others = np.delete(np.arange(log_frequencies.size), reading)
-        off = log_frequencies[others] - self.draws.mean(axis=0)[others]
-        pulled = np.linalg.solve(self._covariance[np.ix_(others, others)], off)
-        expected = self.draws[:, reading].mean() + self._covariance[reading, others] @ pulled
-        return float(off @ pulled), float(expected)
+        """Distance of all readings but one, and the ln f that they predict for that one."""
+        other_readings = np.delete(np.arange(log_frequencies.size), reading)
+        offsets = log_frequencies[other_readings] - self.draws.mean(axis=0)[other_readings]
+        weights = np.linalg.solve(self._covariance[np.ix_(other_readings, other_readings)], offsets)
+        expected = self.draws[:, reading].mean() + self._covariance[reading, other_readings] @ weights
+        return float(offsets @ weights), float(expected)
 
     @property
     def _covariance(self) -> Floats:
@@ -142,112 +144,121 @@ class PriorPredictive:
 
 
 def prior_predictive(
-    board: Board, prior: PriorCard, rng: np.random.Generator, suspects: Sequence[Suspect] = (_AS_STATED,)
+    board: Board, prior: PriorCard, rng: np.random.Generator, suspects: Sequence[CardMistake] = (_NO_MISTAKE,)
 ) -> list[PriorPredictive | None]:
     """Frequencies of a board's labelled modes under its prior, from Rayleigh quotients of beam-function products.
 
-    A few per cent off each frequency, of the bare thin plate; inputs that are uncertain are drawn too. One result for
-    each mistake that is mended first; None where a label would name no mode, or no draw is a material.
+    Frequencies are those of the bare thin plate and err by a few per cent; uncertain inputs are drawn too. One result
+    for each of the `suspects`, whose mistake is corrected first; None where a label would name no mode, or too few
+    draws are a material.
     """
     values = prior_draws(board, prior, rng, _N_DRAWS)
     products = [product_coefficients(setup.ends_x, setup.ends_y) for setup in board.setups]
-    return [_predicted(board, products, values, suspect) for suspect in suspects]
+    return [_predict_readings(board, products, values, suspect) for suspect in suspects]
 
 
-def _predicted(
-    board: Board, products: Sequence[Floats], values: Mapping[str, Floats], suspect: Suspect
+def _predict_readings(
+    board: Board, products: Sequence[Floats], values: Mapping[str, Floats], mistake: CardMistake
 ) -> PriorPredictive | None:
-    mended, columns = suspect.mended(values), []
+    mended, columns = mistake.mended(values), []
     for setup, coefficients in zip(board.setups, products, strict=True):
         weights = term_weights(mended, setup).stiffness
         for reading in setup.readings:
-            i, j = suspect.beams(reading, setup.first_label)
+            i, j = mistake.beams(reading, setup.first_label)
             if min(i, j) < 0 or max(i, j) >= N_BEAMS:
                 return None
             columns.append(weights @ coefficients[:, i, j])
     squared = np.column_stack(columns)
-    possible = np.all(np.isfinite(squared) & (squared > 0), axis=1)
-    if possible.mean() < _FEWEST_POSSIBLE:
+    is_possible = np.all(np.isfinite(squared) & (squared > 0), axis=1)
+    if is_possible.mean() < _FEWEST_POSSIBLE:
         return None
-    hertz = 0.5 * np.log(squared[possible]) - np.log(2.0 * np.pi)
-    return PriorPredictive(hertz + np.log(suspect.frequency))
+    log_hertz = 0.5 * np.log(squared[is_possible]) - np.log(2.0 * np.pi)
+    return PriorPredictive(log_hertz + np.log(mistake.frequency))
 
 
 def require_plausible(board: Board, prior: PriorCard, rng: np.random.Generator) -> None:
-    """Ask about the one mistake that makes all readings wrong together, where there is one; refuse the impossible.
+    """Refuse a card whose readings are all wrong by one mistake, with a question about it, or that is impossible.
 
-    Asked where the readings are out of the prior's reach, or would need a material that there is not, and mending one
-    of `SUSPECTS` brings them within it. Refused in any case where no material carries sound so fast or so slowly.
-    InputError for units and for the impossible, NotIdentifiableError for sides, constants or orders that stand for each
-    other.
+    The question is asked where the readings are out of the prior's reach, or would need a material that does not exist,
+    and correcting one of `CARD_MISTAKES` brings them within reach. A card is refused in any case where no material
+    carries sound so fast or so slowly. InputError for units and for the impossible, NotIdentifiableError for sides,
+    constants or orders that are exchanged.
     """
     if not all(setup.readings for setup in board.setups):  # refused later, or still to be measured
         return
     speed, ratio = speed_and_ratio(board)
     is_material = bool(board.nominal()["poisson_xy"] ** 2 * ratio < 1.0)
-    fault = _contradiction(board, prior, speed, rng) if is_material else _no_material(board, ratio)
+    fault = _prior_fault(board, prior, speed, rng) if is_material else _material_fault(board, ratio)
     if fault is None:
         return
-    likeliest = _likeliest(
+    likely_mistakes = _likeliest_mistakes(
         board,
         prior,
-        [one for one in SUSPECTS if SLOWEST < speed / one.speed < FASTEST and (is_material or not one.is_of_a_unit)],
+        [
+            mistake
+            for mistake in CARD_MISTAKES
+            if SLOWEST_SOUND < speed / mistake.speed < FASTEST_SOUND and (is_material or not mistake.is_of_a_unit)
+        ],
         rng,
     )
-    questions = [one.question for one in likeliest]
-    if not is_material and not likeliest:
-        questions = _strays(board, prior, rng)
-    asked = replace(fault, remedy="; ".join(filter(None, (*questions, fault.remedy))))
-    if any(one.is_of_a_unit for one in likeliest):
-        raise InputError(asked)
-    if likeliest or not is_material:
-        raise NotIdentifiableError(str(asked))
-    if not SLOWEST < speed < FASTEST:
-        raise InputError(asked)
+    questions = [mistake.question for mistake in likely_mistakes]
+    if not is_material and not likely_mistakes:
+        questions = _stray_questions(board, prior, rng)
+    refusal = replace(fault, remedy="; ".join(filter(None, (*questions, fault.remedy))))
+    if any(mistake.is_of_a_unit for mistake in likely_mistakes):
+        raise InputError(refusal)
+    if likely_mistakes or not is_material:
+        raise NotIdentifiableError(str(refusal))
+    if not SLOWEST_SOUND < speed < FASTEST_SOUND:
+        raise InputError(refusal)
 
 
-def _likeliest(board: Board, prior: PriorCard, suspects: Sequence[Suspect], rng: np.random.Generator) -> list[Suspect]:
-    """The suspects that bring the readings within the prior's reach, all that are hardly farther off than the best."""
+def _likeliest_mistakes(
+    board: Board, prior: PriorCard, mistakes: Sequence[CardMistake], rng: np.random.Generator
+) -> list[CardMistake]:
+    """Mistakes whose correction brings the readings within the prior's reach: the best one, and all almost as good."""
     measured = log_measured(board)
-    mended = prior_predictive(board, prior, rng, suspects)
-    distances = [np.inf if found is None else found.distance(measured) for found in mended]
+    predictives = prior_predictive(board, prior, rng, mistakes)
+    distances = [np.inf if predictive is None else predictive.distance(measured) for predictive in predictives]
     nearest = min(distances, default=np.inf)
     if chdtrc(measured.size, nearest) < _PROBABLE:
         return []
-    return [one for one, distance in zip(suspects, distances, strict=True) if distance < nearest + _AS_NEAR]
+    return [
+        mistake for mistake, distance in zip(mistakes, distances, strict=True) if distance < nearest + _NEAR_DISTANCE
+    ]
 
 
-def _strays(board: Board, prior: PriorCard, rng: np.random.Generator) -> list[str]:
-    """Questions after the one reading without which the others are within the prior's reach; none where any may be."""
-    (found,) = prior_predictive(board, prior, rng)
+def _stray_questions(board: Board, prior: PriorCard, rng: np.random.Generator) -> list[str]:
+    """Questions about a single wrong reading, without which the others are within the prior's reach."""
+    (predictive,) = prior_predictive(board, prior, rng)
     measured = log_measured(board)
-    if found is None or measured.size <= _FEWEST_OTHERS:
+    if predictive is None or measured.size <= _FEWEST_OTHERS:
         return []
-    alone = [found.without(i, measured) for i in range(measured.size)]
-    nearest = min(distance for distance, _ in alone)
+    predictions = [predictive.without(i, measured) for i in range(measured.size)]
+    nearest = min(distance for distance, _ in predictions)
     if chdtrc(measured.size - 1, nearest) < _PROBABLE:
         return []
-    asked = [
-        f"is {name} at {np.exp(read):.4g} Hz right? the others expect about {float(f'{np.exp(expected):.2g}'):g} Hz"
-        for name, read, (distance, expected) in zip(board.short_reading_names, measured, alone, strict=True)
-        if distance < nearest + _AS_NEAR
+    questions = [
+        f"is {name} at {np.exp(log_f):.4g} Hz right? the others expect about {float(f'{np.exp(expected):.2g}'):g} Hz"
+        for name, log_f, (distance, expected) in zip(board.short_reading_names, measured, predictions, strict=True)
+        if distance < nearest + _NEAR_DISTANCE
     ]
-    return asked if len(asked) <= _MOST_STRAYS else []
+    return questions if len(questions) <= _MOST_STRAYS else []
 
 
-def _no_material(board: Board, ratio: float) -> Fault:
-    """The fault that the ratio of the constants is larger than nu_xy allows: no material is like that."""
+def _material_fault(board: Board, ratio: float) -> Fault:
+    """The fault that the ratio of the constants is larger than nu_xy allows for any material."""
     wanted = (
         f"a plate of a material: nu_xy nu_yx is below 1, so E_y below {board.nominal()['poisson_xy'] ** -2:.3g} E_x"
     )
     return Fault(f"{board.name}.toml", wanted, f"frequencies with E_y about {ratio:.3g} E_x", "or a smaller poisson_xy")
 
 
-def _contradiction(board: Board, prior: PriorCard, speed: float, rng: np.random.Generator) -> Fault | None:
-    """The fault that no material carries sound as the readings want, or that they are out of the prior's reach."""
+def _prior_fault(board: Board, prior: PriorCard, speed: float, rng: np.random.Generator) -> Fault | None:
+    """The fault that no material carries sound as the readings imply, or that they are out of the prior's reach."""
     place = f"{board.name}.toml frequencies_hz"
-    if not SLOWEST < speed < FASTEST:
-        wanted = f"those of a material that carries sound at {SLOWEST:g} to {FASTEST:g} m/s"
+    if not SLOWEST_SOUND < speed < FASTEST_SOUND:
+        wanted = f"those of a material that carries sound at {SLOWEST_SOUND:g} to {FASTEST_SOUND:g} m/s"
         return Fault(place, wanted, f"{speed:.3g} m/s", "are units, sizes and labels right?")
     measured = log_measured(board)
     (predicted,) = prior_predictive(board, prior, rng)
@@ -255,14 +266,14 @@ def _contradiction(board: Board, prior: PriorCard, speed: float, rng: np.random.
         return None
     readings = [reading for setup in board.setups for reading in setup.readings]
     worst = int(np.argmax(np.abs(measured - predicted.median) / np.hypot(predicted.spread, _SLACK)))
-    low, high = np.exp(np.quantile(predicted.draws[:, worst], _WITHIN))
+    low, high = np.exp(np.quantile(predicted.draws[:, worst], _BAND))
     wanted = f"those that the prior '{prior.name}' foretells, {readings[worst].label} at {low:.3g} to {high:.3g} Hz"
-    got = f"{readings[worst].frequency.mean:.4g} Hz"
-    return Fault(place, wanted, got, "or another prior, if nothing is wrong")
+    stated = f"{readings[worst].frequency.mean:.4g} Hz"
+    return Fault(place, wanted, stated, "or another prior, if nothing is wrong")
 
 
 def speed_and_ratio(board: Board) -> tuple[float, float]:
     """Speed of sound in the stiffer direction, sqrt(12 D / rho h^3) in m/s, and D_y / D_x, from rough rigidities."""
     values = board.nominal()
     D_x, D_y, _ = starting_rigidities(board)
-    return float(np.sqrt(12.0 * max(D_x, D_y) / (density(values) * values["thickness"] ** 3))), float(D_y / D_x)
+    return float(np.sqrt(12.0 * max(D_x, D_y) / (board_density(values) * values["thickness"] ** 3))), float(D_y / D_x)

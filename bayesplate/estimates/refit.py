@@ -20,16 +20,16 @@ standard coordinates of the uncertain inputs, each of which counts as one more o
 one.
 """
 Misfit = Callable[[Floats], tuple[Floats, Floats]]
-"""From (..., n_modes) logarithms of frequencies to what is squared and summed over the readings, and its derivatives.
+"""From (..., n_modes) logarithms of frequencies to residuals, which are squared and summed, and their derivatives.
 
-Half the sum is the negative log likelihood of the readings but for a constant.
+Half the sum is the negative log likelihood of the readings up to a constant.
 """
 
 _STEP = 1e-5
 _REACH = 7.0
-"""Change of ln D, from where a fit begins, up to which constants are looked for: a thousandfold."""
-_EDGE = 0.9
-"""Share of it beyond which a fit has not come to rest: readings that leave a constant open lead there."""
+"""Largest change of ln D from the start of a fit: a thousandfold."""
+_REST_SHARE = 0.9
+"""Share of `_REACH` beyond which a fit has not come to rest: readings that leave a constant open lead there."""
 _LEAST_GAIN = 1e-6
 """Share of the misfit that a step within bounds has to gain: less moves a parameter by a small part of its standard
 error, and along a bent valley there are hundreds of such steps."""
@@ -64,11 +64,14 @@ def normal_misfit(target: Floats, scales: Floats) -> Misfit:
 
 def deviance_misfit(errors: Sequence[ReadingErrors], noise: Sequence[float] | Floats) -> Misfit:
     """Signed deviance residuals of all readings, setup after setup, at one relative noise per setup."""
-    ends = np.cumsum([one.frequency.size for one in errors])[:-1]
+    ends = np.cumsum([setup_errors.frequency.size for setup_errors in errors])[:-1]
 
     def misfit(predicted: Floats) -> tuple[Floats, Floats]:
-        parts = zip(errors, np.split(predicted, ends, axis=-1), noise, strict=True)
-        residuals, slopes = zip(*(one.deviance_residuals(part, level) for one, part, level in parts), strict=True)
+        rows = zip(errors, np.split(predicted, ends, axis=-1), noise, strict=True)
+        residuals, slopes = zip(
+            *(setup_errors.deviance_residuals(log_frequencies, level) for setup_errors, log_frequencies, level in rows),
+            strict=True,
+        )
         return np.concatenate(residuals, axis=-1), np.concatenate(slopes, axis=-1)
 
     return misfit
@@ -86,16 +89,16 @@ def most_likely(
 
     n = n_constants(predict)
 
-    def without(rows: Floats) -> Floats:
+    def drop_left_out(rows: Floats) -> Floats:
         return np.delete(rows, left_out, axis=0) if len(left_out) else rows
 
     def residuals(x: Floats) -> Floats:
-        found = np.concatenate([without(misfit(predict(x[None, :])[0])[0]), x[n:]])
-        return found if _distance(x, start, n) <= _REACH else np.full_like(found, np.nan)
+        misfits = np.concatenate([drop_left_out(misfit(predict(x[None, :])[0])[0]), x[n:]])
+        return misfits if _largest_change(x, start, n) <= _REACH else np.full_like(misfits, np.nan)
 
     def jacobian(x: Floats) -> Floats:
         chained = misfit(predict(x[None, :])[0])[1][:, None] * sensitivities(predict, x)
-        slopes = np.nan_to_num(without(chained), posinf=0.0, neginf=0.0)  # beside a place without frequencies
+        slopes = np.nan_to_num(drop_left_out(chained), posinf=0.0, neginf=0.0)  # beside a place without frequencies
         return np.concatenate([slopes, np.eye(x.size)[n:]])
 
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -108,19 +111,19 @@ def most_likely(
 
 
 def has_come_to_rest(fitted: Floats, starts: Floats, n: int) -> Bools:
-    """Whether (..., n_free) fits ended well within reach of their starts: else nothing tells the n constants."""
-    return np.asarray(_distance(fitted, starts, n) <= _EDGE * _REACH)
+    """Whether (..., n_free) fits ended well within reach of their starts: else the n constants are not determined."""
+    return np.asarray(_largest_change(fitted, starts, n) <= _REST_SHARE * _REACH)
 
 
-def _distance(x: Floats, start: Floats, n: int) -> Floats:
+def _largest_change(x: Floats, start: Floats, n: int) -> Floats:
     """The largest change of ln D; not a number where x is none."""
     return np.asarray(np.abs(x[..., :n] - start[..., :n]).max(axis=-1))
 
 
-def design(predict: Predict, scales: Floats, at: Floats) -> Floats:
+def design_matrix(predict: Predict, scales: Floats, at: Floats) -> Floats:
     """Weighted sensitivities of all observations at a point: (n_modes + n_inputs, n_free) array."""
-    own = np.eye(at.size)[n_constants(predict) :]
-    return np.concatenate([sensitivities(predict, at) / scales[:, None], own])
+    prior_rows = np.eye(at.size)[n_constants(predict) :]
+    return np.concatenate([sensitivities(predict, at) / scales[:, None], prior_rows])
 
 
 def sensitivities(predict: Predict, at: Floats) -> Floats:
@@ -129,6 +132,6 @@ def sensitivities(predict: Predict, at: Floats) -> Floats:
     Those of its tangent where the predictor has one: a single solution of the modes gives them all.
     """
     steps = _STEP * np.eye(at.size)
-    near = predict.tangent(at) if isinstance(predict, Predictor) else predict
-    both = near(np.concatenate([at + steps, at - steps]))
-    return np.asarray(((both[: at.size] - both[at.size :]) / (2 * _STEP)).T)
+    law = predict.tangent(at) if isinstance(predict, Predictor) else predict
+    log_frequencies = law(np.concatenate([at + steps, at - steps]))
+    return np.asarray(((log_frequencies[: at.size] - log_frequencies[at.size :]) / (2 * _STEP)).T)

@@ -1,4 +1,4 @@
-"""The lowest modes of a setup as a sheet shows them: names, frequencies, energies, shapes, and their combinations."""
+"""The lowest modes of a setup for its sheet: names, frequencies, energies, shapes, and combined modes."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.effects.part import aspect_ratio_of
-from bayesplate.frequencies.columns import columns
+from bayesplate.frequencies.columns import modal_coefficients
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.frequencies.spectrum import NamedMode, spectrum
-from bayesplate.frequencies.system import Limits, System
-from bayesplate.plate.naming import reaching
-from bayesplate.plate.solve import Modes, collect, solve_classes
+from bayesplate.frequencies.system import System, WidthLimits
+from bayesplate.plate.naming import modes_to_hold
+from bayesplate.plate.solve import Modes, collect_modes, solve_classes
 
-COMBINED = ("alpha", "beta", "gamma")
-"""Combined modes for D_x, D_y and D_s: mixtures of modes that would each answer to one constant alone."""
+COMBINED_NAMES = ("alpha", "beta", "gamma")
+"""Combined modes for D_x, D_y and D_s: mixtures of modes that each depend on one constant alone."""
 
 NUMBERS_OF_MODES = (12, 16, 20)
-"""The first that holds every measured label; beyond the last the highest are not shown."""
+"""Numbers of modes to solve for: the first that includes every measured label, or the last."""
 
 LOWEST_COMBINED = 12
-"""Modes that are combined where too few were measured: the lowest six of a long board hardly bend one way."""
+"""Modes that are combined where too few were measured: the lowest six of a long board hardly bend in one direction."""
 
 _GRID = 121
 N_POINTS = 61
@@ -45,7 +45,7 @@ class SheetMode:
     band_hz: tuple[float, float] | None  # where it is expected two times in three
     shares: Floats  # (4,): of D_x, D_y, D_s and of effects in its energy
     coefficients: Floats  # (3,): the paper's a, b, c
-    shape: Floats  # (n_x, n_y): as `sampled` at `points`
+    shape: Floats  # (n_x, n_y): of `sample_shapes` at `grid_points`
 
     @property
     def miss_cents(self) -> float | None:
@@ -55,7 +55,7 @@ class SheetMode:
 
 @dataclass(frozen=True, eq=False)
 class CombinedMode:
-    """A mixture of modes that answers to one constant alone: name, modulus, weight of each mode, shape."""
+    """A mixture of modes that depends on one constant alone: name, modulus, weight of each mode, shape."""
 
     name: str
     modulus: str
@@ -77,21 +77,21 @@ class Sheet:
     modes: tuple[SheetMode, ...]  # in the order of frequency
     combined: tuple[CombinedMode, ...]  # empty where the modes do not tell the constants apart
     likely: str = ""  # what the bands come from
-    # where the board begins and ends along y at `points`, as fractions of its widest width; None: a rectangle
-    limits: Limits | None = None
+    # where the board begins and ends along y at `grid_points`, as fractions of its widest width; None: a rectangle
+    limits: WidthLimits | None = None
     isotropic: bool = False
 
     def drawn_at(self, x: float, y: float) -> tuple[float, float]:
         """A place, as fractions of the length and of the width there, as fractions of the sides that are drawn."""
         if self.limits is None:
             return x, y
-        low, high = (float(np.interp(x, points(), limit)) for limit in self.limits)
+        low, high = (float(np.interp(x, grid_points(), limit)) for limit in self.limits)
         return x, low + y * (high - low)
 
 
 @dataclass(frozen=True, eq=False)
 class Precision:
-    """What the modes measured so far foretell of the others."""
+    """Precision with which the modes measured so far predict the others."""
 
     covariance: Floats  # (3, 3): of ln D_x, ln D_y, ln D_s
     noise: Mapping[str, float]  # relative, by setup
@@ -103,12 +103,12 @@ class Precision:
         return frequency / factor, frequency * factor
 
 
-def points(n: int = _GRID) -> Floats:
+def grid_points(n: int = _GRID) -> Floats:
     """Points of each side, (n,) fractions of it, at which shapes are sampled, all a hair within the edges."""
     return np.linspace(1e-3, 1.0 - 1e-3, n)
 
 
-def sampled(modes: Modes, limits: Limits | None, grid: Floats) -> Floats:
+def sample_shapes(modes: Modes, limits: WidthLimits | None, grid: Floats) -> Floats:
     """Deflections of modes, (n_modes, n, n), positive next to the corner of x1 and y1.
 
     The grid is in fractions of the length, and of the width at each of its points; `limits` are those of the plate
@@ -146,10 +146,10 @@ def sheet(
         modes, named = spectrum(system, values, n_modes)
         if set(measured) <= {mode.name for mode in named}:
             break
-    found = columns(system, values, modes.coefficients)
-    shares = found.shares(np.array([float(values[name]) for name in RIGIDITIES]))
-    limits = system.limits(points())
-    shapes = sampled(modes, limits, points())
+    modal = modal_coefficients(system, values, modes.coefficients)
+    shares = modal.shares(np.array([float(values[name]) for name in RIGIDITIES]))
+    limits = system.limits(grid_points())
+    shapes = sample_shapes(modes, limits, grid_points())
     rows = tuple(
         SheetMode(
             name=mode.name,
@@ -161,18 +161,18 @@ def sheet(
                 else _band(mode, bands)
             ),
             shares=shares[i],
-            coefficients=found.coefficients[i],
+            coefficients=modal.coefficients[i],
             shape=shapes[i],
         )
         for i, mode in enumerate(named)
     )
     title = board.title or board.name
     ratio = aspect_ratio_of(system.adjusted(values), setup)
-    first = str(setup.first_label)
-    likely = "" if all(row.band_hz is None for row in rows) else _BY_MODES if precision is not None else _BY_PRIOR
-    mixtures = _combined(rows)
+    first_label = str(setup.first_label)
+    band_source = "" if all(row.band_hz is None for row in rows) else _BY_MODES if precision is not None else _BY_PRIOR
+    mixtures = _combined_modes(rows)
     return Sheet(
-        title, setup.name, setup.edges, first, ratio, system.theory, basis, rows, mixtures, likely, limits,
+        title, setup.name, setup.edges, first_label, ratio, system.theory, basis, rows, mixtures, band_source, limits,
         board.isotropic,
     )  # fmt: skip
 
@@ -184,23 +184,23 @@ def _band(mode: NamedMode, bands: Mapping[str, tuple[float, float]] | None) -> t
     return low * mode.frequency, high * mode.frequency
 
 
-def _combined(modes: tuple[SheetMode, ...]) -> tuple[CombinedMode, ...]:
+def _combined_modes(modes: tuple[SheetMode, ...]) -> tuple[CombinedMode, ...]:
     """Combinations of the measured modes, or of the lowest where fewer than three were measured."""
     named = [mode for mode in modes if mode.name.startswith("(")]
     measured = [mode for mode in named if mode.measured_hz is not None]
-    used = measured if len(measured) >= len(RIGIDITIES) else named[:LOWEST_COMBINED]
-    if len(used) < len(RIGIDITIES):
+    combined = measured if len(measured) >= len(RIGIDITIES) else named[:LOWEST_COMBINED]
+    if len(combined) < len(RIGIDITIES):
         return ()
-    coefficients = np.stack([mode.coefficients for mode in used])
-    shapes = combined_shapes(coefficients, np.stack([mode.shape for mode in used]))
-    mixtures = combination(coefficients)
+    coefficients = np.stack([mode.coefficients for mode in combined])
+    shapes = combined_shapes(coefficients, np.stack([mode.shape for mode in combined]))
+    mixtures = combination_weights(coefficients)
     return tuple(
-        CombinedMode(name, modulus, {m.name: float(w) for m, w in zip(used, row, strict=True)}, shape)
-        for name, modulus, row, shape in zip(COMBINED, MODULI, mixtures, shapes, strict=True)
+        CombinedMode(name, modulus, {m.name: float(w) for m, w in zip(combined, row, strict=True)}, shape)
+        for name, modulus, row, shape in zip(COMBINED_NAMES, MODULI, mixtures, shapes, strict=True)
     )
 
 
-def combination(coefficients: Floats) -> Floats:
+def combination_weights(coefficients: Floats) -> Floats:
     """How much of each mode makes each combined mode, (3, n_modes): the inverse of X = (a, b, c) by Moore and Penrose.
 
     Its product with X is the unit matrix: the combined psi are d_x, d_y and d_s (Ducceschi et al., section 3).
@@ -219,7 +219,7 @@ def combined_shapes(coefficients: Floats, shapes: Floats) -> Floats:
     """
     norms = np.sqrt(np.sum(shapes**2, axis=(1, 2)))
     units = shapes * (corner_signs(shapes) / norms)[:, None, None]
-    return np.asarray(np.tensordot(combination(coefficients), units, axes=1))
+    return np.asarray(np.tensordot(combination_weights(coefficients), units, axes=1))
 
 
 def corner_signs(shapes: Floats) -> Floats:
@@ -230,19 +230,19 @@ def corner_signs(shapes: Floats) -> Floats:
 
 
 def labelled_shapes(models: Sequence[SetupModel], values: Values) -> dict[str, dict[str, Floats]]:
-    """Shapes of every labelled mode by setup and label, as `sampled` at `points(N_POINTS)`.
+    """Shapes of every labelled mode by setup and label, of `sample_shapes` at `grid_points(N_POINTS)`.
 
     A label means a rank within a symmetry class, as in the likelihood.
     """
-    grid = points(N_POINTS)
+    grid = grid_points(N_POINTS)
     result = {}
     for model in models:
         weights = model.system.weights(values).at(0)
-        modes = collect(model.plate, solve_classes(model.plate, weights, reaching(model.places)))
-        where = {place: i for i, place in enumerate(zip(modes.parities, modes.ranks.tolist(), strict=True))}
-        shapes = sampled(modes, model.system.limits(grid), grid)
+        modes = collect_modes(model.plate, solve_classes(model.plate, weights, modes_to_hold(model.places)))
+        rows = {place: i for i, place in enumerate(zip(modes.parities, modes.ranks.tolist(), strict=True))}
+        shapes = sample_shapes(modes, model.system.limits(grid), grid)
         result[model.setup.name] = {
-            str(label): shapes[where[place.parity, place.rank]]
+            str(label): shapes[rows[place.parity, place.rank]]
             for label, place in zip(model.setup.labels, model.places, strict=True)
         }
     return result

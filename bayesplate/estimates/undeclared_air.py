@@ -1,4 +1,4 @@
-"""The air that nobody declares: by how much its mass would raise the constants of a board in a room."""
+"""Air that a card does not declare: by how much its mass would raise the constants of a board in a room."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bayesplate.estimates.least_squares import Estimate
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import System
 
-SMALLEST = 0.005
+SMALLEST_RISE = 0.005
 """Relative rise of a constant below which nothing is said."""
 
 
@@ -44,16 +44,16 @@ def rise_with_air(board: Board, estimate: Estimate) -> Floats:
 
 
 def air_sentence(board: Board, estimate: Estimate) -> str:
-    """What the constants leave out of the air, and the two lines that put it in; empty where it is in or hardly any."""
+    """Sentence on the shift of the constants by undeclared air, and how to declare it; empty where it is small."""
     rise = rise_with_air(board, estimate)
-    if np.abs(rise).max() < SMALLEST:
+    if np.abs(rise).max() < SMALLEST_RISE:
         return ""
-    stated = any(setup.fluid is not None for setup in board.setups)
+    is_stated = any(setup.fluid is not None for setup in board.setups)
     remedy = "the card states it: --effects fluid_loading, or its name among the effects of the card, puts it in"
-    if not stated:
+    if not is_stated:
         remedy = 'add to [setup.fluid] the lines density_kg_m3 = 1.2 and baffle = "none"'
-    told = [f"{name} {100.0 * part:+.1f} %" for name, part in zip(board.symmetry.moduli, rise, strict=False)]
+    changes = [f"{name} {100.0 * change:+.1f} %" for name, change in zip(board.symmetry.moduli, rise, strict=False)]
     return (
         "no air is declared, and a board in a room carries it along; with it the constants would change by "
-        f"{', '.join(told)}: {remedy}"
+        f"{', '.join(changes)}: {remedy}"
     )

@@ -1,11 +1,11 @@
-"""What is unusual about a board: constants out of their prior's reach, an extreme ratio, a density of another wood."""
+"""Unusual boards: constants out of their prior's reach, an extreme ratio of moduli, a density of another wood."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from bayesplate.arrays import Floats
-from bayesplate.board.board import Board, density
+from bayesplate.board.board import Board, board_density
 from bayesplate.board.material import MODULI, RIGIDITIES, moduli
 from bayesplate.board.prior import PriorCard
 
@@ -22,48 +22,48 @@ LIKE_METAL = 2.0
 """E_x over E_y, either way, that these do not reach, rolled or not."""
 
 _STIFFER_ACROSS = 1.5
-_USUAL = (0.001, 0.999)
+_USUAL_SHARES = (0.001, 0.999)
 
 
-def unusual(board: Board, prior: PriorCard, rigidities: Floats) -> tuple[str, ...]:
-    """What is unusual about a board's density and the constants that its readings imply; rigidities in N m."""
+def unusual_sentences(board: Board, prior: PriorCard, rigidities: Floats) -> tuple[str, ...]:
+    """Sentences on an unusual density and on unusual constants that a board's readings imply; rigidities in N m."""
     values = board.nominal() | dict(zip(RIGIDITIES, rigidities, strict=True))
     elastic = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
     by_name = values | elastic._asdict()
-    found, outside = [], []
-    for name, one in prior.constants.items():
-        low, high = (float(one.quantile(np.array(share))) for share in _USUAL)
+    sentences, out_of_reach = [], []
+    for name, constant_prior in prior.constants.items():
+        low, high = (float(constant_prior.quantile(np.array(share))) for share in _USUAL_SHARES)
         if not low <= by_name[name] <= high:
             unit, factor = ("GPa", 1e9) if name in MODULI else ("N m", 1.0)
             expected = f"{low / factor:.3g} to {high / factor:.3g}"
-            outside.append(f"{name} comes out as {by_name[name] / factor:.3g} {unit}, expected were {expected}")
-    if outside:
-        found.append(
-            f"out of reach of the prior '{prior.name}': {'; '.join(outside)}; are sizes, labels and prior right?"
+            out_of_reach.append(f"{name} comes out as {by_name[name] / factor:.3g} {unit}, expected were {expected}")
+    if out_of_reach:
+        sentences.append(
+            f"out of reach of the prior '{prior.name}': {'; '.join(out_of_reach)}; are sizes, labels and prior right?"
         )
     ratio = float(elastic.E_x / elastic.E_y)
     if ratio > MOST_ORTHOTROPIC:
-        found.append(
+        sentences.append(
             f"E_x comes out {ratio:.3g} times as large as E_y, more than in any wood: are length_x_mm and length_y_mm, "
             "or all labels, exchanged?"
         )
     elif ratio < 1.0 / _STIFFER_ACROSS:
-        found.append(f"E_y comes out {1.0 / ratio:.3g} times as large as E_x: is x along the grain?")
-    rho = float(density(values))
+        sentences.append(f"E_y comes out {1.0 / ratio:.3g} times as large as E_x: is x along the grain?")
+    rho = float(board_density(values))
     if prior.density is not None:
-        low, high = (float(prior.density.quantile(np.array(share))) for share in _USUAL)
+        low, high = (float(prior.density.quantile(np.array(share))) for share in _USUAL_SHARES)
         if not low <= rho <= high:
-            found.append(
+            sentences.append(
                 f"the density comes out as {rho:.3g} kg/m3, the prior '{prior.name}' is of boards of {low:.3g} to "
                 f"{high:.3g}: are the mass and the three lengths right?"
             )
     elif rho < LIGHTEST_WOOD:
-        found.append(
+        sentences.append(
             f"the density comes out as {rho:.3g} kg/m3, lighter than balsa: are the mass and the three lengths right?"
         )
     elif rho > HEAVIEST_FIBRES and (either_way := max(ratio, 1.0 / ratio)) > LIKE_METAL:
-        found.append(
+        sentences.append(
             f"the density comes out as {rho:.0f} kg/m3, more than that of any wood or fibre composite, and no metal is "
             f"{either_way:.3g} times as stiff one way as the other: are the mass and the three lengths right?"
         )
-    return tuple(found)
+    return tuple(sentences)

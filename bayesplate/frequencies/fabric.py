@@ -1,4 +1,4 @@
-"""How effects together spread the plate's own properties over it: products of their fields, and what each weighs."""
+"""The plate's own properties as fields over it where several effects vary them: products of fields, with weights."""
 
 from __future__ import annotations
 
@@ -14,104 +14,110 @@ from bayesplate.board.board import Values
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Effect, Theory, Variation
 from bayesplate.frequencies.terms import along_grain
-from bayesplate.plate.fields import EdgeStrip, Fabric, Field, Group, layout
+from bayesplate.plate.fields import EdgeStrip, Fabric, Field, TermGroup, term_field_pairs
 from bayesplate.plate.shear import SHEAR_FLEXIBLE
 from bayesplate.plate.terms import Weights
 from bayesplate.plate.thin import THIN
 
-_GROUPS: tuple[Group, ...] = ("along", "bending", "shear", "mass", "rotary")
+_GROUPS: tuple[TermGroup, ...] = ("along", "bending", "shear", "mass", "rotary")
 
 HIGHEST_ORDER = 2
-"""Of the smallness of a product of variations that counts."""
+"""Highest order of smallness of a product of variations that is taken into account."""
 
 _UNIFORM = (Variation(None),)
 
-Joined = tuple[Variation, ...]
-"""One field of a property where several effects vary it: the product of one variation per effect."""
+VariationProduct = tuple[Variation, ...]
+"""A field of a property that several effects vary: the product of one variation of each effect."""
 
 
 @lru_cache(maxsize=32)
-def _joined(effects: tuple[Effect, ...]) -> dict[Group, list[Joined]]:
-    """Every variation of one effect with every one of the others, by group; empty where no effect varies anything.
+def _variation_products(effects: tuple[Effect, ...]) -> dict[TermGroup, list[VariationProduct]]:
+    """Every product of one variation of each effect, by group; empty where no effect varies anything.
 
-    What is smaller than expansions go is left out.
-    Fields and weights are both read from this one list. What an effect does to bending it does along the grain too,
-    unless it says otherwise.
+    Products of an order of smallness above `HIGHEST_ORDER` are left out. Fields and weights are both read from this
+    list. A variation of bending applies along the grain too, unless the effect has another one there.
     """
     varying = [variations for effect in effects if (variations := effect.variations())]
     if not varying:
         return {}
-    whole = [{"along": each.get("bending", _UNIFORM), **each} for each in varying]
-    every = {group: product(*(each.get(group, _UNIFORM) for each in whole)) for group in _GROUPS}
+    complete = [{"along": variations.get("bending", _UNIFORM), **variations} for variations in varying]
+    products = {group: product(*(variations.get(group, _UNIFORM) for variations in complete)) for group in _GROUPS}
     return {
-        group: [joined for joined in each if sum(one.order for one in joined) <= HIGHEST_ORDER]
-        for group, each in every.items()
+        group: [factors for factors in group_products if sum(factor.order for factor in factors) <= HIGHEST_ORDER]
+        for group, group_products in products.items()
     }
 
 
 def fabric_of(effects: Sequence[Effect]) -> Fabric:
-    """What a plate is made of in the presence of effects.
+    """Fields, outline and grain of a plate in the presence of effects.
 
-    Where several vary the same property, every field of one multiplies every field of the others.
+    Where several effects vary the same property, every field of one multiplies every field of the others.
     """
     outlines = [outline for effect in effects if (outline := effect.outline()) is not None]
     return Fabric(
         fields={
-            group: [reduce(_times, (one.field for one in joined)) for joined in each]
-            for group, each in _joined(tuple(effects)).items()
+            group: [reduce(_multiply_fields, (factor.field for factor in factors)) for factors in products]
+            for group, products in _variation_products(tuple(effects)).items()
         },
         outline=outlines[0] if outlines else None,
         is_turned=any(effect.turns_grain for effect in effects),
     )
 
 
-def in_plane(effects: Sequence[Effect], values: Values) -> Field | None:
+def in_plane_field(effects: Sequence[Effect], values: Values) -> Field | None:
     """The field that the in-plane stiffness follows at one draw of values; None where it is uniform.
 
-    It goes with the thickness and with the moduli, as the shear stiffness does. What an outline takes away at the edges
-    is left in.
+    It varies with the thickness and the moduli, as the shear stiffness does. The strips that an outline cuts off at the
+    edges are still included.
     """
-    joined = _joined(tuple(effects)).get("shear", [])
+    products = _variation_products(tuple(effects)).get("shear", [])
     shares = [
-        (float(_weight(one, values)[0]), tuple(_fields(one)))
-        for one in joined
-        if not any(isinstance(each, EdgeStrip) for each in _fields(one))
+        (float(_product_weight(factors, values)[0]), tuple(_fields(factors)))
+        for factors in products
+        if not any(isinstance(field, EdgeStrip) for field in _fields(factors))
     ]
     if not any(field for _, fields in shares for field in fields):
         return None
-    return _Sum(tuple(shares))
+    return _FieldSum(tuple(shares))
 
 
-def over_fields(base: Weights, effects: Sequence[Effect], theory: Theory, values: Values, setup: Setup) -> Weights:
-    """Weights of the plate's own terms in the presence of effects, once for each field, in the order of `layout`.
+def spread_over_fields(
+    base: Weights, effects: Sequence[Effect], theory: Theory, values: Values, setup: Setup
+) -> Weights:
+    """Weights of the plate's own terms in the presence of effects, one for each field, as of `term_field_pairs`.
 
-    `base` has each term once, without effects. The part of the modulus along the grain takes fields of its own, and is
-    turned with the grain as all the rest.
+    `base` has each term once, without effects. The part due to the modulus along the grain has fields of its own, and
+    turns with the grain like all other parts.
     """
-    varying = _joined(tuple(effects))
-    whole = _reweighed(base, effects, values, setup)
-    if not any(one.weight for each in varying.values() for joined in each for one in joined):
-        return whole
+    products = _variation_products(tuple(effects))
+    reweighed = _reweighed(base, effects, values, setup)
+    if not any(
+        factor.weight for group_products in products.values() for factors in group_products for factor in factors
+    ):
+        return reweighed
     along = _reweighed(along_grain(base, values, setup), effects, values, setup).stiffness
-    weights = {group: [_weight(joined, values) for joined in each] for group, each in varying.items()}
-    others = dict(zip(map(_fields, varying["bending"]), weights["bending"], strict=True))
-    # On each field along the grain, what all other moduli weigh on it: nothing where it is no field of theirs.
-    rest = [others.get(_fields(joined), np.zeros(1)) for joined in varying["along"]]
-    counts = {group: len(made) for group, made in weights.items()}
+    weights = {
+        group: [_product_weight(factors, values) for factors in group_products]
+        for group, group_products in products.items()
+    }
+    bending_weights = dict(zip(map(_fields, products["bending"]), weights["bending"], strict=True))
+    # The weight of all other moduli on each field of the modulus along the grain: zero where they do not have it.
+    other_weights = [bending_weights.get(_fields(factors), np.zeros(1)) for factors in products["along"]]
+    counts = {group: len(group_weights) for group, group_weights in weights.items()}
     is_turned = any(effect.turns_grain for effect in effects)
     groups = (THIN if theory == "thin" else SHEAR_FLEXIBLE).groups(is_turned)
 
     def stiffness(term: int, k: int) -> Floats:
-        own, group = whole.stiffness[:, term], groups[0][term]
+        term_weight, group = reweighed.stiffness[:, term], groups[0][term]
         if group == "along":
-            return along[:, term] * weights[group][k] + (own - along[:, term]) * rest[k]
-        return own * weights[group][k]
+            return along[:, term] * weights[group][k] + (term_weight - along[:, term]) * other_weights[k]
+        return term_weight * weights[group][k]
 
     def mass(term: int, k: int) -> Floats:
-        return whole.mass[:, term] * weights[groups[1][term]][k]
+        return reweighed.mass[:, term] * weights[groups[1][term]][k]
 
-    def spread(weight: Callable[[int, int], Floats], group: Sequence[Group]) -> Floats:
-        return np.stack(np.broadcast_arrays(*(weight(*each) for each in layout(group, counts))), axis=-1)
+    def spread(weight: Callable[[int, int], Floats], group: Sequence[TermGroup]) -> Floats:
+        return np.stack(np.broadcast_arrays(*(weight(*place) for place in term_field_pairs(group, counts))), axis=-1)
 
     return Weights(spread(stiffness, groups[0]), spread(mass, groups[1]))
 
@@ -120,15 +126,15 @@ def _reweighed(base: Weights, effects: Sequence[Effect], values: Values, setup: 
     return reduce(lambda weights, effect: effect.reweigh(weights, values, setup), effects, base)
 
 
-def _fields(joined: Joined) -> tuple[Field | EdgeStrip | None, ...]:
-    return tuple(one.field for one in joined)
+def _fields(factors: VariationProduct) -> tuple[Field | EdgeStrip | None, ...]:
+    return tuple(factor.field for factor in factors)
 
 
-def _weight(joined: Joined, values: Values) -> Floats:
-    return reduce(np.multiply, (one.weight(values) for one in joined if one.weight), np.ones(1))
+def _product_weight(factors: VariationProduct, values: Values) -> Floats:
+    return reduce(np.multiply, (factor.weight(values) for factor in factors if factor.weight), np.ones(1))
 
 
-def _times(first: Field | EdgeStrip | None, second: Field | EdgeStrip | None) -> Field | EdgeStrip | None:
+def _multiply_fields(first: Field | EdgeStrip | None, second: Field | EdgeStrip | None) -> Field | EdgeStrip | None:
     if first is None or second is None:
         return first or second
     if isinstance(first, EdgeStrip):
@@ -136,29 +142,31 @@ def _times(first: Field | EdgeStrip | None, second: Field | EdgeStrip | None) ->
     if isinstance(first, EdgeStrip):
         raise ValueError("fields: wanted one strip along the outline, got two")
     if isinstance(second, EdgeStrip):
-        return replace(second, field=_product(first, second.field))
-    return _product(first, second)
+        return replace(second, field=_scale_field(first, second.field))
+    return _scale_field(first, second)
 
 
-def _product(first: Field, second: Field | None) -> Field:
-    return first if second is None else _Product(first, second)
+def _scale_field(first: Field, second: Field | None) -> Field:
+    return first if second is None else _FieldProduct(first, second)
 
 
 @dataclass(frozen=True)
-class _Sum:
-    """Products of fields, each with its share; None is uniform."""
+class _FieldSum:
+    """Sum of products of fields, each product with its share; None is a uniform field."""
 
     shares: tuple[tuple[float, tuple[Field | EdgeStrip | None, ...]], ...]
 
     def __call__(self, x: Floats, y: Floats) -> Floats:
         total = np.zeros(np.broadcast_shapes(np.shape(x), np.shape(y)))
         for share, fields in self.shares:
-            total = total + share * reduce(np.multiply, (one(x, y) for one in fields if callable(one)), np.ones(1))
+            total = total + share * reduce(
+                np.multiply, (field(x, y) for field in fields if callable(field)), np.ones(1)
+            )
         return total
 
 
 @dataclass(frozen=True)
-class _Product:
+class _FieldProduct:
     first: Field
     second: Field
 

@@ -1,4 +1,4 @@
-"""The two laws that take weights of terms to frequencies: linear, and exact."""
+"""The two laws that give frequencies from the weights of terms: the linear and the exact one."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bayesplate.plate.terms import Weights
 LawName = Literal["linear", "exact"]
 
 _LARGEST = 1e150
-"""Weight above which a draw is no plate: its matrices, or products of them, would not be finite."""
+"""Weight above which a draw is no plate: its matrices, or their products, would not be finite."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class LinearLaw:
     mass: Floats  # (n_modes, n_masses)
 
     def squared(self, weights: Weights) -> Floats:
-        """omega^2 in s^-2: (n_draws, n_modes) array; negative where the law has left the region it is made for."""
+        """omega^2 in s^-2: (n_draws, n_modes) array; may be negative far from the estimate."""
         return np.asarray((weights.stiffness @ self.stiffness.T) / (weights.mass @ self.mass.T))
 
 
@@ -39,7 +39,7 @@ class ExactLaw:
     def squared(self, weights: Weights) -> Floats:
         """omega^2 in s^-2: (n_draws, n_modes) array; not a number at a draw that is no plate.
 
-        Weights that are not finite never reach a solver of eigenvalues, which would end everything at such a draw.
+        Weights that are not finite are kept from the eigenvalue solver, which would raise for all draws together.
         """
         is_finite = [np.abs(weight).max(axis=1) < _LARGEST for weight in weights]
         is_plate = is_finite[0] & is_finite[1]
@@ -61,7 +61,7 @@ def log_frequency(squared: Floats) -> Floats:
 
 
 def mean_log_frequency(each: Sequence[Floats]) -> Floats:
-    """ln of the mean of frequencies of which ln is given, arrays of one shape."""
+    """ln of the mean of several frequencies, from the ln of each: arrays of one shape."""
     return each[0] if len(each) == 1 else np.asarray(np.log(np.mean(np.exp(each), axis=0)))
 
 

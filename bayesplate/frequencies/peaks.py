@@ -1,4 +1,4 @@
-"""Peaks of a setup that have no label, or a doubtful one: what they say of the frequencies of all its modes."""
+"""Likelihood of the peaks of a setup that have no label, or a doubtful one, given the frequencies of all its modes."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ import numpy as np
 from bayesplate.arrays import Floats, Indices
 from bayesplate.board.reading import Peak, Reading
 from bayesplate.board.setup import Setup
-from bayesplate.frequencies.assignment import LOG_NOTHING, Assignments, Near
+from bayesplate.frequencies.assignment import LOG_NEGLIGIBLE, Assignments, NearPeaks
 from bayesplate.frequencies.model import SetupModel, every_label
 from bayesplate.frequencies.reading_errors import ReadingErrors
-from bayesplate.frequencies.residues import share_seen, sign_probabilities
+from bayesplate.frequencies.residues import detection_share, sign_probabilities
 from bayesplate.labels import Label
 
-Rows = Indices
+Integers = Indices
 
 _MOST_UNSIGNED = 6
-"""Peaks of unknown sign up to which each is tried with both."""
+"""Up to so many peaks of unknown sign, the likelihood is summed over both signs of each."""
 _DRAWS_AT_ONCE = 512
-"""Enough for the arithmetic to be done in compiled code; of more, what is at work leaves the fast memory."""
+"""Draws computed together: enough to keep the time in compiled code, few enough for the arrays to stay in cache."""
 _LEAST_MISSED = 1e-3
-"""Probability that a mode left no peak, at least: no ratio is beyond all numbers then."""
+"""Lower limit of the probability that a mode left no peak, which keeps all ratios finite."""
 _FAR_BELOW = 9.0
-"""Standard deviations below the highest peak from which on no mode can be above it: one in 1e19 of a normal error."""
+"""A mode so many standard deviations below the highest peak is taken not to lie above it: a chance of 1e-19."""
 _SIGNS = {"+": 1, "-": -1, "": 0}
 
 
 @dataclass(frozen=True, eq=False)
-class Order:
-    """Peaks that keep their order among the modes: all, or those that may be of one sign."""
+class OrderedPeaks:
+    """Peaks whose order of frequency is that of their modes: all peaks, or those that may have one sign."""
 
-    peaks: Rows  # (n_own,)
+    peaks: Integers  # (n_own,)
     log_sign: Floats  # (n_own, n_modes): ln of the probability that a mode has the sign of a peak
 
 
@@ -42,32 +42,33 @@ class Order:
 class PeakLikelihood:
     """The probability of a setup's peaks, summed over all assignments to its modes (`Assignments`).
 
-    A peak is no mode with a prior probability s, its own or that of its setup, and then lies anywhere up to the highest
-    one; otherwise it is one of the modes that no certain label has taken, about which it scatters as a reading does. Of
-    n peaks n s are expected to be none: each that is weighs n s, for it may stand anywhere among the others, while a
-    mode has one place. A mode leaves no peak with a prior probability, which is higher the nearer hammer or sensor
-    stand to its nodal lines, or if it lies above the highest peak. Where the signs of residues are known, on the card
-    and from the shapes, a peak of the other sign is not that mode, and peaks and modes keep their order within a sign
-    only; a mode with so small a residue that it may have either sign may be a peak of either. A label that may be wrong
-    is right with the probability that the card gives, and otherwise any other mode's.
+    A peak is spurious, that is no mode, with a prior probability s, stated for the peak or for its setup; it may then
+    have any frequency up to the highest peak. Otherwise it is one of the modes without a certain label, about which it
+    scatters as a reading does. Of n peaks n s are expected to be spurious, and each spurious one has the weight n s, as
+    it may stand anywhere among the other peaks, while a mode has one place. A mode leaves no peak with a prior
+    probability, which is higher the nearer hammer or sensor are to its nodal lines, or if it lies above the highest
+    peak. Where the signs of residues are known, on the card and from the shapes, a peak cannot be a mode of the other
+    sign, and peaks and modes keep their order within each sign only; a mode with so small a residue that its sign is
+    uncertain may be a peak of either sign. A label that may be wrong is right with the probability that the card
+    gives, and otherwise belongs to any other mode.
     """
 
     errors: ReadingErrors  # of the peaks, in the order of frequency
-    readings: Rows  # (n_peaks,): which of the setup's readings each one is; -1: none
-    bare: Rows  # (n_peaks,): which of its peaks without a label; -1: none
-    columns: Rows  # (n_modes,): modes that peaks may be, among all of the model: the labelled ones first
+    readings: Integers  # (n_peaks,): index of each peak among the setup's readings; -1: it is none of them
+    bare: Integers  # (n_peaks,): index among the setup's peaks without a label; -1: it has a label
+    columns: Integers  # (n_modes,): indices in the model of the modes that peaks may be, the labelled ones first
     labels: tuple[Label | None, ...]
-    log_prior: Floats  # (n_peaks, n_modes): ln of what is known of each pair: seen, no spurious peak, its label
-    log_alone: Floats  # (n_peaks,): ln of the probability of each peak if it is no mode
-    missed: Floats  # (n_modes,): probability that a mode below the highest peak left none
-    orders: tuple[Order, ...]  # one of all, or one a sign, which share the peaks of unknown sign
-    log_highest: float  # ln of the highest frequency that was read, Hz
+    log_prior: Floats  # (n_peaks, n_modes): ln prior of a pair: mode detected, peak not spurious, its label
+    log_alone: Floats  # (n_peaks,): ln of the probability of each peak if it is spurious
+    missed: Floats  # (n_modes,): probability that a mode below the highest peak left no peak
+    orders: tuple[OrderedPeaks, ...]  # one for all peaks, or one for each sign; peaks of unknown sign are in both
+    log_highest: float  # ln of the highest measured frequency, Hz
 
     @classmethod
     def of(cls, model: SetupModel, robust: bool = False) -> PeakLikelihood | None:
-        """The likelihood of the peaks of a model with all modes (`with_others`); None if all labels are sure."""
+        """The likelihood of the peaks of a model with all modes (`with_other_modes`); None if all labels are sure."""
         setup = model.setup
-        if not takes_part(setup):
+        if not needs_assignment(setup):
             return None
         doubtful = np.flatnonzero([not reading.is_sure for reading in setup.readings])
         n_bare = len(setup.peaks)
@@ -76,25 +77,25 @@ class PeakLikelihood:
         errors = ReadingErrors.of_peaks(setup, doubtful, robust)
         order = np.argsort(errors.frequency, kind="stable")
         errors, readings, bare = errors.at(order), readings[order], bare[order]
-        read: list[Peak | Reading] = [*setup.peaks, *(setup.readings[i] for i in doubtful)]
-        signs = np.array([_SIGNS[one.sign] for one in read])[order]
-        others = np.arange(len(setup.readings), len(model.every_place))
-        columns = np.concatenate([doubtful, others]).astype(np.intp)
+        peaks: list[Peak | Reading] = [*setup.peaks, *(setup.readings[i] for i in doubtful)]
+        signs = np.array([_SIGNS[peak.sign] for peak in peaks])[order]
+        other_modes = np.arange(len(setup.readings), len(model.every_place))
+        columns = np.concatenate([doubtful, other_modes]).astype(np.intp)
         residues = None if model.residues is None else model.residues[columns]
-        seen = np.full(columns.size, 1.0 - setup.missed)
+        detection = np.full(columns.size, 1.0 - setup.missed)
         if residues is not None:
-            seen = seen * np.where(np.isnan(residues), 1.0, share_seen(np.nan_to_num(residues)))
-        spurious = np.array([setup.spurious if one.spurious is None else one.spurious for one in read])[order]
-        log_pair = np.log(seen) + np.log1p(-spurious)[:, None]
-        every = every_label(setup, model.others)
-        labels = tuple(every[column] for column in columns)
+            detection = detection * np.where(np.isnan(residues), 1.0, detection_share(np.nan_to_num(residues)))
+        spurious = np.array([setup.spurious if peak.spurious is None else peak.spurious for peak in peaks])[order]
+        log_pair = np.log(detection) + np.log1p(-spurious)[:, None]
+        all_labels = every_label(setup, model.others)
+        labels = tuple(all_labels[column] for column in columns)
         log_label = _log_labels(setup, readings, labels)
         highest = max([*setup.measured, *setup.unlabelled])
-        wide = np.where(errors.rounded, errors.resolution, errors.frequency) / highest
+        relative_width = np.where(errors.rounded, errors.resolution, errors.frequency) / highest
         orders = tuple(_orders(signs, columns.size, residues))
         is_split = len(orders) > 1
         log_sign = np.where(((signs != 0) & (residues is not None)) | is_split, -np.log(2.0), 0.0)
-        log_alone = np.log(spurious * spurious.size * wide) + log_label[:, -1] + log_sign
+        log_alone = np.log(spurious * spurious.size * relative_width) + log_label[:, -1] + log_sign
         return cls(
             errors=errors,
             readings=readings,
@@ -103,7 +104,7 @@ class PeakLikelihood:
             labels=labels,
             log_prior=log_pair + log_label[:, :-1],
             log_alone=log_alone,
-            missed=1.0 - seen,
+            missed=1.0 - detection,
             orders=orders,
             log_highest=float(np.log(highest)),
         )
@@ -113,28 +114,28 @@ class PeakLikelihood:
 
         Minus infinity where a mode has no frequency.
         """
-        there = every_log_frequency[:, self.columns]
-        has_all = np.flatnonzero(np.isfinite(there).all(axis=1))
-        result = np.full(len(there), -np.inf)
-        if has_all.size > _DRAWS_AT_ONCE:  # those that are alike together, so that fewer pairs are near at any of them
-            most_spread = there[has_all].std(axis=0).argmax()
-            has_all = has_all[np.argsort(there[has_all, most_spread])]
-        for start in range(0, has_all.size, _DRAWS_AT_ONCE):
-            some = has_all[start : start + _DRAWS_AT_ONCE]
-            result[some] = self._log_sum(there[some], noise[some])
+        log_frequency = every_log_frequency[:, self.columns]
+        complete = np.flatnonzero(np.isfinite(log_frequency).all(axis=1))
+        result = np.full(len(log_frequency), -np.inf)
+        if complete.size > _DRAWS_AT_ONCE:  # similar draws go together, so that fewer pairs are near at any of them
+            most_spread = log_frequency[complete].std(axis=0).argmax()
+            complete = complete[np.argsort(log_frequency[complete, most_spread])]
+        for start in range(0, complete.size, _DRAWS_AT_ONCE):
+            batch = complete[start : start + _DRAWS_AT_ONCE]
+            result[batch] = self._log_sum(log_frequency[batch], noise[batch])
         return result
 
-    def _log_sum(self, there: Floats, noise: Floats) -> Floats:
-        """`log_likelihood` of a few draws that have all modes."""
-        _, log_missed, assignments = self._assignments(there, noise)
+    def _log_sum(self, log_frequency: Floats, noise: Floats) -> Floats:
+        """`log_likelihood` of a batch of draws at which every mode has a frequency."""
+        _, log_missed, assignments = self._assignments(log_frequency, noise)
         return np.asarray(assignments.log_sum() + log_missed.sum(axis=0) + self.log_alone.sum())
 
     def probabilities(self, every_log_frequency: Floats, noise: Floats) -> Floats:
-        """Probability that each peak is each mode, averaged over draws: (n_peaks, n_modes); the rest: it is none."""
+        """Probability that each peak is each mode, averaged over draws: (n_peaks, n_modes); the rest: spurious."""
         total = np.zeros(self.log_prior.shape)
         for start in range(0, len(noise), _DRAWS_AT_ONCE):
-            some = slice(start, start + _DRAWS_AT_ONCE)
-            total += self.probabilities_of_each(every_log_frequency[some], noise[some]).sum(axis=2)
+            batch = slice(start, start + _DRAWS_AT_ONCE)
+            total += self.probabilities_of_each(every_log_frequency[batch], noise[batch]).sum(axis=2)
         return total / len(noise)
 
     def probabilities_of_each(self, every_log_frequency: Floats, noise: Floats) -> Floats:
@@ -142,55 +143,59 @@ class PeakLikelihood:
         modes, _, assignments = self._assignments(every_log_frequency[:, self.columns], noise)
         result = np.zeros((*self.log_prior.shape, len(noise)))
         for row, (order, pairs) in enumerate(zip(self.orders, assignments.pairs(), strict=True)):
-            peaks, at = assignments.near[row].pairs()
-            result[order.peaks[peaks][:, None], modes[at], np.arange(len(noise))] += pairs
+            peaks, ranks = assignments.near[row].pairs()
+            result[order.peaks[peaks][:, None], modes[ranks], np.arange(len(noise))] += pairs
         return result
 
     def log_density_alone(self, reading: int) -> float:
-        """ln of the density, in ln f, of one of the setup's readings if it is no mode."""
-        at = int(np.flatnonzero(self.readings == reading)[0])
-        errors = self.errors.at(np.array([at]))
+        """ln of the density, in ln f, of one of the setup's readings if it is spurious."""
+        peak = int(np.flatnonzero(self.readings == reading)[0])
+        errors = self.errors.at(np.array([peak]))
         width = errors.resolution[0] / errors.frequency[0] if errors.rounded[0] else 1.0
-        return float(self.log_alone[at] - np.log(width))
+        return float(self.log_alone[peak] - np.log(width))
 
-    def _assignments(self, there: Floats, noise: Floats) -> tuple[Rows, Floats, Assignments]:
-        """The order of the modes, ln of the probability that each left no peak, and what the peaks say in that order.
+    def _assignments(self, log_frequency: Floats, noise: Floats) -> tuple[Integers, Floats, Assignments]:
+        """Modes in order of frequency, ln of the probability that each left no peak, and the ratios r_ij of pairs.
 
-        The order is (n_modes, n_draws), or (n_modes, 1) where all draws have one. Pairs that are near each other at no
-        draw are left out.
+        The order is (n_modes, n_draws), or (n_modes, 1) where it is the same at all draws. Pairs that are not near each
+        other at any draw are left out.
         """
-        log_missed = self._log_missed(there.T, noise)
-        modes = np.argsort(there[0])[:, None]
-        ordered, log_missed = there.T[modes[:, 0]], log_missed[modes[:, 0]]
-        is_near = self._most(ordered, log_missed, noise) + self._known[:, modes[:, 0]] > LOG_NOTHING
+        log_missed = self._log_missed(log_frequency.T, noise)
+        modes = np.argsort(log_frequency[0])[:, None]
+        ordered, log_missed = log_frequency.T[modes[:, 0]], log_missed[modes[:, 0]]
+        is_near = (
+            self._log_ratio_bound(ordered, log_missed, noise) + self._log_prior_ratio[:, modes[:, 0]] > LOG_NEGLIGIBLE
+        )
         n_first = len(self.orders[0].peaks)
         rows = [is_near[:n_first], is_near[n_first:]][: len(self.orders)]
         by_row = [ordered[row.any(axis=0)] for row in rows]
-        if any((each[1:] < each[:-1]).any() for each in by_row):
-            # Where modes cross that have a row in common, each draw has its own order.
-            again = np.ascontiguousarray(np.argsort(ordered, axis=0, kind="stable"))
-            ordered, log_missed = (np.take_along_axis(each, again, axis=0) for each in (ordered, log_missed))
-            stands = np.zeros((len(modes), len(modes)), dtype=np.bool_)
-            stands[again, np.arange(len(modes))[:, None]] = True
-            is_near = (is_near @ stands) & (self._most(ordered, log_missed, noise) + self._known_at_most > LOG_NOTHING)
-            modes = modes[:, 0][again]
-        near = [Near.of(row) for row in (is_near[:n_first], is_near[n_first:])[: len(self.orders)]]
-        own, at = [], []
-        for row, each in enumerate(near):
-            peaks, places = each.pairs()
-            own += [row * n_first + peak for peak in peaks]
-            at += places
-        log_ratios = self.errors.log_likelihood_of_pairs(self._peaks[own], ordered[at], noise)
-        log_ratios += self._known[np.array(own, dtype=np.intp)[:, None], modes[at]]
-        log_ratios -= log_missed[at]
-        ratios = np.exp(np.maximum(log_ratios, LOG_NOTHING))
+        if any((row_modes[1:] < row_modes[:-1]).any() for row_modes in by_row):
+            # Modes of a common row cross: each draw has its own order.
+            ranking = np.ascontiguousarray(np.argsort(ordered, axis=0, kind="stable"))
+            ordered, log_missed = (np.take_along_axis(table, ranking, axis=0) for table in (ordered, log_missed))
+            takes_rank = np.zeros((len(modes), len(modes)), dtype=np.bool_)
+            takes_rank[ranking, np.arange(len(modes))[:, None]] = True
+            is_near = (is_near @ takes_rank) & (
+                self._log_ratio_bound(ordered, log_missed, noise) + self._log_prior_bound > LOG_NEGLIGIBLE
+            )
+            modes = modes[:, 0][ranking]
+        near = [NearPeaks.of(row) for row in (is_near[:n_first], is_near[n_first:])[: len(self.orders)]]
+        pair_peaks, pair_ranks = [], []
+        for row, near_peaks in enumerate(near):
+            peaks, ranks = near_peaks.pairs()
+            pair_peaks += [row * n_first + peak for peak in peaks]
+            pair_ranks += ranks
+        log_ratios = self.errors.log_likelihood_of_pairs(self._peaks[pair_peaks], ordered[pair_ranks], noise)
+        log_ratios += self._log_prior_ratio[np.array(pair_peaks, dtype=np.intp)[:, None], modes[pair_ranks]]
+        log_ratios -= log_missed[pair_ranks]
+        ratios = np.exp(np.maximum(log_ratios, LOG_NEGLIGIBLE))
         n_pairs = near[0].starts[-1]
         return modes, log_missed, Assignments(near, [ratios[:n_pairs], ratios[n_pairs:]][: len(near)], self._unsigned)
 
-    def _most(self, ordered: Floats, log_missed: Floats, noise: Floats) -> Floats:
-        """The most that peaks say of modes at any draw, but for what is known beforehand: an (n_own, n_modes) array."""
-        most = self.errors.log_most(ordered.min(axis=1), ordered.max(axis=1), noise.min(), noise.max())
-        return np.asarray((most - log_missed.min(axis=1))[self._peaks])
+    def _log_ratio_bound(self, ordered: Floats, log_missed: Floats, noise: Floats) -> Floats:
+        """Upper bound over draws of ln of the likelihood ratio of each pair, without its prior: (n_own, n_modes)."""
+        bound = self.errors.log_most(ordered.min(axis=1), ordered.max(axis=1), noise.min(), noise.max())
+        return np.asarray((bound - log_missed.min(axis=1))[self._peaks])
 
     def _log_missed(self, log_frequency: Floats, noise: Floats) -> Floats:
         """Finite ln of the probability that each mode left no peak, from ln f: (n_modes, n_draws) arrays."""
@@ -198,40 +203,40 @@ class PeakLikelihood:
 
         missed = np.repeat(self.missed[:, None], noise.size, axis=1)
         sd = self.errors.sd(noise).mean(axis=1)
-        some = log_frequency.max(axis=1) > self.log_highest - _FAR_BELOW * sd.max()
-        missed[some] += (1.0 - missed[some]) * ndtr((log_frequency[some] - self.log_highest) / sd)
+        is_high = log_frequency.max(axis=1) > self.log_highest - _FAR_BELOW * sd.max()
+        missed[is_high] += (1.0 - missed[is_high]) * ndtr((log_frequency[is_high] - self.log_highest) / sd)
         return np.asarray(np.log(np.maximum(missed, _LEAST_MISSED)))
 
     @cached_property
-    def _peaks(self) -> Rows:
+    def _peaks(self) -> Integers:
         return np.concatenate([order.peaks for order in self.orders])
 
     @cached_property
     def _unsigned(self) -> list[tuple[int, int]]:
-        """Places of each peak of unknown sign in both orders."""
+        """Indices of each peak of unknown sign in both rows of peaks."""
         if len(self.orders) == 1:
             return []
         plus, minus = (order.peaks.tolist() for order in self.orders)
         return [(plus.index(peak), minus.index(peak)) for peak in plus if peak in minus]
 
     @cached_property
-    def _known(self) -> Floats:
-        """What is known of each pair beforehand, over the peak as no mode, one order after the other: ln of it."""
-        parts = [(self.log_prior - self.log_alone[:, None])[order.peaks] + order.log_sign for order in self.orders]
-        return np.concatenate(parts)
+    def _log_prior_ratio(self) -> Floats:
+        """ln of the prior of each pair over that of a spurious peak, the rows of peaks one after the other."""
+        log_ratios = [(self.log_prior - self.log_alone[:, None])[order.peaks] + order.log_sign for order in self.orders]
+        return np.concatenate(log_ratios)
 
     @cached_property
-    def _known_at_most(self) -> Floats:
-        """The most of it for any mode: an (n_own, 1) array."""
-        return np.asarray(self._known.max(axis=1, keepdims=True))
+    def _log_prior_bound(self) -> Floats:
+        """The largest prior ratio of each peak with any mode: (n_own, 1) array."""
+        return np.asarray(self._log_prior_ratio.max(axis=1, keepdims=True))
 
 
-def takes_part(setup: Setup) -> bool:
+def needs_assignment(setup: Setup) -> bool:
     return bool(setup.peaks) or not all(reading.is_sure for reading in setup.readings)
 
 
-def _orders(signs: Rows, n_modes: int, residues: Floats | None) -> Iterator[Order]:
-    """One order for each sign, peaks of unknown sign in both; or one of all peaks."""
+def _orders(signs: Integers, n_modes: int, residues: Floats | None) -> Iterator[OrderedPeaks]:
+    """The peaks of each sign, those of unknown sign in both; or all peaks together."""
     unsigned = np.flatnonzero(signs == 0)
     log_sign = np.zeros((3, n_modes))
     is_known = residues is not None and not np.isnan(residues).any()
@@ -239,22 +244,22 @@ def _orders(signs: Rows, n_modes: int, residues: Floats | None) -> Iterator[Orde
         with np.errstate(divide="ignore"):
             log_sign[[1, -1]] = np.log(sign_probabilities(residues))
     if unsigned.size > _MOST_UNSIGNED or unsigned.size == signs.size or not is_known:
-        yield Order(np.arange(signs.size), log_sign[signs])
+        yield OrderedPeaks(np.arange(signs.size), log_sign[signs])
         return
     for sign in (1, -1):
-        own = np.flatnonzero((signs == sign) | (signs == 0))
-        yield Order(own, np.repeat(log_sign[sign][None], own.size, axis=0))
+        peaks = np.flatnonzero((signs == sign) | (signs == 0))
+        yield OrderedPeaks(peaks, np.repeat(log_sign[sign][None], peaks.size, axis=0))
 
 
-def _log_labels(setup: Setup, readings: Rows, labels: Sequence[Label | None]) -> Floats:
-    """ln of the probability of what each peak was labelled, for each mode and, last, if it is no mode.
+def _log_labels(setup: Setup, readings: Integers, labels: Sequence[Label | None]) -> Floats:
+    """ln of the probability of each peak's label if the peak is each mode and, last, if it is spurious.
 
-    A label that is right with probability c is each other mode's with an equal share of 1 - c. One that the program
-    proposed says nothing.
+    A label is right with probability c, and otherwise belongs to each other mode with an equal share of 1 - c. A label
+    that the program proposed has no weight.
     """
     result = np.zeros((readings.size, len(labels) + 1))
-    for i, at in enumerate(readings):
-        if at >= 0 and (reading := setup.readings[at]).confidence > 0:
+    for i, index in enumerate(readings):
+        if index >= 0 and (reading := setup.readings[index]).confidence > 0:
             stated = reading.label if reading.stated is None else reading.stated
             result[i] = np.log((1.0 - reading.confidence) / len(labels))
             result[i, [j for j, label in enumerate(labels) if label == stated]] = np.log(reading.confidence)

@@ -1,4 +1,4 @@
-"""ln f of a board's modes as a function of what a fit moves, with its tangent anywhere."""
+"""ln f of a board's modes as a function of the parameters of a fit, with its tangent at any point."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from bayesplate.frequencies.model import SetupModel, log_frequencies_of_board
 class Predictor:
     """ln f (Hz) of modes, setup after setup, as a function of the (n, n_free) parameters of a fit."""
 
-    values: Callable[[Floats], Values]  # to constants and sizes by name, SI
+    values: Callable[[Floats], Values]  # from parameters to constants and sizes by name, SI
     models: Sequence[SetupModel]
     law: LawName
-    rows: Indices | None = None  # (n_modes,): which of all modes that the models have
-    n_constants: int = 3  # the first parameters, logarithms of free rigidities: all others have priors
+    rows: Indices | None = None  # (n_modes,): indices of its modes among all of the models; None: all
+    n_constants: int = 3  # number of free rigidities: their logarithms are the first parameters; the others have priors
 
     def __call__(self, x: Floats) -> Floats:
         """ln f, (n, n_modes), at (n, n_free) parameters."""
         values = self.values(x)
-        every = np.concatenate(log_frequencies_of_board(self.models, values, self.law), axis=1)
-        return every if self.rows is None else every[:, self.rows]
+        log_frequencies = np.concatenate(log_frequencies_of_board(self.models, values, self.law), axis=1)
+        return log_frequencies if self.rows is None else log_frequencies[:, self.rows]
 
     def of(self, rows: Indices) -> Predictor:
-        """A predictor of some of the modes, by their places among all."""
+        """A predictor of some of the modes, by their indices among all."""
         return replace(self, rows=rows)
 
     def of_labelled(self) -> Predictor:
         starts = np.cumsum([0, *(len(model.every_place) for model in self.models)])[:-1]
-        both = zip(starts, self.models, strict=True)
-        return self.of(np.concatenate([start + np.arange(len(model.places)) for start, model in both]))
+        setups = zip(starts, self.models, strict=True)
+        return self.of(np.concatenate([start + np.arange(len(model.places)) for start, model in setups]))
 
     def with_fixed(self, rest: Floats) -> Predictor:
-        """A predictor of the first parameters only, the (n_rest,) others held where they are."""
+        """A predictor as a function of the first parameters only, the (n_rest,) others held fixed."""
         return replace(self, values=lambda x: self.values(np.concatenate([x, np.tile(rest, (len(x), 1))], axis=1)))
 
     def tangent(self, at: Floats) -> Predictor:

@@ -1,4 +1,4 @@
-"""How far the prior alone lets each frequency range, before anything is measured."""
+"""Range of each frequency under the prior alone, before anything is measured."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from bayesplate.frequencies.terms import term_weights
 from bayesplate.labels import Label
 from bayesplate.plate.beams import N_BEAMS, product_coefficients
 
-WITHIN = (1 / 6, 5 / 6)
-"""Two times in three."""
+BAND_QUANTILES = (1 / 6, 5 / 6)
+"""Quantiles that hold two thirds of the draws."""
 
 _N_DRAWS = 4000
 
@@ -32,29 +32,29 @@ def prior_bands(
 ) -> dict[str, tuple[float, float]]:
     """Factors between which the prior expects each frequency, relative to the one at its median, by label.
 
-    From Rayleigh quotients of beam-function products, draw by draw: a few per cent off each frequency, which cancel in
-    the factors. Labels beyond the beam functions are left out.
+    From Rayleigh quotients of beam-function products at each draw: each frequency is a few per cent off, but this
+    cancels in the factors. Labels of an order above that of the beam functions are left out.
     """
     values = prior_draws(board, prior, rng, _N_DRAWS)
     products = product_coefficients(setup.ends_x, setup.ends_y)
-    middle = term_weights(prior_medians(board, prior), setup).stiffness[0]
+    median_weights = term_weights(prior_medians(board, prior), setup).stiffness[0]
     weights = term_weights(values, setup).stiffness
     bands = {}
     for label in labels:
         i, j = label.m - setup.first_label.m, label.n - setup.first_label.n
         if max(i, j) < N_BEAMS:
-            squared = weights @ products[:, i, j] / (middle @ products[:, i, j])
+            squared = weights @ products[:, i, j] / (median_weights @ products[:, i, j])
             factors = np.sqrt(squared[np.isfinite(squared) & (squared > 0)])
-            low, high = np.quantile(factors, WITHIN)
+            low, high = np.quantile(factors, BAND_QUANTILES)
             bands[str(label)] = (float(low), float(high))
     return bands
 
 
 def prior_draws(board: Board, prior: PriorCard, rng: np.random.Generator, n: int) -> dict[str, Floats]:
     """Draws of the constants and of the board's inputs: dict of (n,) array, SI."""
-    drawn = {name: one.sample(rng, n) for name, one in prior.constants.items()}
+    constants = {name: density.sample(rng, n) for name, density in prior.constants.items()}
     inputs = {name: quantity.value(rng.standard_normal(n)) for name, quantity in board.inputs.items()}
-    return with_rigidities({**inputs, **drawn})
+    return with_rigidities({**inputs, **constants})
 
 
 def with_rigidities(values: Values) -> dict[str, Floats]:

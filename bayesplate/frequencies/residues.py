@@ -1,7 +1,8 @@
-"""Residues: how strongly a mode shows between the place of the hammer and that of the sensor, and with which sign.
+"""Residues: how strongly a mode responds between the places of the hammer and of the sensor, and with which sign.
 
 The residue of a mode in the mobility between two places is the product of its mass-normalised deflections there. A mode
-with a nodal line near either place shows hardly or not at all; where both move the same way the residue is positive.
+with a nodal line near either place responds hardly or not at all; where both places move in the same direction, the
+residue is positive.
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ from bayesplate.plate.solve import Modes
 NODAL_LINE = 0.05
 """Residue over the largest that a shape could give, below which a place counts as lying on a nodal line.
 
-As far as that a computed residue may be off, too: neighbouring modes of one class mix otherwise on the real board, and
-places were read with a ruler.
+It is also the standard error of a computed residue: neighbouring modes of one class mix differently on the real board,
+and places were measured with a ruler.
 """
-_SURE = 1e-3
-"""Probability below which a mode does not have a sign."""
+_LEAST_PROBABILITY = 1e-3
+"""Smaller probabilities of a sign are set to zero."""
 
 _GRID = np.linspace(0.0, 1.0, 21)
 
@@ -46,11 +47,11 @@ def deflections(
     x, y = fractions_of(setup, place, values)
     if shaped is not None:
         x, y = shaped.placed(x, y)
-    at = modes.displacement(np.array([x]), np.array([y]))[:, 0, 0]
-    return np.asarray(at / _largest(modes, shaped))
+    deflection = modes.displacement(np.array([x]), np.array([y]))[:, 0, 0]
+    return np.asarray(deflection / _largest_deflections(modes, shaped))
 
 
-def _largest(modes: Modes, shaped: Effect | None) -> Floats:
+def _largest_deflections(modes: Modes, shaped: Effect | None) -> Floats:
     """The largest deflection of each mode on the plate: (n_modes,) array."""
     outline = None if shaped is None else shaped.outline()
     if outline is None:
@@ -60,14 +61,14 @@ def _largest(modes: Modes, shaped: Effect | None) -> Floats:
     return np.asarray(np.max(np.abs(modes.displacement_across(_GRID, places)), axis=(1, 2)))
 
 
-def share_seen(residues: Floats) -> Floats:
-    """Share of its chance to leave a peak that a mode keeps between hammer and sensor: (n_modes,) array, 0 to 1.
+def detection_share(residues: Floats) -> Floats:
+    """Factor on the probability that a mode leaves a peak, by its residue: (n_modes,) array, 0 to 1.
 
     It is r^2 / (r^2 + s^2) with s = `NODAL_LINE`, averaged over residues r that scatter about the computed one by s,
 
         1 - sqrt(pi / 2) Re w((r + i s) / (s sqrt 2)),
 
-    w being the Faddeeva function: a third of it is left where the computed residue is zero.
+    w being the Faddeeva function: a third remains where the computed residue is zero.
     """
     from scipy.special import wofz
 
@@ -78,10 +79,12 @@ def share_seen(residues: Floats) -> Floats:
 def sign_probabilities(residues: Floats) -> Floats:
     """Probability that the residue of each mode is positive, and that it is negative: (2, n_modes) array.
 
-    For a computed residue that is off by `NODAL_LINE`; one half each where none is known.
+    `NODAL_LINE` is the standard error of the computed residue; one half each where no residue is known.
     """
     from scipy.special import ndtr
 
     positive = ndtr(np.nan_to_num(residues) / NODAL_LINE)
-    positive = np.where(positive < _SURE, 0.0, np.where(positive > 1.0 - _SURE, 1.0, positive))
+    positive = np.where(
+        positive < _LEAST_PROBABILITY, 0.0, np.where(positive > 1.0 - _LEAST_PROBABILITY, 1.0, positive)
+    )
     return np.stack([positive, 1.0 - positive])

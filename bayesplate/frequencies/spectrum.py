@@ -1,4 +1,4 @@
-"""Every mode of a setup up to a frequency, with its label; what labels and signs say against it."""
+"""The lowest modes of a setup with their labels, and conflicts of measured labels and signs with them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from bayesplate.frequencies.model import SetupModel
 from bayesplate.frequencies.residues import NODAL_LINE, residues_of
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
-from bayesplate.plate.naming import CERTAIN, name_modes
+from bayesplate.plate.naming import CERTAIN_CORRELATION, name_modes
 from bayesplate.plate.plate import Plate
 from bayesplate.plate.solve import Modes, solve
 
@@ -39,32 +39,32 @@ def spectrum(
     plate = system.plate(values) if plate is None else plate
     modes = solve(plate, system.weights(values).at(0), n_modes)
     first = system.setup.first_label
-    named = []
+    named_modes = []
     for eigenvalue, ((i, j), correlation) in zip(modes.eigenvalues, name_modes(modes), strict=True):
-        label = Label(i + first.m, j + first.n) if correlation >= CERTAIN else None
-        named.append(NamedMode(label, float(np.sqrt(eigenvalue) / (2.0 * np.pi)), correlation))
-    return modes, tuple(named)
+        label = Label(i + first.m, j + first.n) if correlation >= CERTAIN_CORRELATION else None
+        named_modes.append(NamedMode(label, float(np.sqrt(eigenvalue) / (2.0 * np.pi)), correlation))
+    return modes, tuple(named_modes)
 
 
 def spectra(models: Sequence[SetupModel], values: Values) -> dict[str, tuple[Modes, tuple[NamedMode, ...]]]:
-    """Spectrum of every setup with a hammer, whose signs can be compared with it; at least two modes per reading."""
-    found = {}
+    """Spectrum of every setup with a hammer, to compare signs with; at least two modes for each reading."""
+    by_setup = {}
     for model in models:
         setup = model.setup
         if setup.hammer is not None:
             n_modes = max(_FEWEST_MODES, 2 * len(setup.readings))
-            found[setup.name] = spectrum(model.system, values, n_modes, model.plate)
-    return found
+            by_setup[setup.name] = spectrum(model.system, values, n_modes, model.plate)
+    return by_setup
 
 
 def doubtful_labels(models: Sequence[SetupModel]) -> tuple[str, ...]:
-    """One sentence per mode with a sure label that its shape does not clearly fit."""
+    """A sentence for each mode with a sure label that its shape does not clearly fit."""
     return tuple(
         f"setup {model.setup.name}: the shape of mode {reading.label} fits its label only to {place.correlation:.2f}; "
         "it may be its neighbour at a veering"
         for model in models
         for reading, place in zip(model.setup.readings, model.places, strict=True)
-        if reading.is_sure and place.correlation < CERTAIN
+        if reading.is_sure and place.correlation < CERTAIN_CORRELATION
     )
 
 
@@ -73,8 +73,8 @@ def sign_conflicts(
 ) -> tuple[str, ...]:
     """Sentences on labels whose measured sign of the residue differs from that of the shape.
 
-    Only where the setup states signs and the places are known, and where neither stands near a nodal line: there the
-    sign tells nothing.
+    Only where the setup states signs and both places are known and away from nodal lines, near which the sign is
+    uncertain.
     """
     stated = {reading.label: reading.sign for reading in setup.readings if reading.sign}
     residues = residues_of(setup, modes, values, shaped) if stated else None

@@ -1,4 +1,4 @@
-"""A setup with its effects: which plate it is, and what every term of it weighs."""
+"""A setup with its effects: its plate, and the weights of all its terms."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
-from bayesplate.board.setup import Ends, Setup
+from bayesplate.board.setup import EdgeConditions, Setup
 from bayesplate.effects import effects_of
 from bayesplate.effects.base import Contribution, Effect, Mass, Stiffness, Theory
-from bayesplate.frequencies.fabric import fabric_of, in_plane, over_fields
+from bayesplate.frequencies.fabric import fabric_of, in_plane_field, spread_over_fields
 from bayesplate.frequencies.terms import shear_term_weights, term_weights
-from bayesplate.plate.line import N_POINTS, N_POINTS_CUT, Hold, Holds, Line, line
+from bayesplate.plate.line import N_POINTS, N_POINTS_CUT, EndCondition, EndConditions, Line, line
 from bayesplate.plate.mesh import ELEMENTS_PER_SIDE, mesh
 from bayesplate.plate.plate import Plate, plate_of
 from bayesplate.plate.shear import SHEAR_ELEMENTS_PER_SIDE, SHEAR_FLEXIBLE
 from bayesplate.plate.terms import Weights
 from bayesplate.plate.thin import THIN
 
-Limits = tuple[Floats, Floats]
+WidthLimits = tuple[Floats, Floats]
 """Where a plate begins and ends along y at some points of its length, (n,) arrays, as fractions of its widest width."""
 
 
@@ -44,9 +44,9 @@ class System:
         finest = max((effect.refines for effect in self.effects), default=1.0)
         per_side = SHEAR_ELEMENTS_PER_SIDE if is_sheared else round(ELEMENTS_PER_SIDE * finest)
         n_points = N_POINTS if self.shaped is None else N_POINTS_CUT
-        symmetry = zip(*((True, True), *(effect.keeps_symmetry() for effect in self._acting)), strict=True)
+        symmetry = zip(*((True, True), *(effect.keeps_symmetry() for effect in self._acting_effects)), strict=True)
         x, y = (
-            line(ends, n, is_sheared, all(keeps), self._held(ends), n_points)
+            line(ends, n, is_sheared, all(keeps), self._holds(ends), n_points)
             for ends, n, keeps in zip(
                 (self.setup.ends_x, self.setup.ends_y),
                 mesh(term_weights(values, self.setup).at(0), per_side),
@@ -55,29 +55,36 @@ class System:
             )
         )
         adjusted = self.adjusted(values)
-        membrane = in_plane(self.effects, adjusted)
+        membrane = in_plane_field(self.effects, adjusted)
         stiffness, masses = (
-            [term for one in self._contributions(kind) for term in one.terms_at(adjusted, membrane)]
+            [term for contribution in self._contributions(kind) for term in contribution.terms_at(adjusted, membrane)]
             for kind in (Stiffness, Mass)
         )
-        return _bare(self.theory, self._acting, x, y).with_terms(stiffness, masses)
+        return _bare_plate(self.theory, self._acting_effects, x, y).with_terms(stiffness, masses)
 
     @cached_property
     def stations(self) -> tuple[System, ...]:
-        """The system with what roved at each of its places; itself where nothing did."""
-        return tuple(replace(self, effects=each) for each in product(*(effect.stations() for effect in self.effects)))
+        """The system with the roving item at each of its places; itself where nothing roved."""
+        return tuple(
+            replace(self, effects=effects) for effects in product(*(effect.stations() for effect in self.effects))
+        )
 
     def _contributions(self, kind: type[Contribution]) -> list[Contribution]:
-        """What the effects add to the budget of energies: terms and weights are both read from this one list."""
-        return [one for effect in self._acting for one in effect.contributions() if isinstance(one, kind)]
+        """Contributions of the effects to the energies: terms and weights are both read from this list."""
+        return [
+            contribution
+            for effect in self._acting_effects
+            for contribution in effect.contributions()
+            if isinstance(contribution, kind)
+        ]
 
-    def _held(self, ends: Ends) -> Holds:
-        """What the ends still hold where effects have released clamped ones."""
+    def _holds(self, ends: EdgeConditions) -> EndConditions:
+        """The degrees of freedom that the ends hold, where effects may have released clamped ends."""
         released = {effect.releases for effect in self.effects} - {""}
-        left: Hold = "clamped"
+        released_hold: EndCondition = "clamped"
         if released:
-            left = "free" if len(released) == 2 else "supported" if released == {"slope"} else "guided"
-        low, high = (left if end == "clamped" else end for end in ends)
+            released_hold = "free" if len(released) == 2 else "supported" if released == {"slope"} else "guided"
+        low, high = (released_hold if end == "clamped" else end for end in ends)
         return low, high
 
     @property
@@ -85,35 +92,38 @@ class System:
         """The effect that gives the plate its outline, where that is not the whole rectangle."""
         return next((effect for effect in self.effects if effect.outline() is not None), None)
 
-    def limits(self, x: Floats) -> Limits | None:
+    def limits(self, x: Floats) -> WidthLimits | None:
         """Ends of the plate along y at fractions of its length, as fractions of its widest width; None: a rectangle."""
         outline = None if self.shaped is None else self.shaped.outline()
         return None if outline is None else outline(x)
 
     @cached_property
-    def _acting(self) -> tuple[Effect, ...]:
-        """The effects as they act on the true outline, where one of them gives it."""
+    def _acting_effects(self) -> tuple[Effect, ...]:
+        """The effects as they act within the true outline, where an effect gives one."""
         shaped = self.shaped
         return self.effects if shaped is None else tuple(effect.within(shaped) for effect in self.effects)
 
     def adjusted(self, values: Values) -> Values:
-        """The values as all weights take them: sizes and density corrected, shear moduli where the plate has them."""
+        """Values for all weights: sizes and density corrected by effects, shear moduli where the plate has them."""
         for effect in self.effects:
             values = effect.adjusted(values)
         return values
 
     def weights(self, values: Values) -> Weights:
-        """What every term weighs: (n_draws, n_terms) and (n_draws, n_masses) arrays."""
+        """Weights of all terms: (n_draws, n_terms) of stiffness and (n_draws, n_masses) of mass."""
         values = self.adjusted(values)
         base = (shear_term_weights if self.theory == "shear-flexible" else term_weights)(values, self.setup)
-        base = over_fields(base, self.effects, self.theory, values, self.setup)
-        added = ([one.columns(values, self.setup) for one in self._contributions(kind)] for kind in (Stiffness, Mass))
-        columns = [[own, *further] for own, further in zip(base, added, strict=True)]
-        n_draws = max(len(one) for each in columns for one in each)
+        base = spread_over_fields(base, self.effects, self.theory, values, self.setup)
+        added = (
+            [contribution.columns(values, self.setup) for contribution in self._contributions(kind)]
+            for kind in (Stiffness, Mass)
+        )
+        blocks = [[plate_columns, *effect_columns] for plate_columns, effect_columns in zip(base, added, strict=True)]
+        n_draws = max(len(block) for kind in blocks for block in kind)
         return Weights(
             *(
-                np.concatenate([np.broadcast_to(one, (n_draws, one.shape[1])) for one in each], axis=1)
-                for each in columns
+                np.concatenate([np.broadcast_to(block, (n_draws, block.shape[1])) for block in kind], axis=1)
+                for kind in blocks
             )
         )
 
@@ -123,6 +133,6 @@ def system_of(board: Board, setup: Setup) -> System:
 
 
 @lru_cache(maxsize=8)
-def _bare(theory: Theory, effects: tuple[Effect, ...], x: Line, y: Line) -> Plate:
-    """The plate with its own terms alone, spread over the fields that effects give it."""
+def _bare_plate(theory: Theory, effects: tuple[Effect, ...], x: Line, y: Line) -> Plate:
+    """The plate with its own terms only, spread over the fields of the effects."""
     return plate_of(SHEAR_FLEXIBLE if theory == "shear-flexible" else THIN, x, y, fabric_of(effects))

@@ -1,11 +1,11 @@
-"""What the terms of a setup weigh: from constants and sizes to the weights of stiffness and mass."""
+"""Weights of a setup's stiffness and mass terms, from constants and sizes."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from bayesplate.arrays import Floats
-from bayesplate.board.board import Values, density, vibrating_lengths
+from bayesplate.board.board import Values, board_density, vibrating_lengths
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.board.setup import Setup
 from bayesplate.plate.shear import SHEAR_CORRECTION
@@ -19,7 +19,7 @@ def term_weights(values: Values, setup: Setup) -> Weights:
     (Ducceschi et al., eq. (11)). Values are numbers or (n_draws,) arrays, D_x, D_y, D_s in N m.
     """
     length_x, length_y = vibrating_lengths(values, setup)
-    mass = density(values) * values["thickness"] * length_x * length_y
+    mass = board_density(values) * values["thickness"] * length_x * length_y
     area = length_x * length_y
     stiffness = np.stack(
         np.broadcast_arrays(
@@ -34,9 +34,9 @@ def term_weights(values: Values, setup: Setup) -> Weights:
 
 
 def shear_moduli(values: Values) -> tuple[Floats, Floats]:
-    """G_xz and G_yz, Pa; one that is not there is G_xy, as in a plate that is alike in all directions."""
-    of_plane = 3.0 * values["D_s"] / np.asarray(values["thickness"]) ** 3
-    return np.asarray(values.get("G_xz", of_plane)), np.asarray(values.get("G_yz", of_plane))
+    """G_xz and G_yz, Pa; a missing one is taken as G_xy, as in an isotropic plate."""
+    in_plane = 3.0 * values["D_s"] / np.asarray(values["thickness"]) ** 3
+    return np.asarray(values.get("G_xz", in_plane)), np.asarray(values.get("G_yz", in_plane))
 
 
 def shear_term_weights(values: Values, setup: Setup) -> Weights:
@@ -47,8 +47,8 @@ def shear_term_weights(values: Values, setup: Setup) -> Weights:
     thin = term_weights(values, setup)
     length_x, length_y = vibrating_lengths(values, setup)
     thickness, (G_xz, G_yz) = np.asarray(values["thickness"]), shear_moduli(values)
-    # Board mass and thickness cancel from S_x / m, up to density and the area.
-    per_modulus = SHEAR_CORRECTION / density(values)
+    # Mass and thickness of the board cancel in S_x / m, up to density and area.
+    per_modulus = SHEAR_CORRECTION / board_density(values)
     columns = (
         per_modulus * G_xz / length_x**2,
         per_modulus * G_yz / length_y**2,
@@ -64,9 +64,9 @@ def shear_term_weights(values: Values, setup: Setup) -> Weights:
 
 
 def along_grain(base: Weights, values: Values, setup: Setup) -> Weights:
-    """What the modulus along the grain alone gives to the weights `base`: E_x h^3 / 12 = D_x - nu_xy^2 D_y in K_xx.
+    """The part of the weights `base` due to the modulus along the grain: E_x h^3 / 12 = D_x - nu_xy^2 D_y in K_xx.
 
-    The plate's own terms stand first in `base`; all others are zero in the result.
+    The plate's own terms come first in `base`; all others are zero in the result.
     """
     length_x, length_y = vibrating_lengths(values, setup)
     xx, _, mix, *_ = np.moveaxis(base.stiffness, -1, 0)

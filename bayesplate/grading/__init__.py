@@ -1,1 +1,1 @@
-"""Many fitted boards: their rows, figures of makers, limits that they meet, partners that match them."""
+"""Many fitted boards: table rows, makers' figures, limits of a specification, pairs of matching boards."""

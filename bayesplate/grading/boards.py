@@ -1,4 +1,4 @@
-"""A board of many as a row of a table, and what became of all of them: batch.json; SI units."""
+"""The boards of a batch as table rows, and the summary of the batch as batch.json has it; SI units."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from bayesplate.board.material import MODULI, RIGIDITIES
-from bayesplate.results.contract import JOINT, Joint, Spread
+from bayesplate.results.contract import JOINT_NAMES, JointMoments, Spread
 from bayesplate.results.summary import Summary
 
 FITTED = "fitted"
-MAKERS = (
+MAKERS_QUANTITIES = (
     "density",
     "wave_speed_x",
     "wave_speed_y",
@@ -20,52 +20,56 @@ MAKERS = (
     "impedance_x",
     "anisotropy",
 )
-"""Which of the derived quantities a table of many boards has."""
-_ENDS = ("mean", "sd", "q05", "q50", "q95")
+"""Derived quantities in the table of a batch."""
+_STATISTICS = ("mean", "sd", "q05", "q50", "q95")
 _CORRELATED = (*MODULI, "density")
 _PAIRS = tuple((a, b) for i, a in enumerate(_CORRELATED) for b in _CORRELATED[i + 1 :])
-WORDS = ("name", "outcome", "message", "doubt", "card_sha256", "seed", "theory", "law", "effects", "prior")
-"""Columns of texts, but for the seed."""
-NUMBERS = (
-    *(f"{name}_{end}" for name in MODULI for end in _ENDS),
-    *(f"{name}_{end}" for name in (*RIGIDITIES, *MAKERS) for end in ("mean", "sd")),
+TEXT_COLUMNS = ("name", "outcome", "message", "doubt", "card_sha256", "seed", "theory", "law", "effects", "prior")
+"""Columns of texts; the seed is an integer."""
+NUMBER_COLUMNS = (
+    *(f"{name}_{statistic}" for name in MODULI for statistic in _STATISTICS),
+    *(f"{name}_{statistic}" for name in (*RIGIDITIES, *MAKERS_QUANTITIES) for statistic in ("mean", "sd")),
     *(f"correlation_{a}_{b}" for a, b in _PAIRS),
     "n_modes",
     "in_sample_rms_cents",
     "leave_one_out_rms_cents",
     "n_warnings",
 )
-"""Columns of numbers; correlations are those of logarithms."""
+"""Columns of numbers; the correlations are between logarithms."""
 
 
 @dataclass(frozen=True)
 class BoardRow:
-    """What became of one board of many."""
+    """The outcome of one board of a batch."""
 
-    name: str  # of a card that could not be read that of its file
-    outcome: str  # "fitted", or why there are no constants, in two or three words
+    name: str  # of the board, or of the file where its card could not be read
+    outcome: str  # "fitted", or in two or three words why there are no constants
     message: str = ""  # of the error
     doubt: str = ""  # why the constants of a fitted board are not to be trusted
     card_sha256: str = ""
     seed: int | None = None
-    told: Mapping[str, str] | None = None  # of a fitted board, by the names of `WORDS`
-    numbers: Mapping[str, float | None] | None = None  # likewise of `NUMBERS`
-    joint: Joint | None = None  # how its constants vary together
+    told: Mapping[str, str] | None = None  # theory, law, effects and prior of a fitted board, by `TEXT_COLUMNS`
+    numbers: Mapping[str, float | None] | None = None  # numbers of a fitted board, by `NUMBER_COLUMNS`
+    joint: JointMoments | None = None  # joint moments of its constants
     readings_sha256: str = ""
 
     @property
     def is_fitted(self) -> bool:
-        """Whether it has constants."""
+        """Whether the board has constants."""
         return self.outcome == FITTED
 
     def cells(self) -> list[str | float | int | None]:
-        """The row, in the order of `WORDS` and `NUMBERS`."""
-        told, numbers = self.told or {}, self.numbers or {}
+        """The cells of the row, in the order of `TEXT_COLUMNS` and `NUMBER_COLUMNS`."""
+        model, numbers = self.told or {}, self.numbers or {}
         texts = [self.name, self.outcome, self.message, self.doubt, self.card_sha256, self.seed]
-        return [*texts, *(told.get(word) for word in WORDS[len(texts) :]), *(numbers.get(name) for name in NUMBERS)]
+        return [
+            *texts,
+            *(model.get(word) for word in TEXT_COLUMNS[len(texts) :]),
+            *(numbers.get(name) for name in NUMBER_COLUMNS),
+        ]
 
 
-def row_of(summary: Summary) -> BoardRow:
+def board_row(summary: Summary) -> BoardRow:
     """The row of a fitted board."""
     model = summary.model
     return BoardRow(
@@ -80,60 +84,63 @@ def row_of(summary: Summary) -> BoardRow:
             "effects": " ".join(model.effects),
             "prior": model.prior,
         },
-        numbers=_numbers(summary),
+        numbers=_number_cells(summary),
         joint=summary.joint,
     )
 
 
-def _numbers(summary: Summary) -> dict[str, float | None]:
-    found: dict[str, float | None] = {}
+def _number_cells(summary: Summary) -> dict[str, float | None]:
+    numbers: dict[str, float | None] = {}
     for name, entry in summary.elastic.items():
-        found |= {f"{name}_{end}": getattr(entry, end) for end in _ENDS}
-    spreads: dict[str, Spread] = {**dict(summary.rigidity.items()), **{name: summary.derived[name] for name in MAKERS}}
+        numbers |= {f"{name}_{statistic}": getattr(entry, statistic) for statistic in _STATISTICS}
+    spreads: dict[str, Spread] = {
+        **dict(summary.rigidity.items()),
+        **{name: summary.derived[name] for name in MAKERS_QUANTITIES},
+    }
     for name, entry in spreads.items():
-        found |= {f"{name}_mean": entry.mean, f"{name}_sd": entry.sd}
-    found |= {f"correlation_{a}_{b}": _correlation(summary.joint, a, b) for a, b in _PAIRS}
-    found["n_modes"] = float(len(summary.modes))
-    found["in_sample_rms_cents"] = summary.error.in_sample_rms_cents
-    found["leave_one_out_rms_cents"] = summary.error.leave_one_out_rms_cents
-    found["n_warnings"] = float(len(summary.warnings))
-    return found
+        numbers |= {f"{name}_mean": entry.mean, f"{name}_sd": entry.sd}
+    numbers |= {f"correlation_{a}_{b}": _log_correlation(summary.joint, a, b) for a, b in _PAIRS}
+    numbers["n_modes"] = float(len(summary.modes))
+    numbers["in_sample_rms_cents"] = summary.error.in_sample_rms_cents
+    numbers["leave_one_out_rms_cents"] = summary.error.leave_one_out_rms_cents
+    numbers["n_warnings"] = float(len(summary.warnings))
+    return numbers
 
 
-def _correlation(joint: Joint, a: str, b: str) -> float | None:
-    """Of two logarithms; None where one of them is exact."""
-    i, j = JOINT.index(a), JOINT.index(b)
-    spread = (joint.log_covariance[i][i] * joint.log_covariance[j][j]) ** 0.5
-    return joint.log_covariance[i][j] / spread if spread > 0.0 else None
+def _log_correlation(joint: JointMoments, a: str, b: str) -> float | None:
+    """Correlation of the logarithms of two quantities; None where one of them is exact."""
+    i, j = JOINT_NAMES.index(a), JOINT_NAMES.index(b)
+    sd_product = (joint.log_covariance[i][i] * joint.log_covariance[j][j]) ** 0.5
+    return joint.log_covariance[i][j] / sd_product if sd_product > 0.0 else None
 
 
-_MOST_NAMED = 3
+_MOST_COPIES = 3
 
 
-def with_copies_in_doubt(rows: Sequence[BoardRow]) -> list[BoardRow]:
-    """The rows; those of boards whose readings are alike to the last digit say so among their doubts."""
-    alike: dict[str, list[str]] = defaultdict(list)
+def mark_copied_readings(rows: Sequence[BoardRow]) -> list[BoardRow]:
+    """The rows, with a doubt on each board whose readings equal those of another board to the last digit."""
+    board_names: dict[str, list[str]] = defaultdict(list)
     for row in rows:
-        alike[row.readings_sha256].append(row.name)
-    found = []
+        board_names[row.readings_sha256].append(row.name)
+    marked_rows = []
     for row in rows:
-        others = [name for name in alike[row.readings_sha256] if name != row.name] if row.readings_sha256 else []
-        if others:
-            more = f" and {len(others) - _MOST_NAMED} more" if len(others) > _MOST_NAMED else ""
-            which = ", ".join(others[:_MOST_NAMED]) + more
-            copied = f"every reading is that of {which} to the last digit: one board twice, or a copy?"
-            row = replace(row, doubt="; ".join(filter(None, (copied, row.doubt))))
-        found.append(row)
-    return found
+        copies = [name for name in board_names[row.readings_sha256] if name != row.name] if row.readings_sha256 else []
+        if copies:
+            surplus = f" and {len(copies) - _MOST_COPIES} more" if len(copies) > _MOST_COPIES else ""
+            listed = ", ".join(copies[:_MOST_COPIES]) + surplus
+            doubt = f"every reading is that of {listed} to the last digit: one board twice, or a copy?"
+            row = replace(row, doubt="; ".join(filter(None, (doubt, row.doubt))))
+        marked_rows.append(row)
+    return marked_rows
 
 
 FORMAT = 1
-_MOST_TOLD = 10
+_MOST_FAILURES = 10
 
 
 @dataclass(frozen=True)
-class Failure:
-    """A board that was not fitted: its name, what became of it, and the message of the error."""
+class FailedBoard:
+    """A board that was not fitted: its name, its outcome and the message of the error."""
 
     name: str
     outcome: str
@@ -141,8 +148,8 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class Doubt:
-    """A board that was fitted and whose constants are not to be trusted, and why."""
+class DoubtfulBoard:
+    """A fitted board whose constants are not to be trusted, and why."""
 
     name: str
     doubt: str
@@ -150,22 +157,22 @@ class Doubt:
 
 @dataclass(frozen=True)
 class BatchSummary:
-    """What became of the boards of a batch; tuples are in the order of the names."""
+    """The outcome of a batch; tuples are in the order of the names."""
 
     format: int
-    seed: int  # from which each board's own follows
+    seed: int  # from which the seed of each board follows
     versions: Mapping[str, str]
     n_boards: int
     n_fitted: int
     n_failed: int
-    failed: tuple[Failure, ...]
-    doubts: tuple[Doubt, ...]
+    failed: tuple[FailedBoard, ...]
+    doubts: tuple[DoubtfulBoard, ...]
     aside: tuple[str, ...]  # files that are cards of another kind
 
     def failures_text(self, table: str) -> str:
-        """The boards that were not fitted, the first ten with their reasons, and where the others stand."""
+        """The boards that were not fitted: the first ten with their reasons, and the table that has the others."""
         lines = [f"{self.n_failed} of {self.n_boards} boards were not fitted, the others are written:"]
-        lines += [f"{one.name}: {one.outcome}: {one.message}" for one in self.failed[:_MOST_TOLD]]
-        if self.n_failed > _MOST_TOLD:
-            lines.append(f"and {self.n_failed - _MOST_TOLD} more, in {table}")
+        lines += [f"{failure.name}: {failure.outcome}: {failure.message}" for failure in self.failed[:_MOST_FAILURES]]
+        if self.n_failed > _MOST_FAILURES:
+            lines.append(f"and {self.n_failed - _MOST_FAILURES} more, in {table}")
         return "\n".join([*lines, "correct their cards or rows: --resume then fits these alone"])

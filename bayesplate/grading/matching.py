@@ -1,4 +1,4 @@
-"""What fitted boards are good for: limits that they meet, and partners that match them like the halves of a book."""
+"""Grading of fitted boards: the limits that they meet, and book-matched pairs."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from bayesplate.grading.boards import BoardRow
 from bayesplate.grading.figures import FIGURES, LogFigure, box_probability, covariance_along, target_thickness
 
 MATCH_PERCENT = 10.0
-LEAST_PROBABILITY = 0.05
-"""Pairs that match with less are not proposed."""
-_NEAREST = 12
-"""Partners that are looked at for each board."""
-TARGET = "target_thickness"
-SHOWN = ("density", "wave_speed_x", "wave_speed_y", "radiation_ratio_x", "anisotropy")
-"""Figures of makers that every grading has."""
-NINETY = 1.6448536269514722
+LEAST_MATCH_PROBABILITY = 0.05
+"""Pairs with a smaller probability of matching are not proposed."""
+_N_NEIGHBOURS = 12
+"""Nearest boards examined as partners of each board."""
+TARGET_THICKNESS = "target_thickness"
+MAKERS_FIGURES = ("density", "wave_speed_x", "wave_speed_y", "radiation_ratio_x", "anisotropy")
+"""Makers' figures in every grading."""
+HALF_WIDTH_90 = 1.6448536269514722
 """Half the width of a normal 90 % interval, standard deviations."""
 
 
 @dataclass(frozen=True)
 class GradingRequest:
-    """What boards are graded by.
+    """Tolerances, limits and target by which boards are graded.
 
     Attributes
     ----------
@@ -45,15 +45,15 @@ class GradingRequest:
 
     @property
     def figures(self) -> dict[str, LogFigure]:
-        """What is shown of each board besides its moduli, by name."""
-        names = dict.fromkeys((*SHOWN, *(name for name in self.limits if name not in MODULI)))
-        target = {} if self.rigidity is None else {TARGET: target_thickness(self.rigidity)}
+        """Figures shown of each board besides its moduli, by name."""
+        names = dict.fromkeys((*MAKERS_FIGURES, *(name for name in self.limits if name not in MODULI)))
+        target = {} if self.rigidity is None else {TARGET_THICKNESS: target_thickness(self.rigidity)}
         return {**{name: FIGURES[name] for name in names}, **target}
 
 
 @dataclass(frozen=True, slots=True)
-class Pair:
-    """Two boards, by their places, and the probability that they match."""
+class BoardPair:
+    """Two boards, by their indices, and the probability that they match."""
 
     first: int
     second: int
@@ -62,22 +62,22 @@ class Pair:
 
 @dataclass(frozen=True, eq=False)
 class Grading:
-    """Fitted boards and what they are good for; arrays are in the order of the names.
+    """Graded boards; arrays are in the order of the names.
 
     Attributes
     ----------
     request : GradingRequest
     names : tuple of str
     doubts : tuple of str
-        Why a board's constants are not to be trusted, empty where nothing speaks against them.
+        Why a board's constants are not to be trusted; empty where there is no doubt.
     log_mean : (n, 7) array
-        Of ln E_x, E_y, G_xy, D_x, D_y, D_s and density, SI.
+        Mean of ln E_x, E_y, G_xy, D_x, D_y, D_s and density, SI.
     log_covariance : (n, 7, 7) array
     meets : dict of (n,) array
-        Probability of each limit by the name of its figure.
+        Probability that each limit is met, by the name of its figure.
     meets_all : (n,) array or None
-        Of all limits together; None where there is none.
-    pairs : tuple of Pair
+        Probability that all limits are met; None without limits.
+    pairs : tuple of BoardPair
         None of them with a board in doubt.
     """
 
@@ -88,38 +88,40 @@ class Grading:
     log_covariance: Floats
     meets: Mapping[str, Floats]
     meets_all: Floats | None
-    pairs: tuple[Pair, ...]
+    pairs: tuple[BoardPair, ...]
 
     def log(self, figure: LogFigure, boards: slice | Sequence[int] = slice(None)) -> tuple[Floats, Floats]:
         """Mean and standard deviation of the logarithm of a figure of some boards, SI: (n,) arrays."""
         return figure.log(self.log_mean[boards], self.log_covariance[boards])
 
     def spread(self, figure: LogFigure, boards: slice | Sequence[int] = slice(None)) -> tuple[Floats, Floats, Floats]:
-        """Median, and the ends of the 90 % interval of some boards, in the unit of people: (n,) arrays."""
+        """Median and ends of the 90 % interval of some boards, in the figure's unit: (n,) arrays."""
         mean, sd = self.log(figure, boards)
-        middle, low, high = (np.exp(mean + at * sd) / figure.per_unit for at in (0.0, -NINETY, NINETY))
-        return middle, low, high
+        median, low, high = (
+            np.exp(mean + n_sd * sd) / figure.per_unit for n_sd in (0.0, -HALF_WIDTH_90, HALF_WIDTH_90)
+        )
+        return median, low, high
 
     @property
     def trusted(self) -> NDArray[np.intp]:
-        """Places of the boards that are not in doubt."""
-        return np.flatnonzero([not one for one in self.doubts])
+        """Indices of the boards that are not in doubt."""
+        return np.flatnonzero([not doubt for doubt in self.doubts])
 
     @property
     def partners(self) -> dict[int, tuple[int, float]]:
-        """Place of each board's partner and the probability that they match, by the place of the board."""
-        both = {pair.first: (pair.second, pair.probability) for pair in self.pairs}
-        return both | {pair.second: (pair.first, pair.probability) for pair in self.pairs}
+        """Index of each board's partner and the probability that they match, by the index of the board."""
+        partners = {pair.first: (pair.second, pair.probability) for pair in self.pairs}
+        return partners | {pair.second: (pair.first, pair.probability) for pair in self.pairs}
 
 
 def grade(rows: Sequence[BoardRow], request: GradingRequest) -> Grading:
-    """Grade fitted boards, constants and density log-normal together with the moments of the logs of the draws."""
+    """Grade fitted boards; constants and density are taken to be jointly log-normal, with the draws' log moments."""
     fitted = [(row, row.joint) for row in rows if row.joint is not None]
     log_mean = np.array([joint.log_mean for _, joint in fitted]).reshape(-1, 7)
     covariance = np.array([joint.log_covariance for _, joint in fitted]).reshape(-1, 7, 7)
-    some = np.flatnonzero([not row.doubt for row, _ in fitted])
-    meets, meets_all = _meets(log_mean, covariance, request.limits)
-    pairs = proposed_pairs(log_mean[some], covariance[some], request.match_percent)
+    trusted = np.flatnonzero([not row.doubt for row, _ in fitted])
+    meets, meets_all = _limit_probabilities(log_mean, covariance, request.limits)
+    pairs = proposed_pairs(log_mean[trusted], covariance[trusted], request.match_percent)
     return Grading(
         request=request,
         names=tuple(row.name for row, _ in fitted),
@@ -128,55 +130,57 @@ def grade(rows: Sequence[BoardRow], request: GradingRequest) -> Grading:
         log_covariance=covariance,
         meets=meets,
         meets_all=meets_all,
-        pairs=tuple(Pair(int(some[one.first]), int(some[one.second]), one.probability) for one in pairs),
+        pairs=tuple(BoardPair(int(trusted[pair.first]), int(trusted[pair.second]), pair.probability) for pair in pairs),
     )
 
 
-def proposed_pairs(log_mean: Floats, covariance: Floats, percent: Mapping[str, float]) -> tuple[Pair, ...]:
-    """Pairs of boards, each board at most once, the likeliest match first; none that matches with less than 5 %.
+def proposed_pairs(log_mean: Floats, covariance: Floats, percent: Mapping[str, float]) -> tuple[BoardPair, ...]:
+    """Pairs of boards, each board at most once, the likeliest match first; none below a probability of 5 %.
 
-    Two boards match if each figure of the one is that of the other within its tolerance, a name and per cents of
-    `percent`: |ln(E_a / E_b)| <= ln(1 + tolerance). Their errors are taken to be independent.
+    Two boards match if each figure of `percent` agrees within its tolerance in per cent: |ln(E_a / E_b)| <=
+    ln(1 + tolerance). The errors of two boards are taken to be independent.
     """
     from scipy.spatial import KDTree
 
     if len(log_mean) < 2 or not percent:
         return ()
-    along = np.stack([FIGURES[name].direction for name in percent])
+    directions = np.stack([FIGURES[name].direction for name in percent])
     width = np.log1p(np.array(list(percent.values())) / 100.0)
-    mean, own = log_mean @ along.T, covariance_along(along, covariance)
-    spread = np.median(2.0 * np.diagonal(own, axis1=1, axis2=2), axis=0)
+    mean, covariances = log_mean @ directions.T, covariance_along(directions, covariance)
+    spread = np.median(2.0 * np.diagonal(covariances, axis1=1, axis2=2), axis=0)
     tree = KDTree(mean / np.sqrt(width**2 + spread))
-    partners = tree.query(tree.data, k=min(_NEAREST + 1, len(mean)))[1]
+    partners = tree.query(tree.data, k=min(_N_NEIGHBOURS + 1, len(mean)))[1]
     boards = np.broadcast_to(np.arange(len(mean))[:, None], partners.shape)
-    both = np.unique(np.sort(np.stack([boards.ravel(), partners.ravel()], axis=1), axis=1), axis=0)
-    first, second = both[both[:, 0] < both[:, 1]].T
-    probability = box_probability(mean[first] - mean[second], own[first] + own[second], -width, width)
-    pairs: list[Pair] = []
-    taken: set[int] = set()
+    candidates = np.unique(np.sort(np.stack([boards.ravel(), partners.ravel()], axis=1), axis=1), axis=0)
+    first, second = candidates[candidates[:, 0] < candidates[:, 1]].T
+    probability = box_probability(mean[first] - mean[second], covariances[first] + covariances[second], -width, width)
+    pairs: list[BoardPair] = []
+    paired: set[int] = set()
     for i in np.argsort(-probability, kind="stable"):
-        pair = Pair(int(first[i]), int(second[i]), float(probability[i]))
-        if pair.probability >= LEAST_PROBABILITY and taken.isdisjoint((pair.first, pair.second)):
+        pair = BoardPair(int(first[i]), int(second[i]), float(probability[i]))
+        if pair.probability >= LEAST_MATCH_PROBABILITY and paired.isdisjoint((pair.first, pair.second)):
             pairs.append(pair)
-            taken |= {pair.first, pair.second}
+            paired |= {pair.first, pair.second}
     return tuple(pairs)
 
 
-def _meets(
+def _limit_probabilities(
     log_mean: Floats, covariance: Floats, limits: Mapping[str, tuple[float | None, float | None]]
 ) -> tuple[dict[str, Floats], Floats | None]:
-    """The probability of each limit, and of all."""
+    """Probability that each limit is met, and that all are."""
     if not limits:
         return {}, None
-    along = np.stack([FIGURES[name].direction for name in limits])
-    mean = log_mean @ along.T + np.log([FIGURES[name].factor for name in limits])
-    both = covariance_along(along, covariance)
-    low = np.array([-np.inf if one is None else np.log(one) for one, _ in limits.values()])
-    high = np.array([np.inf if one is None else np.log(one) for _, one in limits.values()])
-    each = {name: _within(mean, both, low, high, slice(i, i + 1)) for i, name in enumerate(limits)}
-    return each, _within(mean, both, low, high, slice(None))
+    directions = np.stack([FIGURES[name].direction for name in limits])
+    mean = log_mean @ directions.T + np.log([FIGURES[name].factor for name in limits])
+    covariances = covariance_along(directions, covariance)
+    low = np.array([-np.inf if least is None else np.log(least) for least, _ in limits.values()])
+    high = np.array([np.inf if greatest is None else np.log(greatest) for _, greatest in limits.values()])
+    probabilities = {
+        name: _joint_probability(mean, covariances, low, high, slice(i, i + 1)) for i, name in enumerate(limits)
+    }
+    return probabilities, _joint_probability(mean, covariances, low, high, slice(None))
 
 
-def _within(mean: Floats, covariance: Floats, low: Floats, high: Floats, some: slice) -> Floats:
-    """The probability of some of the limits."""
-    return box_probability(mean[:, some], covariance[:, some, some], low[some], high[some])
+def _joint_probability(mean: Floats, covariance: Floats, low: Floats, high: Floats, selection: slice) -> Floats:
+    """Joint probability that the selected limits are met."""
+    return box_probability(mean[:, selection], covariance[:, selection, selection], low[selection], high[selection])

@@ -1,1 +1,1 @@
-"""What to measure next: what each further reading is expected to give, and at what cost."""
+"""Planning of measurements: the expected gain and the cost of each further reading."""

@@ -1,4 +1,4 @@
-"""A plan, drawn up; and what to do at the bench: the modes to look for, and where sensor and hammer go."""
+"""The plan, and the work at the bench: the modes to look for, and the places of sensor and hammer."""
 
 from __future__ import annotations
 
@@ -10,60 +10,67 @@ import numpy as np
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
 from bayesplate.board.prior import PriorCard
-from bayesplate.campaign.shared import Shared
+from bayesplate.campaign.shared import SharedParameter
 from bayesplate.effects import Effect
 from bayesplate.effects.attached_items import fractions_on, places_on
-from bayesplate.estimates.sheet import NUMBERS_OF_MODES, Sheet, points, sheet
-from bayesplate.frequencies.prior_bands import WITHIN
+from bayesplate.estimates.sheet import NUMBERS_OF_MODES, Sheet, grid_points, sheet
+from bayesplate.frequencies.prior_bands import BAND_QUANTILES
 from bayesplate.frequencies.residues import NODAL_LINE
 from bayesplate.planning.beliefs import Beliefs, KnownBoard
-from bayesplate.planning.gains import Readings
+from bayesplate.planning.gains import PlannedReadings
 from bayesplate.planning.laws import BareLaw
 from bayesplate.planning.plan import FORMAT, BenchEntry, ExplanationEntry, ModeToFind, Plan
 from bayesplate.planning.proposals import Planner, Proposal
-from bayesplate.planning.stations import SEARCHED, Station
+from bayesplate.planning.stations import N_SEARCHED_MODES, Station
 from bayesplate.planning.tables import first_line
 
-BAND = (WITHIN[0], 0.5, WITHIN[1])
+BAND = (BAND_QUANTILES[0], 0.5, BAND_QUANTILES[1])
 """Probabilities of the ends of a band and of its middle."""
-_EVERY = 5
-"""Of the grid of a sheet: so far apart places for sensor and hammer are tried."""
-_MOST = 2
-_LEVELS = 401
+_GRID_STEP = 5
+"""Steps on the grid of a sheet between the places that are tried for sensor and hammer."""
+_MOST_BENCHES = 2
+_N_LEVELS = 401
 """Equally probable readings that stand for each term."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """What to do at the bench for one way to hold the board."""
+    """The work at the bench for one way to hold the board."""
 
     entry: BenchEntry
-    sheet: Sheet  # of the modes to look for alone
+    sheet: Sheet  # of the modes to look for only
     placing: Placing
 
 
-def benches(beliefs: Beliefs, steps: Sequence[Proposal]) -> tuple[Bench, ...]:
-    """For each way to hold a board that proposals ask for, two at most, the modes to look for."""
+def make_benches(beliefs: Beliefs, steps: Sequence[Proposal]) -> tuple[Bench, ...]:
+    """The bench of each way to hold a board that proposals ask for, two at most."""
     likely = "over all explanations that survive" if len(beliefs.explanations) > 1 else "by what is known now"
-    made: list[Bench] = []
-    for one in steps:
-        if one.known is not None and one.read is not None and one.entry.what != "again" and len(made) < _MOST:
-            made.append(bench_of(one.known, one.read.law, one.rows, bands(beliefs, one.readings), likely))
-    return tuple(made)
+    benches: list[Bench] = []
+    for step in steps:
+        if (
+            step.known is not None
+            and step.read is not None
+            and step.entry.what != "again"
+            and len(benches) < _MOST_BENCHES
+        ):
+            benches.append(
+                make_bench(step.known, step.read.law, step.rows, reading_bands(beliefs, step.readings), likely)
+            )
+    return tuple(benches)
 
 
-def bands(beliefs: Beliefs, readings: Readings) -> Floats:
-    """Where each reading will lie, over all explanations, at the probabilities of `BAND`: (n, 3) array."""
+def reading_bands(beliefs: Beliefs, readings: PlannedReadings) -> Floats:
+    """Quantiles of each reading at the probabilities of `BAND`, over all explanations: (n, 3) array."""
     from scipy.special import ndtri
 
-    levels = ndtri((np.arange(_LEVELS) + 0.5) / _LEVELS)[:, None, None]
+    levels = ndtri((np.arange(_N_LEVELS) + 0.5) / _N_LEVELS)[:, None, None]
     drawn, weights = [], []
-    for k, one in enumerate(beliefs.explanations):
+    for k, explanation in enumerate(beliefs.explanations):
         slopes = readings.slopes[k]
-        variance = np.einsum("tnu,tuv,tnv->tn", slopes, one.covariance, slopes) + readings.variance[k]
-        expected = readings.shift[k] + np.einsum("tnu,tu->tn", slopes, one.mean)
+        variance = np.einsum("tnu,tuv,tnv->tn", slopes, explanation.covariance, slopes) + readings.variance[k]
+        expected = readings.shift[k] + np.einsum("tnu,tu->tn", slopes, explanation.mean)
         drawn.append((expected + np.sqrt(variance) * levels).reshape(-1, readings.n))
-        weights.append(np.full(len(drawn[-1]), one.probability / len(drawn[-1])))
+        weights.append(np.full(len(drawn[-1]), explanation.probability / len(drawn[-1])))
     values, shares = np.concatenate(drawn), np.concatenate(weights)
     ends = np.empty((readings.n, len(BAND)))
     for i, order in enumerate(np.argsort(values, axis=0).T):
@@ -71,50 +78,52 @@ def bands(beliefs: Beliefs, readings: Readings) -> Floats:
     return ends
 
 
-def bench_of(known: KnownBoard, law: BareLaw, rows: Sequence[int], ends: Floats, likely: str) -> Bench:
-    """The sheet for some modes of a board, `ends` being ln of their frequencies (Hz) at the probabilities of `BAND`.
+def make_bench(known: KnownBoard, law: BareLaw, rows: Sequence[int], ends: Floats, likely: str) -> Bench:
+    """The bench for some modes of a board; `ends` are ln of their frequencies (Hz) at the probabilities of `BAND`.
 
-    The sensor stands where it stood in a session that goes on.
+    In a session that goes on the sensor stays where it is.
     """
     board, station = known.board, law.station
     system = station.system(board)
-    numbers = (*NUMBERS_OF_MODES, SEARCHED)
-    drawn = sheet(board, system, station.values(system, known.values), "where they are expected", numbers=numbers)
-    by_name = {mode.name: mode for mode in drawn.modes}
-    wanted = [str(station.setup.labels[i]) for i in rows]
-    there = [(by_name[name], end) for name, end in zip(wanted, np.exp(ends), strict=True) if name in by_name]
-    shown = tuple(
+    numbers = (*NUMBERS_OF_MODES, N_SEARCHED_MODES)
+    full_sheet = sheet(board, system, station.values(system, known.values), "where they are expected", numbers=numbers)
+    by_name = {mode.name: mode for mode in full_sheet.modes}
+    names = [str(station.setup.labels[i]) for i in rows]
+    mode_ends = [(by_name[name], end) for name, end in zip(names, np.exp(ends), strict=True) if name in by_name]
+    sheet_modes = tuple(
         replace(mode, hertz=float(end[1]), measured_hz=None, band_hz=(float(end[0]), float(end[2])))
-        for mode, end in sorted(there, key=lambda pair: float(pair[1][1]))
+        for mode, end in sorted(mode_ends, key=lambda pair: float(pair[1][1]))
     )
-    shapes = np.stack([mode.shape[::_EVERY, ::_EVERY] for mode in shown])
-    sensor = None if station.is_new else _sensor(board, station, drawn, system.shaped)
-    placed = placing(shapes, points()[::_EVERY], sensor)
-    seen_at = (drawn.drawn_at(*place) for place in (placed.sensor, placed.hammer, *placed.taps))
-    stated = seen_at if system.shaped is None else (system.shaped.as_stated(*place) for place in seen_at)
-    marks = places_on(board, station.setup, tuple(stated))
-    at_sensor, at_hammer, *taps = ((round(1e3 * x), round(1e3 * y)) for x, y in marks)
+    shapes = np.stack([mode.shape[::_GRID_STEP, ::_GRID_STEP] for mode in sheet_modes])
+    sensor = None if station.is_new else _sensor_place(board, station, full_sheet, system.shaped)
+    placing = choose_places(shapes, grid_points()[::_GRID_STEP], sensor)
+    spots = (full_sheet.drawn_at(*place) for place in (placing.sensor, placing.hammer, *placing.taps))
+    board_spots = spots if system.shaped is None else (system.shaped.as_stated(*place) for place in spots)
+    places = places_on(board, station.setup, tuple(board_spots))
+    sensor_mm, hammer_mm, *taps = ((round(1e3 * x), round(1e3 * y)) for x, y in places)
     modes = tuple(
-        ModeToFind(mode.name, mode.hertz, *(mode.band_hz or (0.0, 0.0)), seen)
-        for mode, seen in zip(shown, placed.seen, strict=True)
+        ModeToFind(mode.name, mode.hertz, *(mode.band_hz or (0.0, 0.0)), residue)
+        for mode, residue in zip(sheet_modes, placing.seen, strict=True)
     )
     edges = dict(station.setup.edges)
-    entry = BenchEntry(board.name, station.setup.name, edges, at_sensor, at_hammer, tuple(taps), modes)
-    return Bench(entry, replace(drawn, modes=shown, combined=(), likely=likely), placed)
+    entry = BenchEntry(board.name, station.setup.name, edges, sensor_mm, hammer_mm, tuple(taps), modes)
+    return Bench(entry, replace(full_sheet, modes=sheet_modes, combined=(), likely=likely), placing)
 
 
-def _sensor(board: Board, station: Station, drawn: Sheet, shaped: Effect | None) -> tuple[float, float] | None:
-    """Where the one sensor stands, as fractions of what vibrates; None where there is none, or there are several."""
+def _sensor_place(
+    board: Board, station: Station, full_sheet: Sheet, shaped: Effect | None
+) -> tuple[float, float] | None:
+    """Place of the only sensor, as fractions of the vibrating sides; None without one or with several."""
     if station.base.sensor is None:
         return None
     ((x, y),) = fractions_on(board, station.setup, (station.base.sensor,))
     if shaped is not None:
         x, y = shaped.placed(x, y)
-    low, high = drawn.drawn_at(x, 0.0)[1], drawn.drawn_at(x, 1.0)[1]
+    low, high = full_sheet.drawn_at(x, 0.0)[1], full_sheet.drawn_at(x, 1.0)[1]
     return x, (y - low) / (high - low)
 
 
-Place = tuple[float, float]
+BenchPlace = tuple[float, float]  # fractions of the vibrating sides
 
 REFERENCES = (
     "D. J. Ewins: Modal Testing: Theory, Practice and Application. 2nd ed., Research Studies Press (2000). "
@@ -122,65 +131,67 @@ REFERENCES = (
     "K. Manohar, B. W. Brunton, J. N. Kutz, S. L. Brunton: Data-driven sparse sensor placement for reconstruction. "
     "IEEE Control Syst. Mag. 38, 63-86 (2018), doi:10.1109/MCS.2018.2810460. [places by pivoted QR]",
 )
-_APART = 0.25
+_LEAST_DISTANCE = 0.25
 """Least distance between sensor and hammer, as a fraction of a side."""
 _MARGIN = 0.03
-"""Of the sides that is left free at the rim: nobody hits an edge."""
+"""Fraction of a side at the rim without sensor and hammer: nobody hits an edge."""
 
 
 @dataclass(frozen=True)
 class Placing:
-    """Where to put sensor and hammer on what vibrates, as fractions of its sides."""
+    """Places of sensor and hammer, as fractions of the vibrating sides."""
 
-    sensor: Place
-    hammer: Place
+    sensor: BenchPlace
+    hammer: BenchPlace
     # residue of each mode between the two, over the largest that its figure could give: 0 on a nodal line
     seen: tuple[float, ...]
-    # where to tap to tell the figures apart, as many as there are modes: the first pivots of a QR decomposition
-    taps: tuple[Place, ...]
+    # places to tap that distinguish the figures, as many as there are modes: the first pivots of a QR decomposition
+    taps: tuple[BenchPlace, ...]
 
 
-def placing(shapes: Floats, grid: Floats, sensor: Place | None = None) -> Placing:
+def choose_places(shapes: Floats, grid: Floats, sensor: BenchPlace | None = None) -> Placing:
     """Sensor and hammer for modes with these deflections, (n_modes, n, n), on a grid of fractions of a side, x first.
 
-    The sensor stands where it does, or where the smallest residue at the driving point is largest, the hammer where the
-    smallest residue between the two is, of the modes that the sensor can see.
+    The sensor stays at a given place, or stands where the smallest residue at the driving point is largest. The hammer
+    strikes where the smallest residue between the two is largest, of the modes that the sensor can see.
     """
     from scipy.linalg import qr
 
     inner = (grid >= _MARGIN) & (grid <= 1.0 - _MARGIN)
-    at = grid[inner]
-    kept = shapes[:, inner][:, :, inner]
-    relative = kept / np.abs(shapes).max(axis=(1, 2))[:, None, None]
+    coordinates = grid[inner]
+    inner_shapes = shapes[:, inner][:, :, inner]
+    relative = inner_shapes / np.abs(shapes).max(axis=(1, 2))[:, None, None]
     flat = relative.reshape(len(shapes), -1)
-    places = [(float(x), float(y)) for x in at for y in at]
+    places = [(float(x), float(y)) for x in coordinates for y in coordinates]
     if sensor is None:
-        first = int(np.argmax((flat**2).min(axis=0)))
+        sensor_index = int(np.argmax((flat**2).min(axis=0)))
     else:
-        first = int(np.argmin([np.hypot(x - sensor[0], y - sensor[1]) for x, y in places]))
-    apart = np.array([max(abs(x - places[first][0]), abs(y - places[first][1])) >= _APART for x, y in places])
-    residues = np.abs(flat * flat[:, [first]])
-    can_be_seen = np.abs(flat[:, first]) >= NODAL_LINE
+        sensor_index = int(np.argmin([np.hypot(x - sensor[0], y - sensor[1]) for x, y in places]))
+    is_apart = np.array(
+        [max(abs(x - places[sensor_index][0]), abs(y - places[sensor_index][1])) >= _LEAST_DISTANCE for x, y in places]
+    )
+    residues = np.abs(flat * flat[:, [sensor_index]])
+    can_be_seen = np.abs(flat[:, sensor_index]) >= NODAL_LINE
     weakest = residues[can_be_seen if can_be_seen.any() else slice(None)].min(axis=0)
-    second = int(np.argmax(np.where(apart, weakest, -1.0)))
+    hammer_index = int(np.argmax(np.where(is_apart, weakest, -1.0)))
     taps = tuple(places[i] for i in qr(flat, mode="economic", pivoting=True)[2][: len(shapes)])
-    seen = tuple(float(one) for one in residues[:, second])
-    return Placing(places[first], places[second], seen, taps)
+    seen = tuple(float(residue) for residue in residues[:, hammer_index])
+    return Placing(places[sensor_index], places[hammer_index], seen, taps)
 
 
-def drawn_up(
+def draw_up_plan(
     planner: Planner,
     name: str,
     title: str,
     card_sha256: str,
     priors: Sequence[PriorCard] = (),
-    shared: Sequence[Shared] = (),
+    shared: Sequence[SharedParameter] = (),
 ) -> tuple[Plan, tuple[Bench, ...]]:
-    """The plan as plan.json has it, and the sheets for the bench."""
-    beliefs, listed = planner.beliefs, planner.ranked(priors, shared)
-    together = planner.sequences(listed)
-    drawn = benches(beliefs, together[-1][0] if together else listed[:1])
-    made = Plan(
+    """The plan as plan.json holds it, and the benches."""
+    beliefs, proposals = planner.beliefs, planner.ranked(priors, shared)
+    sequences = planner.sequences(proposals)
+    benches = make_benches(beliefs, sequences[-1][0] if sequences else proposals[:1])
+    plan = Plan(
         format=FORMAT,
         name=name,
         title=title,
@@ -189,24 +200,29 @@ def drawn_up(
         basis=beliefs.basis,
         goal=planner.goal,
         costs=asdict(planner.costs),
-        explanations=_entries(beliefs),
+        explanations=_explanation_entries(beliefs),
         entropy=beliefs.entropy,
-        first=first_of(planner, listed),
-        proposals=tuple(one.entry for one in listed),
-        sequences=tuple(entry for _, entry in together),
-        bench=tuple(one.entry for one in drawn),
+        first=plan_first_line(planner, proposals),
+        proposals=tuple(proposal.entry for proposal in proposals),
+        sequences=tuple(entry for _, entry in sequences),
+        bench=tuple(bench.entry for bench in benches),
         notes=beliefs.notes,
     )
-    return made, drawn
+    return plan, benches
 
 
-def first_of(planner: Planner, listed: Sequence[Proposal]) -> str:
+def plan_first_line(planner: Planner, listed: Sequence[Proposal]) -> str:
     """The first line of a plan: what to do next; empty where nothing would help."""
     beliefs = planner.beliefs
     if beliefs.wrong is not None:
         return beliefs.wrong
-    return first_line([one.entry for one in listed], _entries(beliefs), beliefs.entropy, planner.goal)
+    return first_line(
+        [proposal.entry for proposal in listed], _explanation_entries(beliefs), beliefs.entropy, planner.goal
+    )
 
 
-def _entries(beliefs: Beliefs) -> tuple[ExplanationEntry, ...]:
-    return tuple(ExplanationEntry(one.members, one.words, one.probability) for one in beliefs.explanations)
+def _explanation_entries(beliefs: Beliefs) -> tuple[ExplanationEntry, ...]:
+    return tuple(
+        ExplanationEntry(explanation.members, explanation.words, explanation.probability)
+        for explanation in beliefs.explanations
+    )

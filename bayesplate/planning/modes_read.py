@@ -1,4 +1,4 @@
-"""Modes as readings: what each explanation expects of those that could be read, and how sure it is."""
+"""Frequencies of modes that could be read: their mean and variance under each explanation."""
 
 from __future__ import annotations
 
@@ -8,181 +8,186 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.arrays import Floats
-from bayesplate.board.sessions import shared_share, unknown_discrepancies
+from bayesplate.board.sessions import shared_variance_share, unknown_discrepancy_variance
 from bayesplate.frequencies.reading_errors import ReadingErrors
-from bayesplate.planning.beliefs import Belief, Beliefs, FormTerms, KnownBoard, levels
-from bayesplate.planning.gains import Readings
+from bayesplate.planning.beliefs import Beliefs, ExplanationTerms, FormTerms, KnownBoard, prior_levels
+from bayesplate.planning.gains import PlannedReadings
 from bayesplate.planning.laws import BareLaw, SolvedStation
 from bayesplate.planning.stations import Station
 
-REPEATED = 2e-4
-"""Relative scatter of a frequency that is read once more in one session: what five hits on a free board leave open."""
+REPEAT_SCATTER = 2e-4
+"""Relative scatter of a frequency that is read once more in one session, with five hits on a free board."""
 
 
 @dataclass(frozen=True, eq=False)
 class StationReadings:
-    """Everything that could be read in a station."""
+    """All readings of frequencies that could be taken in a station."""
 
     law: BareLaw
-    # modes that were not read yet, in the session that goes on, or in a new one where the board is held anew
-    further: Readings
-    rows: tuple[int, ...]  # which of the station's modes they are
-    # which of the readings at hand can be taken once more: every explanation knows what is read then
+    # unread modes, in the session that goes on, or in a new one where the board is held anew
+    further: PlannedReadings
+    rows: tuple[int, ...]  # their indices among the station's modes
+    # indices of the readings at hand that can be taken once more: those which every explanation takes for a mode
     old: tuple[int, ...]
-    # these in another session; None where there are none, or where what is believed leaves them aside
-    again: Readings | None
-    # the same with a known mass, in the session that goes on, by the index of its spot; none where there is one
-    # explanation only, for a known mass tells by what it adds alone
-    with_mass: Mapping[int, Readings]
+    # these in another session; None where there are none, or where the beliefs are those of the prior
+    again: PlannedReadings | None
+    # these with a known mass, in the session that goes on, by the index of its spot; none with a single explanation:
+    # the shifts by a known mass only distinguish explanations
+    with_mass: Mapping[int, PlannedReadings]
 
 
 def station_readings(beliefs: Beliefs, known: KnownBoard, law: BareLaw, rng: np.random.Generator) -> StationReadings:
-    """What each explanation expects of everything that could be read in a station of a board."""
+    """All readings that could be taken in a station of a board, as each explanation expects them."""
     station, board = law.station, known.board
     n, n_old = len(station.setup.readings), station.n_old
-    parts = [_expected(one, known, law) for one in beliefs.explanations]
-    is_followed = np.all([np.isfinite(shift).all(axis=0) for shift, _ in parts], axis=0)
-    own = ReadingErrors.of(station.setup).own_variance + unknown_discrepancies(board, station.setup)
-    place = known.first_setup + [setup.name for setup in board.setups].index(station.base.name)
-    kept = [one.noise[:, place] ** 2 for one in beliefs.explanations]
-    new = [levels(station.setup.noise, one.n_terms, rng) ** 2 for one in beliefs.explanations]
+    expected = [_expected_modes(explanation, known, law) for explanation in beliefs.explanations]
+    is_followed = np.all([np.isfinite(shift).all(axis=0) for shift, _ in expected], axis=0)
+    own_variance = ReadingErrors.of(station.setup).own_variance + unknown_discrepancy_variance(board, station.setup)
+    setup_index = known.first_setup + [setup.name for setup in board.setups].index(station.base.name)
+    kept_variances = [explanation.noise[:, setup_index] ** 2 for explanation in beliefs.explanations]
+    new_variances = [
+        prior_levels(station.setup.noise, explanation.n_terms, rng) ** 2 for explanation in beliefs.explanations
+    ]
 
-    def readings(rows: Sequence[int], noise: Sequence[Floats], spot: int = 0) -> Readings:
-        at = [spot * n + row for row in rows]
-        return Readings(
-            tuple(shift[:, at] for shift, _ in parts),
-            tuple(slopes[:, at] for _, slopes in parts),
-            tuple(level[:, None] + own[list(rows)] for level in noise),
+    def readings(rows: Sequence[int], noise: Sequence[Floats], spot: int = 0) -> PlannedReadings:
+        columns = [spot * n + row for row in rows]
+        return PlannedReadings(
+            tuple(shift[:, columns] for shift, _ in expected),
+            tuple(slopes[:, columns] for _, slopes in expected),
+            tuple(level[:, None] + own_variance[list(rows)] for level in noise),
         )
 
     rows = [i for i in range(n_old, n) if is_followed[i]]
     old = [i for i in range(n_old) if is_followed[i]]
-    further = readings(rows, new if station.is_new else kept)
-    again, with_mass = None, {}
+    further = readings(rows, new_variances if station.is_new else kept_variances)
+    repeated, with_mass = None, {}
     if old and not beliefs.is_prior:
-        other_day = [np.full(len(one), shared_share(station.base)) for one in kept]
-        again = given_first(station, old, readings(old, new), kept, other_day)
-    if again and len(beliefs.explanations) > 1:
-        same_day = [np.maximum(1.0 - REPEATED**2 / one, 0.0) for one in kept]
-        once_more = given_first(station, old, readings(old, kept), kept, same_day)
+        other_day = [np.full(len(level), shared_variance_share(station.base)) for level in kept_variances]
+        repeated = repeat_readings(station, old, readings(old, new_variances), kept_variances, other_day)
+    if repeated and len(beliefs.explanations) > 1:
+        same_day = [np.maximum(1.0 - REPEAT_SCATTER**2 / level, 0.0) for level in kept_variances]
+        once_more = repeat_readings(station, old, readings(old, kept_variances), kept_variances, same_day)
         for spot, off_place in enumerate(law.off_place[:, old]):
-            added = readings(old, kept, 1 + spot)
-            if all(np.isfinite(one).all() for one in added.shift):
+            added = readings(old, kept_variances, 1 + spot)
+            if all(np.isfinite(values).all() for values in added.shift):
                 shift = tuple(a + b for a, b in zip(once_more.shift, added.shift, strict=True))
-                variance = tuple(one + off_place**2 for one in once_more.variance)
+                variance = tuple(level + off_place**2 for level in once_more.variance)
                 slopes = tuple(a + b for a, b in zip(once_more.slopes, added.slopes, strict=True))
-                with_mass[spot] = Readings(shift, slopes, variance)
-    return StationReadings(law, further, tuple(rows), tuple(old), again, with_mass)
+                with_mass[spot] = PlannedReadings(shift, slopes, variance)
+    return StationReadings(law, further, tuple(rows), tuple(old), repeated, with_mass)
 
 
-def given_first(
-    station: Station, old: Sequence[int], readings: Readings, kept: Sequence[Floats], shares: Sequence[Floats]
-) -> Readings:
-    """Readings at hand, rows `old`, taken once more given the first, with which they share part of what it is off by.
+def repeat_readings(
+    station: Station, old: Sequence[int], readings: PlannedReadings, kept: Sequence[Floats], shares: Sequence[Floats]
+) -> PlannedReadings:
+    """Repeats of the readings at hand, rows `old`, conditional on the first readings, whose noise they share in part.
 
-    `readings` are as if they shared nothing; `kept` is the variance of the first readings' noise and `shares` the part
-    of it that is found again, (n_terms,) arrays by explanation.
+    `readings` are the repeats with independent noise; `kept` is the variance of the first readings' noise and `shares`
+    the part of it that a repeat shares, (n_terms,) arrays by explanation.
     """
     rows = list(old)
-    first, own = np.log(station.base.measured)[rows], ReadingErrors.of(station.base).own_variance[rows]
+    first, own_variance = np.log(station.base.measured)[rows], ReadingErrors.of(station.base).own_variance[rows]
     new = ReadingErrors.of(station.setup).own_variance[rows]
-    every = []
-    for k, (each, part) in enumerate(zip(kept, shares, strict=True)):
-        share = part[:, None]
-        common = share * each[:, None]
-        told = common / (each[:, None] + own)
-        shift = (1.0 - told) * readings.shift[k] + told * first
-        variance = new + (1.0 - share) * (readings.variance[k] - new) + common * (1.0 - told)
-        every.append((shift, (1.0 - told)[:, :, None] * readings.slopes[k], variance))
-    return Readings.of(every)
+    by_explanation = []
+    for k, (first_variance, terms_share) in enumerate(zip(kept, shares, strict=True)):
+        share = terms_share[:, None]
+        common = share * first_variance[:, None]
+        weight = common / (first_variance[:, None] + own_variance)
+        shift = (1.0 - weight) * readings.shift[k] + weight * first
+        variance = new + (1.0 - share) * (readings.variance[k] - new) + common * (1.0 - weight)
+        by_explanation.append((shift, (1.0 - weight)[:, :, None] * readings.slopes[k], variance))
+    return PlannedReadings.of(by_explanation)
 
 
-def _expected(one: Belief, known: KnownBoard, law: BareLaw) -> tuple[Floats, Floats]:
-    """What is expected of the modes where u is zero, then of what a known mass adds; and the slopes of both.
+def _expected_modes(explanation: ExplanationTerms, known_board: KnownBoard, law: BareLaw) -> tuple[Floats, Floats]:
+    """The modes where u is zero, then their shifts by a known mass at each spot; and the slopes of both.
 
-    Arrays of (n_terms, (1 + n_spots) n_modes) and (.., n_u). Not a number where an explanation takes a reading for no
-    mode, or a mode cannot be followed.
+    Arrays of (n_terms, (1 + n_spots) n_modes) and (.., n_u). NaN where an explanation takes a reading for no mode, or a
+    mode cannot be followed.
     """
     station, n = law.station, len(law.middle)
-    shift = np.tile(np.concatenate([law.middle, law.solved[1:].ravel()]), (one.n_terms, 1))
-    slopes = np.zeros((*shift.shape, one.mean.shape[1]))
-    own = law.slopes @ known.columns
-    slopes[:, :n, : own.shape[2]] = own[np.arange(one.n_terms) % len(own)]
-    add_effects(one, known, law, shift, slopes)
-    if one.again is None or not station.n_old:
+    shift = np.tile(np.concatenate([law.middle, law.solved[1:].ravel()]), (explanation.n_terms, 1))
+    slopes = np.zeros((*shift.shape, explanation.mean.shape[1]))
+    own_slopes = law.slopes @ known_board.columns
+    slopes[:, :n, : own_slopes.shape[2]] = own_slopes[np.arange(explanation.n_terms) % len(own_slopes)]
+    add_effects(explanation, known_board, law, shift, slopes)
+    if explanation.again is None or not station.n_old:
         return shift, slopes
-    taken, setups, old = np.arange(n), known.board.setups, slice(station.n_old)
+    taken, setups, old = np.arange(n), known_board.board.setups, slice(station.n_old)
     start = sum(len(setup.readings) for setup in setups[: [setup.name for setup in setups].index(station.base.name)])
-    here = slice(start, start + station.n_old)
-    taken[old] = np.where(one.again.taken[here] < 0, -1, one.again.taken[here] - start)
+    at_hand = slice(start, start + station.n_old)
+    taken[old] = np.where(explanation.again.taken[at_hand] < 0, -1, explanation.again.taken[at_hand] - start)
     columns = np.arange(shift.shape[1]).reshape(-1, n)[:, taken].ravel()
     shift, slopes = shift[:, columns], slopes[:, columns]
-    shift[:, old], slopes[:, old] = one.again.shift[:, here], one.again.slopes[:, here]
+    shift[:, old], slopes[:, old] = explanation.again.shift[:, at_hand], explanation.again.slopes[:, at_hand]
     return np.where(np.tile(taken < 0, len(law.solved)), np.nan, shift), slopes
 
 
-_QUANTILES = (0.03, 0.97)
-"""Of a size over the terms, at which it is solved besides its mean."""
-_TOO_FAR = 0.4
+_SIZE_QUANTILES = (0.03, 0.97)
+"""Quantiles of a size over the terms at which the modes are solved besides its mean."""
+_MOST_SHIFT = 0.4
 """A shift of ln f beyond which a mode has lost its name."""
 
 
-def add_effects(one: Belief, known: KnownBoard, law: BareLaw, shift: Floats, slopes: Floats) -> None:
-    """Add what the effects of an explanation do to what is expected of the modes of a station, in place.
+def add_effects(one: ExplanationTerms, known: KnownBoard, law: BareLaw, shift: Floats, slopes: Floats) -> None:
+    """Add the effects of an explanation to the expected modes of a station, in place.
 
-    To the shift where u is zero, (n_terms, (1 + n_spots) n_modes), of the modes, then of what a known mass at each spot
-    adds to each, and to the slopes, (.., n_u). Not a number where a mode cannot be followed in the middle of a size, or
-    to neither side of it.
+    They are added to the shift where u is zero, (n_terms, (1 + n_spots) n_modes), of the modes, then of the shifts by a
+    known mass at each spot, and to the slopes, (.., n_u). NaN where a mode cannot be followed at the middle of a size,
+    or to either side of it.
 
-    By a few full solves about the likely sizes, the constants where the readings then have them, and a parabola along
-    each size between: what remains beside the constants' own linear law is small and smooth. Each term is linear about
-    its own place on it.
+    The effects are solved in full at a few likely sizes, with the constants that the readings then give, and a parabola
+    is laid along each size: the remainder beside the linear law of the constants is small and smooth. Each term is
+    linear about its own place on the parabola.
     """
     n = len(law.middle)
     for form in one.forms:
         mean = one.mean[form.rows]
-        sizes, own = mean[:, form.columns], one.covariance[form.rows][:, form.columns, form.columns]
-        centre, narrow = sizes.mean(axis=0), np.sqrt(own.mean(axis=0))
-        low, high = np.quantile(sizes, _QUANTILES, axis=0)
+        sizes, covariance = mean[:, form.columns], one.covariance[form.rows][:, form.columns, form.columns]
+        centre, narrow = sizes.mean(axis=0), np.sqrt(covariance.mean(axis=0))
+        low, high = np.quantile(sizes, _SIZE_QUANTILES, axis=0)
         ends = np.stack([np.minimum(low, centre - narrow), np.maximum(high, centre + narrow)])
-        bounds = np.array([one.prior.standard_bounds for one in form.parameters]).reshape(-1, 2).T
-        away = np.clip(ends, *bounds) - centre
-        # the constants follow the size
+        bounds = np.array([parameter.prior.standard_bounds for parameter in form.parameters]).reshape(-1, 2).T
+        reach = np.clip(ends, *bounds) - centre
+        # regression of the constants on the sizes
         design = np.column_stack([np.ones(len(mean)), sizes - centre])
         constants = np.linalg.lstsq(design, mean[:, : known.board.symmetry.n], rcond=None)[0]
 
-        to_either_side = (np.outer(two, unit) for two, unit in zip(away.T, np.eye(centre.size), strict=True))
+        to_either_side = (np.outer(sides, unit) for sides, unit in zip(reach.T, np.eye(centre.size), strict=True))
         steps = np.concatenate([[0.0 * centre], *to_either_side])
         followed = np.column_stack([np.ones(len(steps)), steps]) @ constants
         pairs = zip(centre + steps, followed, strict=True)
-        solved = np.stack([_beside(known, law, form, at, moved) for at, moved in pairs])
+        solved = np.stack([_form_shift(known, law, form, point, moved) for point, moved in pairs])
         shift[form.rows] += solved[0]
         for j, column in enumerate(form.columns):
-            two, pair = away[:, j], solved[1 + 2 * j : 3 + 2 * j] - solved[0]
-            across = (
-                pair[::-1] * (two / two[::-1])[:, None]
-            )  # a straight line where a mode is followed to one side only
-            pair[:, :n] = np.where(np.isnan(pair), across, pair)[:, :n]
-            linear, square = np.linalg.solve(np.column_stack([two, two**2]), pair)
-            place = np.clip(sizes[:, j] - centre[j], *two)[:, None]
-            along = linear + 2.0 * square * place
-            shift[form.rows] += linear * place + square * place**2 - along * sizes[:, j, None]
-            slopes[form.rows, :, column] += along
+            sides, pair = reach[:, j], solved[1 + 2 * j : 3 + 2 * j] - solved[0]
+            # a straight line where a mode is followed to one side only
+            straight = pair[::-1] * (sides / sides[::-1])[:, None]
+            pair[:, :n] = np.where(np.isnan(pair), straight, pair)[:, :n]
+            linear, square = np.linalg.solve(np.column_stack([sides, sides**2]), pair)
+            place = np.clip(sizes[:, j] - centre[j], *sides)[:, None]
+            slope = linear + 2.0 * square * place
+            shift[form.rows] += linear * place + square * place**2 - slope * sizes[:, j, None]
+            slopes[form.rows, :, column] += slope
 
 
-def _beside(known: KnownBoard, law: BareLaw, form: FormTerms, sizes: Floats, constants: Floats) -> Floats:
-    """What a form does at some sizes, less what the linear law of the constants says: ((1 + n_spots) n_modes,) array.
+def _form_shift(known_board: KnownBoard, law: BareLaw, form: FormTerms, sizes: Floats, constants: Floats) -> Floats:
+    """Change of the modes by a form at some sizes, less the linear law of the constants: ((1 + n_spots) n_modes,).
 
-    On the mesh for the estimate's constants, so that all sizes of a form have the same matrices.
+    Solved on the mesh for the estimate's constants, so that all sizes of a form have the same matrices.
     """
     exact = {name: np.asarray(q.mean) for name, q in form.board.inputs.items() if q.is_exact}
-    named = {one.name: np.asarray(one.prior.value(z)) for one, z in zip(form.parameters, sizes, strict=True)}
-    values, symmetry = {**exact, **known.values, **named}, known.board.symmetry
-    at = np.log(symmetry.free_of(known.values))
-    there, meshed = (
-        {**values, **symmetry.rigidities(np.exp(each), values["poisson_xy"])} for each in (at + constants, at)
+    named = {
+        parameter.name: np.asarray(parameter.prior.value(z))
+        for parameter, z in zip(form.parameters, sizes, strict=True)
+    }
+    values, symmetry = {**exact, **known_board.values, **named}, known_board.board.symmetry
+    log_constants = np.log(symmetry.free_of(known_board.values))
+    moved_values, mesh_values = (
+        {**values, **symmetry.rigidities(np.exp(logs), values["poisson_xy"])}
+        for logs in (log_constants + constants, log_constants)
     )
-    shift = SolvedStation.of(law.station, form.board, there, meshed).bare_and_added - law.solved
-    shift[0] -= law.slopes[0, :, : at.size] @ constants
-    shift[:, np.abs(shift[0]) > _TOO_FAR] = np.nan
+    shift = SolvedStation.of(law.station, form.board, moved_values, mesh_values).bare_and_added - law.solved
+    shift[0] -= law.slopes[0, :, : log_constants.size] @ constants
+    shift[:, np.abs(shift[0]) > _MOST_SHIFT] = np.nan
     return np.asarray(shift.ravel())

@@ -1,4 +1,4 @@
-"""plan.json as types: what to measure next, the best first, and what to look for at the bench."""
+"""The classes of plan.json: proposals of measurements, the best first, and modes to look for at the bench."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ FORMAT = 1
 
 @dataclass(frozen=True)
 class ExplanationEntry:
-    """An explanation that is to be told from the others."""
+    """An explanation of the readings that may be true."""
 
     effects: tuple[str, ...]  # empty for no effect
     words: str
-    probability: float  # among those that survive
+    probability: float  # among the surviving explanations
 
 
 @dataclass(frozen=True)
 class Gain:
-    """What readings are expected to give."""
+    """The expected gain of readings."""
 
     # E_x, E_y, G_xy: expected standard deviation of the constant's logarithm after, over that before; of several boards
     # the geometric mean
@@ -30,22 +30,22 @@ class Gain:
     constants_error: float  # its standard error; 0 where it is exact
     explanations: float | None  # expected drop of the entropy of the explanations, nats; None where there is one only
     explanations_error: float | None  # its standard error
-    # half the log determinant of what the constants gain, the explanation being known, nats; of an isotropic board of
-    # what E gains; where boards share something, of what that gains
+    # half the log determinant of the information gained on the constants, the explanation being known, nats; on E alone
+    # for an isotropic board; on the shared parameters where boards share some
     information: float
     shared: Mapping[str, float]  # of a campaign: the same as E_x for each parameter that its boards share
-    score: float  # what the plan is ordered by, nats
+    score: float  # by which the plan is ordered, nats
     score_per_minute: float
 
 
 @dataclass(frozen=True)
 class ProposalEntry:
-    """One thing that could be measured next."""
+    """A measurement that could be made next."""
 
     what: str  # "modes", "edges", "mass", "again", "size" or "board"
     board: str
     setup: str  # empty where no frequency is read
-    sentence: str  # what to do, as an order
+    sentence: str  # the instruction
     cost_minutes: float
     modes: tuple[str, ...]  # labels of the modes to read
     gain: Gain
@@ -57,7 +57,7 @@ class SequenceEntry:
 
     steps: tuple[str, ...]  # their sentences, in the order in which they can be done
     cost_minutes: float
-    gain: Gain  # of all together
+    gain: Gain  # of all steps together
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class ModeToFind:
     """A mode to look for at the bench."""
 
     label: str
-    hz: float  # where it is expected: the median over all explanations
+    hz: float  # expected frequency: the median over all explanations
     # low_hz, high_hz: between which it lies two times in three
     low_hz: float
     high_hz: float
@@ -75,7 +75,7 @@ class ModeToFind:
 
 @dataclass(frozen=True)
 class BenchEntry:
-    """What to do at the bench for one way to hold the board."""
+    """The work at the bench for one way to hold the board."""
 
     board: str
     setup: str
@@ -83,7 +83,7 @@ class BenchEntry:
     # sensor_mm, hammer_mm: places on the whole board
     sensor_mm: tuple[float, float]
     hammer_mm: tuple[float, float]
-    taps_mm: tuple[tuple[float, float], ...]  # where to tap to tell the figures apart
+    taps_mm: tuple[tuple[float, float], ...]  # places to tap that distinguish the figures
     modes: tuple[ModeToFind, ...]
 
 
@@ -99,16 +99,16 @@ class Plan:
     seed : int
     card_sha256 : str
     basis : str
-        What is believed now: "readings", "prior" or "campaign".
+        Source of the present beliefs: "readings", "prior" or "campaign".
     goal : str or None
-        What was asked for.
+        The requested goal; None for all.
     costs : dict of float
-        Minutes by class.
+        Minutes of each class of work.
     explanations : tuple of ExplanationEntry
     entropy : float
-        Of them, nats.
+        Entropy of the explanations, nats.
     first : str
-        The first line: what to do next and what it is expected to give; empty where nothing would help.
+        The first line: what to do next and its expected gain; empty where nothing would help.
     proposals : tuple of ProposalEntry
         The best first.
     sequences : tuple of SequenceEntry

@@ -1,4 +1,4 @@
-"""Everything that could be measured next, each with what it is expected to give and what it costs."""
+"""Proposals of measurements, each with its expected gain and its cost."""
 
 from __future__ import annotations
 
@@ -6,35 +6,41 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 
 from bayesplate.board.prior import PriorCard
-from bayesplate.campaign.shared import Shared
+from bayesplate.campaign.shared import SharedParameter
 from bayesplate.planning.beliefs import Beliefs, KnownBoard
-from bayesplate.planning.gains import N_DRAWS, Readings, expected_gain, together
+from bayesplate.planning.gains import N_DRAWS, PlannedReadings, expected_gain, join_readings
 from bayesplate.planning.laws import known_mass
 from bayesplate.planning.modes_read import StationReadings, station_readings
 from bayesplate.planning.plan import Gain, ProposalEntry, SequenceEntry
-from bayesplate.planning.sizes_read import LOOKS, column_of, input_readings, look_readings, measurements
+from bayesplate.planning.sizes_read import (
+    INSPECTIONS,
+    input_readings,
+    inspection_readings,
+    parameter_column,
+    size_measurements,
+)
 from bayesplate.planning.together import further_boards
-from bayesplate.streams import stream
+from bayesplate.streams import random_stream
 
-BELIEFS = "what is believed now"
-"""The random stream of the terms that stand for it."""
-FAINT = 2e-3
-"""Nats below which a proposal is not listed."""
-BEST = (1, 3)
-"""Further modes of a board that are proposed together."""
-FIRST = (3, 6)
-"""The same of a board that was not measured yet."""
-_TRIED, _JOINED = 128, 192
-"""Simulated readings by which modes, and sequences, are compared."""
-_LONGEST = 3
-"""Proposals in a sequence."""
-_ENDING = ("edges", "again")
-"""What takes the board from the place where it was measured, so that nothing goes on there."""
+BELIEFS_STREAM = "what is believed now"
+"""The random stream of the terms that stand for the beliefs."""
+FAINT_GAIN = 2e-3
+"""Least gain, nats, of a listed proposal."""
+BEST_MODES = (1, 3)
+"""Numbers of further modes of a board that are proposed together."""
+FIRST_MODES = (3, 6)
+"""Numbers of modes of a board without readings that are proposed together."""
+_N_MODE_DRAWS, _N_SEQUENCE_DRAWS = 128, 192
+"""Simulated draws by which modes, and sequences, are compared."""
+_LONGEST_SEQUENCE = 3
+"""Most proposals in a sequence."""
+_SESSION_ENDS = ("edges", "again")
+"""Proposals that take the board out of its setup, which ends the session there."""
 
 
 @dataclass(frozen=True)
 class Costs:
-    """What each class of work costs, minutes."""
+    """The cost of each class of work, minutes."""
 
     reading: float = 1.0  # one frequency of a board in its place, or one reading of a size
     clamping: float = 10.0  # another way to hold the board, or the same one again
@@ -42,157 +48,177 @@ class Costs:
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
-        return tuple(one.name for one in fields(cls))
+        return tuple(field.name for field in fields(cls))
 
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """One thing that could be measured next."""
+    """A measurement that could be made next."""
 
     entry: ProposalEntry
-    readings: Readings
-    about: str  # the way to hold a board, the input, the effect or the board that it asks for
-    known: KnownBoard | None = None  # the board; None where it is one that is not there yet
-    read: StationReadings | None = None  # everything that could be read in its station; None where no frequency is read
-    rows: tuple[int, ...] = ()  # which of the station's modes are read
-    spot: int = 0  # of its station, where a known mass stands
+    readings: PlannedReadings
+    about: str  # the setup, the input, the effect or the board that it asks for
+    known: KnownBoard | None = None  # the board; None for a further one
+    read: StationReadings | None = None  # all readings of its station; None where no frequency is read
+    rows: tuple[int, ...] = ()  # indices of the station's modes that are read
+    spot: int = 0  # index of the spot of the station where a known mass stands
 
 
 @dataclass(frozen=True, eq=False)
 class Planner:
-    """What is believed, what is asked for, and what things cost."""
+    """Beliefs, goal and costs, from which proposals are ranked."""
 
     beliefs: Beliefs
     seed: int  # everything random follows from it; all gains are compared on the same simulated readings
     goal: str | None = None  # see `bayesplate.planning.gains.expected_gain`
     costs: Costs = Costs()
 
-    def gain(self, readings: Readings, minutes: float = 1.0, n_draws: int = N_DRAWS) -> Gain:
-        rng = stream(self.seed, "gains of further readings")
+    def gain(self, readings: PlannedReadings, minutes: float = 1.0, n_draws: int = N_DRAWS) -> Gain:
+        rng = random_stream(self.seed, "gains of further readings")
         return expected_gain(self.beliefs, readings, rng, self.goal, minutes, n_draws)
 
     def ranked(
-        self, priors: Sequence[PriorCard] = (), shared: Sequence[Shared] = (), least: float = FAINT
+        self, priors: Sequence[PriorCard] = (), shared: Sequence[SharedParameter] = (), least: float = FAINT_GAIN
     ) -> tuple[Proposal, ...]:
-        """Everything that could be measured next and gives more than the least (nats), the most promising first.
+        """All proposals that gain more than the least (nats), the best first.
 
-        The priors are one per board, where more boards could be measured, `shared` is what these have in common.
+        The priors are one per board, where more boards could be measured; `shared` are the parameters that these share.
         """
-        listed = [one for known in self.beliefs.boards for one in (*self._of_modes(known), *self._of_sizes(known))]
-        listed += self._of_looks()
-        for one in further_boards(self.beliefs, priors, shared):
-            minutes = self.costs.board + len(one.labels) * self.costs.reading
-            setup, told = one.like.setups[0].name, one.sentence
-            listed.append(self._proposal("board", "", setup, told, minutes, one.readings, told, one.labels))
-        kept = [one for one in listed if one.entry.gain.score > least]
-        return tuple(sorted(kept, key=lambda one: -one.entry.gain.score))
+        listed = [
+            proposal
+            for board in self.beliefs.boards
+            for proposal in (*self._mode_proposals(board), *self._size_proposals(board))
+        ]
+        listed += self._inspection_proposals()
+        for board in further_boards(self.beliefs, priors, shared):
+            minutes = self.costs.board + len(board.labels) * self.costs.reading
+            setup, sentence = board.like.setups[0].name, board.sentence
+            listed.append(self._proposal("board", "", setup, sentence, minutes, board.readings, sentence, board.labels))
+        worthwhile = [proposal for proposal in listed if proposal.entry.gain.score > least]
+        return tuple(sorted(worthwhile, key=lambda proposal: -proposal.entry.gain.score))
 
     def _proposal(
-        self, what: str, board: str, setup: str, sentence: str, minutes: float, readings: Readings, about: str,
+        self, what: str, board: str, setup: str, sentence: str, minutes: float, readings: PlannedReadings, about: str,
         modes: tuple[str, ...] = (),
     ) -> Proposal:  # fmt: skip
         entry = ProposalEntry(what, board, setup, sentence, minutes, modes, self.gain(readings, minutes))
         return Proposal(entry, readings, about)
 
-    def _of_modes(self, known: KnownBoard) -> Iterator[Proposal]:
-        """Frequencies: further modes, the same again, the same with a known mass, and the board held another way."""
-        rng = stream(self.seed, "noise of a further session")
-        for law in known.laws:
-            if law.station.goes_on(known.board):
-                yield from self._of_station(known, station_readings(self.beliefs, known, law, rng))
+    def _mode_proposals(self, known_board: KnownBoard) -> Iterator[Proposal]:
+        """Proposals of frequencies: further modes, repeats, repeats with a known mass, and new stations."""
+        rng = random_stream(self.seed, "noise of a further session")
+        for law in known_board.laws:
+            if law.station.goes_on(known_board.board):
+                yield from self._station_proposals(known_board, station_readings(self.beliefs, known_board, law, rng))
 
-    def _of_station(self, known: KnownBoard, read: StationReadings) -> Iterator[Proposal]:
-        station, costs, name = read.law.station, self.costs, known.board.name
+    def _station_proposals(self, known_board: KnownBoard, available: StationReadings) -> Iterator[Proposal]:
+        station, costs, name = available.law.station, self.costs, known_board.board.name
         is_alone = len(self.beliefs.boards) == 1
-        where = f" in setup {station.base.name}" if len(known.board.setups) > 1 else ""
-        of, its = ("", "the same board") if is_alone else (f" of board {name}", f"board {name}")
+        where = f" in setup {station.base.name}" if len(known_board.board.setups) > 1 else ""
+        of_board, board_words = ("", "the same board") if is_alone else (f" of board {name}", f"board {name}")
         about = f"{name}, held as in {station.setup.name}"
 
-        def words(rows: Sequence[int]) -> str:
+        def mode_words(rows: Sequence[int]) -> str:
             return f"mode{'s' * (len(rows) > 1)} {', '.join(str(station.setup.labels[i]) for i in rows)}"
 
-        def made(
-            what: str, told: str, minutes: float, readings: Readings, rows: tuple[int, ...], spot: int = 0
+        def make_proposal(
+            what: str, sentence: str, minutes: float, readings: PlannedReadings, rows: tuple[int, ...], spot: int = 0
         ) -> Proposal:
             labels, minutes = tuple(str(station.setup.labels[i]) for i in rows), minutes + len(rows) * costs.reading
-            one = self._proposal(what, name, station.setup.name, told, minutes, readings, about, labels)
-            return replace(one, known=known, read=read, rows=rows, spot=spot)
+            proposal = self._proposal(what, name, station.setup.name, sentence, minutes, readings, about, labels)
+            return replace(proposal, known=known_board, read=available, rows=rows, spot=spot)
 
-        for some in self._best_modes(read):
-            rows, readings = tuple(read.rows[i] for i in some), read.further.some(some)
+        for chosen in self._best_modes(available):
+            rows, readings = tuple(available.rows[i] for i in chosen), available.further.some(chosen)
             if station.is_new:
-                yield made("edges", f"Measure {its} {station.held}, {words(rows)}", costs.clamping, readings, rows)
+                yield make_proposal(
+                    "edges", f"Measure {board_words} {station.held}, {mode_words(rows)}", costs.clamping, readings, rows
+                )
             elif station.n_old and not self.beliefs.is_prior:
-                yield made("modes", f"Measure {words(rows)}{of} as well{where}", 0.0, readings, rows)
+                yield make_proposal(
+                    "modes", f"Measure {mode_words(rows)}{of_board} as well{where}", 0.0, readings, rows
+                )
             else:
-                told = f"Measure {words(rows)}{of} in setup {station.base.name}"
-                yield made("modes", told, costs.clamping, readings, rows)
-        old = read.old
-        if read.again is not None:
-            these = words(old) if is_alone else f"all {len(old)} modes{of}"
-            told = f"Measure {these}{where} again on another day, the board taken out and put back"
-            yield made("again", told, costs.clamping, read.again, old)
-        if read.with_mass:
-            spot = max(read.with_mass, key=lambda spot: self.gain(read.with_mass[spot]).score)
-            (x, y), grams = station.places(known.board)[spot], 1e3 * known_mass(known.board)
-            at = f"at x = {1e3 * x:.0f}, y = {1e3 * y:.0f} mm"
-            told = f"Stick a known mass of {grams:g} g on the board {at} and measure {words(old)}{where} again"
-            yield made("mass", told, costs.reading, read.with_mass[spot], old, spot)
+                sentence = f"Measure {mode_words(rows)}{of_board} in setup {station.base.name}"
+                yield make_proposal("modes", sentence, costs.clamping, readings, rows)
+        old = available.old
+        if available.again is not None:
+            modes = mode_words(old) if is_alone else f"all {len(old)} modes{of_board}"
+            sentence = f"Measure {modes}{where} again on another day, the board taken out and put back"
+            yield make_proposal("again", sentence, costs.clamping, available.again, old)
+        if available.with_mass:
+            spot = max(available.with_mass, key=lambda spot: self.gain(available.with_mass[spot]).score)
+            (x, y), grams = station.places(known_board.board)[spot], 1e3 * known_mass(known_board.board)
+            place_words = f"at x = {1e3 * x:.0f}, y = {1e3 * y:.0f} mm"
+            sentence = (
+                f"Stick a known mass of {grams:g} g on the board {place_words} and measure "
+                f"{mode_words(old)}{where} again"
+            )
+            yield make_proposal("mass", sentence, costs.reading, available.with_mass[spot], old, spot)
 
-    def _best_modes(self, read: StationReadings) -> list[tuple[int, ...]]:
-        """The best modes, so many together, found one by one: each goes with those found before it."""
-        n, sizes = read.further.n, FIRST if self.beliefs.is_prior or not read.law.station.n_old else BEST
-        if read.law.station.is_new and not self.beliefs.is_prior:
+    def _best_modes(self, available: StationReadings) -> list[tuple[int, ...]]:
+        """Sets of the best modes, chosen one by one: each is the best beside those chosen before it."""
+        n, sizes = (
+            available.further.n,
+            FIRST_MODES if self.beliefs.is_prior or not available.law.station.n_old else BEST_MODES,
+        )
+        if available.law.station.is_new and not self.beliefs.is_prior:
             return [tuple(range(n))] if n else []
         chosen: list[int] = []
         for _ in range(min(max(sizes), n)):
-            left = [i for i in range(n) if i not in chosen]
-            some = {i: self.gain(read.further.some([*chosen, i]), n_draws=_TRIED).score for i in left}
-            chosen.append(max(left, key=lambda i: some[i]))
-        told = sizes if len(self.beliefs.boards) == 1 else sizes[1:]
-        return list(dict.fromkeys(tuple(sorted(chosen[:size])) for size in told)) if chosen else []
+            remaining = [i for i in range(n) if i not in chosen]
+            scores = {
+                i: self.gain(available.further.some([*chosen, i]), n_draws=_N_MODE_DRAWS).score for i in remaining
+            }
+            chosen.append(max(remaining, key=lambda i: scores[i]))
+        listed_sizes = sizes if len(self.beliefs.boards) == 1 else sizes[1:]
+        return list(dict.fromkeys(tuple(sorted(chosen[:size])) for size in listed_sizes)) if chosen else []
 
-    def _of_sizes(self, known: KnownBoard) -> Iterator[Proposal]:
-        """Readings of a board itself; what all boards share alike is read once, on the first."""
-        name, n = known.board.name, len(self.beliefs.shared)
-        for one in measurements(known.board):
-            along = column_of(known, one.parameter)
-            is_shared = n > 0 and not along[:-n].any()
-            if is_shared and known is not self.beliefs.boards[0]:
+    def _size_proposals(self, known_board: KnownBoard) -> Iterator[Proposal]:
+        """Proposals of readings of the sizes of a board; a size that all boards share is read once, on the first."""
+        name, n = known_board.board.name, len(self.beliefs.shared)
+        for measurement in size_measurements(known_board.board):
+            column = parameter_column(known_board, measurement.parameter)
+            is_shared = n > 0 and not column[:-n].any()
+            if is_shared and known_board is not self.beliefs.boards[0]:
                 continue
-            of = "" if is_shared or len(self.beliefs.boards) == 1 else f", board {name}"
-            told = one.sentence.replace("to the board", "to every board") if is_shared else one.sentence + of
-            about, minutes = f"{name}: {one.parameter.name}", one.n * self.costs.reading
-            readings, its = input_readings(self.beliefs, known, one), "" if is_shared else name
-            yield self._proposal("size", its, "", told, minutes, readings, about)
+            of_board = "" if is_shared or len(self.beliefs.boards) == 1 else f", board {name}"
+            sentence = (
+                measurement.sentence.replace("to the board", "to every board")
+                if is_shared
+                else measurement.sentence + of_board
+            )
+            about, minutes = f"{name}: {measurement.parameter.name}", measurement.n * self.costs.reading
+            readings, board_name = input_readings(self.beliefs, known_board, measurement), "" if is_shared else name
+            yield self._proposal("size", board_name, "", sentence, minutes, readings, about)
 
-    def _of_looks(self) -> Iterator[Proposal]:
-        """Proposals to look at an effect without reading a frequency."""
-        for effect, look in LOOKS.items():
-            readings, name = look_readings(self.beliefs, effect), self.beliefs.boards[0].board.name
+    def _inspection_proposals(self) -> Iterator[Proposal]:
+        """Proposals to inspect an effect without reading a frequency."""
+        for effect, inspection in INSPECTIONS.items():
+            readings, name = inspection_readings(self.beliefs, effect), self.beliefs.boards[0].board.name
             if readings is not None:
-                minutes = look.n * self.costs.reading
-                yield self._proposal("size", name, "", look.sentence, minutes, readings, effect)
+                minutes = inspection.n * self.costs.reading
+                yield self._proposal("size", name, "", inspection.sentence, minutes, readings, effect)
 
     def sequences(self, listed: Sequence[Proposal]) -> tuple[tuple[tuple[Proposal, ...], SequenceEntry], ...]:
-        """The best two and the best three together, found one by one: each goes with those found before it.
+        """The best two and the best three together, chosen one by one: each is the best beside those chosen before it.
 
-        They stand in the order in which they can be done: what goes on in a session before the board is taken out. Two
-        that read modes of one way to hold a board, or the same size, are not put together.
+        They stand in the order in which they can be done: proposals that go on in a session come before the board is
+        taken out. Two that read modes in one station, or the same size, are not put together.
         """
-        chosen, made = list(listed[:1]), []
-        while chosen and len(chosen) < _LONGEST:
-            left = [one for one in listed if one.about not in {other.about for other in chosen}]
-            if not left:
+        chosen, sequences = list(listed[:1]), []
+        while chosen and len(chosen) < _LONGEST_SEQUENCE:
+            remaining = [candidate for candidate in listed if candidate.about not in {other.about for other in chosen}]
+            if not remaining:
                 break
-            minutes = [sum(each.entry.cost_minutes for each in (*chosen, one)) for one in left]
+            minutes = [sum(step.entry.cost_minutes for step in (*chosen, candidate)) for candidate in remaining]
             gains = [
-                self.gain(together([each.readings for each in (*chosen, one)]), cost, _JOINED)
-                for one, cost in zip(left, minutes, strict=True)
+                self.gain(join_readings([step.readings for step in (*chosen, candidate)]), cost, _N_SEQUENCE_DRAWS)
+                for candidate, cost in zip(remaining, minutes, strict=True)
             ]
-            best = max(range(len(left)), key=lambda i: gains[i].score)
-            chosen.append(left[best])
-            steps = tuple(sorted(chosen, key=lambda one: one.entry.what in _ENDING))
-            told = tuple(one.entry.sentence for one in steps)
-            made.append((steps, SequenceEntry(told, minutes[best], gains[best])))
-        return tuple(made)
+            best = max(range(len(remaining)), key=lambda i: gains[i].score)
+            chosen.append(remaining[best])
+            steps = tuple(sorted(chosen, key=lambda step: step.entry.what in _SESSION_ENDS))
+            sentences = tuple(step.entry.sentence for step in steps)
+            sequences.append((steps, SequenceEntry(sentences, minutes[best], gains[best])))
+        return tuple(sequences)

@@ -1,4 +1,4 @@
-"""Ways to read modes: the board held as it was, with all edges free, or as a cantilever."""
+"""Stations: ways to hold the board and read its modes, as it was held, with all edges free, or as a cantilever."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bayesplate.board.board import Board, Values
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Reading
-from bayesplate.board.setup import Ends, Setup, assumed_noise
+from bayesplate.board.setup import EdgeConditions, Setup, assumed_noise
 from bayesplate.effects import effects_of
 from bayesplate.effects.attached_items import places_on
 from bayesplate.effects.base import Effect
@@ -21,22 +21,22 @@ from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
 
-FURTHER = 8
-"""Modes beyond those that were read from which the best are chosen."""
-ELSEWHERE = 6
+N_FURTHER_MODES = 8
+"""Unread modes from which the best are chosen."""
+N_NEW_MODES = 6
 """Lowest modes that are read where the board is held another way."""
-SEARCHED = 24
-"""Lowest modes of a way to hold the board among which those that are read are looked for."""
+N_SEARCHED_MODES = 24
+"""Lowest computed modes of a station, among which the modes with clear names are found."""
 _NEAR_FREE, _NEAR_HELD = 0.94, 0.7
-"""Where a known mass stands besides the middle, as fractions of a side whose end is free or held."""
+"""Places of a known mass besides the middle, as fractions of a side whose end is free or held."""
 
 
 @dataclass(frozen=True, eq=False)
 class Station:
     """A way to hold the board, and the modes that can be read there."""
 
-    setup: Setup  # its readings: those of `base` first, then what the model expects of the modes that could be read
-    base: Setup  # the setup of the board that goes on, or from which another one takes its sensor and its air
+    setup: Setup  # its readings: those of `base` first, then the unread modes at the frequencies of the model
+    base: Setup  # the setup of the board that goes on, or from which a new one takes its sensor and its air
     n_old: int = 0  # readings that were taken already; 0 where the board was never held so
 
     @property
@@ -50,14 +50,14 @@ class Station:
         return "with all edges free" if self.setup.is_free else "clamped along x0 alone"
 
     def goes_on(self, board: Board) -> bool:
-        """Whether something more can be read in it: of several sessions of one setup, in the last."""
+        """Whether more can be read in this station: of several sessions of one setup, in the last only."""
         if self.is_new or self.base.group is None:
             return True
-        return self.base.name == [one.name for one in board.setups if one.group == self.base.group][-1]
+        return self.base.name == [setup.name for setup in board.setups if setup.group == self.base.group][-1]
 
     @property
     def spots(self) -> tuple[tuple[float, float], ...]:
-        """Where a known mass could stand, as fractions of the vibrating sides; nowhere where nothing was read."""
+        """Places for a known mass, as fractions of the vibrating sides; none where no mode was read."""
         if not self.n_old:
             return ()
         ends = (_NEAR_FREE if end == "free" else _NEAR_HELD for end in (self.setup.ends_x[1], self.setup.ends_y[1]))
@@ -69,63 +69,67 @@ class Station:
         return places_on(board, self.setup, self.spots)
 
     def system(self, board: Board) -> System:
-        """The setup with the effects of a board that was made for its base."""
-        if all(one.name != self.setup.name for one in board.setups):
-            acting = (one.in_setup(board, self.setup) for one in board.chosen if one.scope == "setup")
-            new = {one.name: one for one in acting if one is not None}
+        """The setup with the effects of a board, which were declared for its base."""
+        if all(setup.name != self.setup.name for setup in board.setups):
+            acting = (effect.in_setup(board, self.setup) for effect in board.chosen if effect.scope == "setup")
+            new = {effect.name: effect for effect in acting if effect is not None}
             board = replace(board, setups=(*board.setups, self.setup), chosen=(*board.chosen, *new.values()))
         return System(self.setup, effects_of(board, self.setup))
 
     def values(self, system: System, values: Values) -> dict[str, Floats]:
-        """Values that also hold what the effects of a system take and the board was not asked for.
+        """Values completed by the parameters of a system's effects that the board does not have.
 
-        What an effect of a setup is in another one is taken to be as large: the same sensor, the same clamp.
+        An effect of a setup is taken to be as large in another one: the same sensor, the same clamp.
         """
         by_key = {
-            (effect.name, one.key): values[one.name]
-            for effect in map(self._in_base, system.effects)
-            for one in effect.parameters()
-            if one.name in values
+            (effect.name, parameter.key): values[parameter.name]
+            for effect in map(self._effect_in_base, system.effects)
+            for parameter in effect.parameters()
+            if parameter.name in values
         }
         missing = {
-            one.name: np.asarray(by_key.get((effect.name, one.key), one.prior.median))
+            parameter.name: np.asarray(by_key.get((effect.name, parameter.key), parameter.prior.median))
             for effect in system.effects
-            for one in effect.parameters()
-            if one.name not in values
+            for parameter in effect.parameters()
+            if parameter.name not in values
         }
         return {**values, **missing}
 
-    def _in_base(self, effect: Effect) -> Effect:
-        """An effect under the names that it has in the base."""
+    def _effect_in_base(self, effect: Effect) -> Effect:
+        """The effect with the names of its parameters in the base."""
         return replace(effect, owner=self.base.owner) if effect.owner == self.setup.owner else effect
 
 
 def old_stations(board: Board, values: Values) -> Iterator[Station]:
-    """The ways in which the board was held, each with the modes that were not read, computed at these values (SI)."""
+    """Stations of the setups in which the board was held, each with its unread modes computed at these values (SI)."""
     for setup in board.setups:
-        read = tuple(replace(one, frequency=Quantity.exact(one.frequency.mean), sign="") for one in setup.readings)
+        readings = tuple(
+            replace(reading, frequency=Quantity.exact(reading.frequency.mean), sign="") for reading in setup.readings
+        )
         empty = replace(setup, readings=(), peaks=(), published_coefficients=None)
-        more = _next_modes(board, Station(empty, setup), values, FURTHER, {one.label for one in read})
-        if read or more:
-            yield Station(replace(empty, readings=(*read, *more)), setup, len(read))
+        further = _next_modes(
+            board, Station(empty, setup), values, N_FURTHER_MODES, {reading.label for reading in readings}
+        )
+        if readings or further:
+            yield Station(replace(empty, readings=(*readings, *further)), setup, len(readings))
 
 
 def new_stations(board: Board, values: Values, prior: PriorCard | None = None) -> Iterator[Station]:
-    """The ways in which the board was never held, free and as a cantilever, with the modes at these values (SI).
+    """Stations in which the board was never held, free and as a cantilever, with the modes at these values (SI).
 
-    The noise that a prior states, if it does, is that of an edge that was not tried yet.
+    The noise of such a station is that of the prior, if it states one.
     """
-    ways: tuple[tuple[str, Ends], ...] = (("free", ("free", "free")), ("cantilever", ("clamped", "free")))
-    taken, first = {setup.name for setup in board.setups}, board.setups[0]
+    ways: tuple[tuple[str, EdgeConditions], ...] = (("free", ("free", "free")), ("cantilever", ("clamped", "free")))
+    names, first = {setup.name for setup in board.setups}, board.setups[0]
     for name, ends_x in ways:
         is_free = "clamped" not in ends_x
-        if any(one.is_free if is_free else "clamped" in {*one.ends_x, *one.ends_y} for one in board.setups):
+        if any(setup.is_free if is_free else "clamped" in {*setup.ends_x, *setup.ends_y} for setup in board.setups):
             continue
-        while name in taken:
+        while name in names:
             name += "-2"
         noise = assumed_noise((*ends_x, "free", "free"), prior)
         empty = Setup(name, ends_x, ("free", "free"), (), noise, attached=first.attached, fluid=first.fluid)
-        readings = _next_modes(board, Station(empty, first), values, ELSEWHERE, set())
+        readings = _next_modes(board, Station(empty, first), values, N_NEW_MODES, set())
         if readings:
             yield Station(replace(empty, readings=readings), first)
 
@@ -133,21 +137,22 @@ def new_stations(board: Board, values: Values, prior: PriorCard | None = None) -
 def _next_modes(
     board: Board, station: Station, values: Values, n: int, taken: Collection[Label]
 ) -> tuple[Reading, ...]:
-    """The lowest modes with a clear name that were not read, each where the model expects it.
+    """The lowest unread modes with a clear name, at the frequencies of the model.
 
-    None on whose nodal line the sensor stands, which stays where it is in a session that goes on.
+    In a session that goes on the sensor stays where it is, and modes on whose nodal line it stands are left out.
     """
     system, first = station.system(board), station.setup.first_label
-    there = station.values(system, values)
-    modes, named = spectrum(system, there, SEARCHED)
-    seen = np.ones(len(named))
+    station_values = station.values(system, values)
+    modes, named = spectrum(system, station_values, N_SEARCHED_MODES)
+    deflection_shares = np.ones(len(named))
     if not station.is_new and station.base.sensor is not None:
-        seen = np.abs(deflections(station.base, modes, there, station.base.sensor, system.shaped))
-    new = (
-        (one.label, one.frequency)
-        for one, share in zip(named, seen, strict=True)
-        if share >= NODAL_LINE and one.label is not None and one.label not in taken
+        deflection_shares = np.abs(deflections(station.base, modes, station_values, station.base.sensor, system.shaped))
+    new_modes = (
+        (mode.label, mode.frequency)
+        for mode, share in zip(named, deflection_shares, strict=True)
+        if share >= NODAL_LINE and mode.label is not None and mode.label not in taken
     )
     return tuple(
-        Reading(label, (label.m - first.m, label.n - first.n), Quantity.exact(hertz)) for label, hertz in [*new][:n]
+        Reading(label, (label.m - first.m, label.n - first.n), Quantity.exact(hertz))
+        for label, hertz in [*new_modes][:n]
     )

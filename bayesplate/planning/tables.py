@@ -1,4 +1,4 @@
-"""A plan as people read it: tables, the first line, and gains in words."""
+"""A plan in words: its tables, its first line, and gains in sentences."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ from collections.abc import Mapping, Sequence
 
 from bayesplate.board.material import MODULI
 from bayesplate.campaign.tables import shared_words
-from bayesplate.effects.words import joined
+from bayesplate.effects.words import join_words
 from bayesplate.planning.gains import CONSTANTS, EXPLANATIONS
 from bayesplate.planning.plan import ExplanationEntry, Gain, Plan, ProposalEntry
 from bayesplate.results.tables import Table
 from bayesplate.results.words import percent
 
-MOST = 12
-"""Proposals that a table lists; plan.json has all."""
+MOST_PROPOSALS = 12
+"""Most proposals in a table; plan.json has all."""
 
 
 def plan_tables(plan: Plan) -> tuple[Table, ...]:
-    """Explanations, proposals, sequences, and what to look for at the bench; empty ones left out."""
-    every = (_explanations(plan), _proposals(plan), _sequences(plan), *_benches(plan))
-    return tuple(table for table in every if table.rows)
+    """Tables of explanations, proposals, sequences, and modes to look for at the bench; empty ones are left out."""
+    tables = (_explanations(plan), _proposals(plan), _sequences(plan), *_benches(plan))
+    return tuple(table for table in tables if table.rows)
 
 
 def _explanations(plan: Plan) -> Table:
-    rows = tuple((one.words, f"{100.0 * one.probability:.0f} %") for one in plan.explanations)
+    rows = tuple((explanation.words, f"{100.0 * explanation.probability:.0f} %") for explanation in plan.explanations)
     return Table(f"What may be the case on {plan.name}", ("explanation", "probability"), rows if len(rows) > 1 else ())
 
 
@@ -40,13 +40,16 @@ def _cells(gain: Gain, cost: float, plan: Plan) -> tuple[str, ...]:
     if len(plan.explanations) > 1:
         drop = gain.explanations
         doubt = (str(percent(None if drop is None or not plan.entropy else drop / plan.entropy)),)
-    left = gain.shared.values() if gain.shared else (getattr(gain, name) for name in MODULI)
-    shrunk = tuple(f"{100.0 * value:.0f} %" for value in left)
+    ratios = gain.shared.values() if gain.shared else (getattr(gain, name) for name in MODULI)
+    shrunk = tuple(f"{100.0 * value:.0f} %" for value in ratios)
     return (*doubt, *shrunk, f"{cost:g}", f"{gain.score:.2f}", f"{gain.score_per_minute:.3f}")
 
 
 def _proposals(plan: Plan) -> Table:
-    rows = tuple((one.sentence, *_cells(one.gain, one.cost_minutes, plan)) for one in plan.proposals[:MOST])
+    rows = tuple(
+        (proposal.sentence, *_cells(proposal.gain, proposal.cost_minutes, plan))
+        for proposal in plan.proposals[:MOST_PROPOSALS]
+    )
     return Table(
         f"What to measure next on {plan.name}: intervals after, in % of now", ("proposal", *_columns(plan)), rows
     )
@@ -55,10 +58,10 @@ def _proposals(plan: Plan) -> Table:
 def _sequences(plan: Plan) -> Table:
     rows = tuple(
         (
-            "\n".join(f"{number}. {step}" for number, step in enumerate(one.steps, start=1)),
-            *_cells(one.gain, one.cost_minutes, plan),
+            "\n".join(f"{number}. {step}" for number, step in enumerate(sequence.steps, start=1)),
+            *_cells(sequence.gain, sequence.cost_minutes, plan),
         )
-        for one in plan.sequences
+        for sequence in plan.sequences
     )
     return Table("The best two and the best three together", ("steps", *_columns(plan)), rows)
 
@@ -66,70 +69,78 @@ def _sequences(plan: Plan) -> Table:
 def _benches(plan: Plan) -> tuple[Table, ...]:
     return tuple(
         Table(
-            f"At the bench, setup {one.setup}: sensor at {_place(one.sensor_mm)}, hammer at {_place(one.hammer_mm)}",
+            f"At the bench, setup {bench.setup}: "
+            f"sensor at {_place_words(bench.sensor_mm)}, hammer at {_place_words(bench.hammer_mm)}",
             ("mode", "Hz", "likely Hz", "seen"),
             tuple(
                 (mode.label, f"{mode.hz:.1f}", f"{mode.low_hz:.1f} to {mode.high_hz:.1f}", f"{100.0 * mode.seen:.0f} %")
-                for mode in one.modes
+                for mode in bench.modes
             ),
         )
-        for one in plan.bench
+        for bench in plan.bench
     )
 
 
-def _place(place: tuple[float, float]) -> str:
+def _place_words(place: tuple[float, float]) -> str:
     return f"x = {place[0]:.0f}, y = {place[1]:.0f} mm"
 
 
-WORTH = 0.05
-"""A gain below this, nats, is no reason to measure: an interval would shrink by less than a twentieth."""
-_CLEAR = 2.0
-"""Standard errors that a gain must stand above zero."""
+WORTHWHILE_GAIN = 0.05
+"""Least gain, nats, that is a reason to measure: below it an interval would shrink by less than a twentieth."""
+_CLEAR_ERRORS = 2.0
+"""Standard errors by which a gain must exceed zero."""
 
 
 def first_line(
     proposals: Sequence[ProposalEntry], explanations: Sequence[ExplanationEntry], entropy: float, goal: str | None
 ) -> str:
-    """What to do next and what it is expected to give: the best proposal that helps with the goal; empty if none."""
-    for one in proposals:
-        shrunk, doubt = _shrunk(one.gain, goal), _of_doubt(one.gain, explanations, entropy)
-        intervals = _of_intervals(shrunk)
+    """The best proposal that helps with the goal, with its expected gain, as a sentence; empty if there is none."""
+    for proposal in proposals:
+        shrunk, doubt = _shrunk_intervals(proposal.gain, goal), _doubt_words(proposal.gain, explanations, entropy)
+        intervals = _interval_words(shrunk)
         by_goal = {None: doubt or intervals, EXPLANATIONS: doubt, CONSTANTS: intervals}
         if by_goal.get(goal, goal in shrunk):
-            return f"{one.sentence}: {joined([words for words in (doubt, intervals) if words])}."
+            return f"{proposal.sentence}: {join_words([words for words in (doubt, intervals) if words])}."
     return ""
 
 
-def _of_doubt(gain: Gain, explanations: Sequence[ExplanationEntry], entropy: float) -> str:
-    """How far the doubt between explanations would fall, in words; empty where it is not clear that it would."""
+def _doubt_words(gain: Gain, explanations: Sequence[ExplanationEntry], entropy: float) -> str:
+    """The fall of the doubt between explanations in words; empty where it is small or uncertain."""
     drop, error = gain.explanations, gain.explanations_error
-    if drop is None or error is None or drop < max(WORTH, _CLEAR * error):
+    if drop is None or error is None or drop < max(WORTHWHILE_GAIN, _CLEAR_ERRORS * error):
         return ""
-    return f"the doubt between {_names(explanations)} would fall by {percent(drop / entropy)}"
+    return f"the doubt between {_explanation_words(explanations)} would fall by {percent(drop / entropy)}"
 
 
-def _names(explanations: Sequence[ExplanationEntry]) -> str:
-    """Explanations in words; where one is two effects, it is told which of them are meant to be alone."""
-    paired = {name for one in explanations if len(one.effects) > 1 for name in one.effects}
-    ways = ["together" if len(one.effects) > 1 else "alone" if paired & {*one.effects} else "" for one in explanations]
-    return joined([f"{one.words} {way}".rstrip() for one, way in zip(explanations, ways, strict=True)])
+def _explanation_words(explanations: Sequence[ExplanationEntry]) -> str:
+    """Explanations in words; the effects of a pair are marked "together", and "alone" where they are alone."""
+    paired = {name for explanation in explanations if len(explanation.effects) > 1 for name in explanation.effects}
+    ways = [
+        "together" if len(explanation.effects) > 1 else "alone" if paired & {*explanation.effects} else ""
+        for explanation in explanations
+    ]
+    return join_words(
+        [f"{explanation.words} {way}".rstrip() for explanation, way in zip(explanations, ways, strict=True)]
+    )
 
 
-def _of_intervals(shrunk: Mapping[str, float]) -> str:
-    """How far intervals would shrink, in words."""
+def _interval_words(shrunk: Mapping[str, float]) -> str:
+    """The shrinkage of intervals in words."""
     if not shrunk:
         return ""
     noun, verb = ("interval", "it is") if len(shrunk) == 1 else ("intervals", "they are")
-    sizes = joined([f"{100.0 * value:.0f}" if value >= 0.1 else f"{100.0 * value:.2g}" for value in shrunk.values()])
-    return f"the {noun} of {joined(list(shrunk))} would shrink to {sizes} % of what {verb}"
+    sizes = join_words(
+        [f"{100.0 * value:.0f}" if value >= 0.1 else f"{100.0 * value:.2g}" for value in shrunk.values()]
+    )
+    return f"the {noun} of {join_words(list(shrunk))} would shrink to {sizes} % of what {verb}"
 
 
-def _shrunk(gain: Gain, goal: str | None) -> dict[str, float]:
-    """What is left of each interval that shrinks by as much as is worth telling, and for sure.
+def _shrunk_intervals(gain: Gain, goal: str | None) -> dict[str, float]:
+    """Ratio after over before of each interval that shrinks by a worthwhile amount, beyond its error.
 
-    Those of what boards share, where they share something and nothing else was asked for.
+    The intervals of shared parameters, where boards share some and no goal was given, otherwise those of the moduli.
     """
     shared = {shared_words(name): value for name, value in gain.shared.items()} if goal is None else {}
-    left = shared or {name: getattr(gain, name) for name in MODULI}
-    least = max(WORTH, _CLEAR * gain.constants_error)
-    return {name: value for name, value in left.items() if -math.log(value) >= least}
+    ratios = shared or {name: getattr(gain, name) for name in MODULI}
+    least = max(WORTHWHILE_GAIN, _CLEAR_ERRORS * gain.constants_error)
+    return {name: value for name, value in ratios.items() if -math.log(value) >= least}

@@ -1,8 +1,8 @@
 """Properties that vary over the plate: the weights of its Gauss points in integrals of fields within outlines.
 
-Where an outline cuts an element, what is left of it is integrated by Gauss points of its own. The product of two cubics
-is of degree six, so that seven numbers tell of weights anywhere in an element all that they can do: they are moved to
-the seven Gauss points of the whole element, and every integral over the plate is a sum over the same points.
+Where an outline cuts an element, the part inside is integrated by Gauss points of its own. The product of two cubics is
+of degree six, so that any weights within an element can be replaced by seven equivalent ones: they are moved to the
+seven Gauss points of the whole element, and every integral over the plate is a sum over the same points.
 """
 
 from __future__ import annotations
@@ -31,33 +31,36 @@ class EdgeStrip:
     field: Field | None = None  # None: uniform
 
 
-Group = Literal["along", "bending", "shear", "mass", "rotary"]
+TermGroup = Literal["along", "bending", "shear", "mass", "rotary"]
 """Terms of a plate that take the same field; "along" is the bending that the modulus along the grain resists."""
 
-_GHOST: dict[Group, float] = {"along": 1e-5, "bending": 1e-5, "shear": 1e-5, "mass": 1e-8, "rotary": 1e-8}
-"""What is left of the plate outside its outline: soft enough to carry nothing, far lighter still than it is soft."""
+_GHOST_SHARE: dict[TermGroup, float] = {"along": 1e-5, "bending": 1e-5, "shear": 1e-5, "mass": 1e-8, "rotary": 1e-8}
+"""Share of the plate's properties that stays outside its outline: too soft to carry anything, and far lighter still."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fabric:
     """How the plate's own properties spread over it, and whether its grain runs at an angle."""
 
-    # that the terms of each group take, each with a weight of its own (None: uniform); absent: uniform alone
-    fields: Mapping[Group, Sequence[Field | EdgeStrip | None]] = field(default_factory=dict)
+    # fields of each group of terms, each with a weight of its own (None: uniform); a group that is absent is uniform
+    fields: Mapping[TermGroup, Sequence[Field | EdgeStrip | None]] = field(default_factory=dict)
     outline: Outline | None = None
     is_turned: bool = False  # terms that couple bending and twist, and the two shear strains, join the plate's own
 
-    def weights(self, groups: Iterable[Group], x: Line, y: Line) -> dict[Group, list[Floats]]:
+    def weights(self, groups: Iterable[TermGroup], x: Line, y: Line) -> dict[TermGroup, list[Floats]]:
         """Weights of the plate's Gauss points for each field of each group: (n_x, n_y) arrays.
 
-        The plate outside its outline belongs to the first field, whose weight is above zero; that of others may not be.
+        The plate outside its outline belongs to the first field, whose weight is positive; others may be negative.
         """
-        taken = {
-            group: [(one, _GHOST[group] if k == 0 else 0.0) for k, one in enumerate(self.fields.get(group, (None,)))]
+        keys_by_group = {
+            group: [
+                (factor, _GHOST_SHARE[group] if k == 0 else 0.0)
+                for k, factor in enumerate(self.fields.get(group, (None,)))
+            ]
             for group in groups
         }
-        made = {each: self._weights(*each, x, y) for each in {each for own in taken.values() for each in own}}
-        return {group: [made[each] for each in own] for group, own in taken.items()}
+        grids = {key: self._weights(*key, x, y) for key in {key for keys in keys_by_group.values() for key in keys}}
+        return {group: [grids[key] for key in keys] for group, keys in keys_by_group.items()}
 
     def _weights(self, factor: Field | EdgeStrip | None, ghost: float, x: Line, y: Line) -> Floats:
         if isinstance(factor, EdgeStrip):
@@ -74,13 +77,13 @@ UNIFORM = Fabric()
 """The same properties everywhere, the grain along x."""
 
 
-def layout(groups: Sequence[Group], counts: Mapping[Group, int]) -> list[tuple[int, int]]:
-    """Pairs of a term's index and the index of a field that it takes: every term with its first field first.
+def term_field_pairs(groups: Sequence[TermGroup], counts: Mapping[TermGroup, int]) -> list[tuple[int, int]]:
+    """Pairs of a term's index and the index of one of its fields: all terms with their first field come first.
 
-    Given are the group of each of the plate's own terms, and the number of fields of each group.
+    `groups` holds the group of each of the plate's own terms, `counts` the number of fields of each group.
     """
-    most = max(counts[group] for group in groups)
-    return [(term, k) for k in range(most) for term, group in enumerate(groups) if k < counts[group]]
+    n_fields = max(counts[group] for group in groups)
+    return [(term, k) for k in range(n_fields) for term, group in enumerate(groups) if k < counts[group]]
 
 
 def weights_within(x: Line, y: Line, outline: Outline | None = None, factor: Field | None = None) -> Floats:
@@ -92,17 +95,17 @@ def weights_within(x: Line, y: Line, outline: Outline | None = None, factor: Fie
     starts = np.clip(y.nodes[:-1], low, high)
     lengths = np.clip(y.nodes[1:], low, high) - starts
     points, weights = _gauss_rule()
-    at = starts[..., None] + lengths[..., None] * points
+    cut_points = starts[..., None] + lengths[..., None] * points
     across = lengths[..., None] * weights
     if factor is not None:
-        across = across * factor(x.points[:, None, None], at)
-    whole = np.diff(y.nodes)[:, None]
-    moved = _moved((at - y.nodes[:-1, None]) / whole, across)
-    return np.asarray(x.weights[:, None] * y.share * moved.reshape(x.points.size, -1))
+        across = across * factor(x.points[:, None, None], cut_points)
+    element_lengths = np.diff(y.nodes)[:, None]
+    element_weights = _to_gauss_points((cut_points - y.nodes[:-1, None]) / element_lengths, across)
+    return np.asarray(x.weights[:, None] * y.share * element_weights.reshape(x.points.size, -1))
 
 
 def _gauss_rule() -> tuple[Floats, Floats]:
-    """Gauss points and weights on [0, 1], those of the lines that are cut."""
+    """Gauss points and weights on [0, 1] of lines that an outline cuts."""
     from skfem.quadrature import get_quadrature
     from skfem.refdom import RefLine
 
@@ -110,11 +113,11 @@ def _gauss_rule() -> tuple[Floats, Floats]:
     return points[0], weights
 
 
-def _moved(t: Floats, weights: Floats) -> Floats:
-    """Weights at the Gauss points of an element that sum a polynomial of degree six as given ones do at points t."""
+def _to_gauss_points(t: Floats, weights: Floats) -> Floats:
+    """Weights at the Gauss points of an element that integrate polynomials of degree six as `weights` at t do."""
     from numpy.polynomial.legendre import legvander
 
     degrees = np.arange(N_POINTS_CUT)
-    points, own = _gauss_rule()
+    points, gauss_weights = _gauss_rule()
     moments = np.einsum("...g,...gn->...n", weights, legvander(2.0 * t - 1.0, degrees[-1]))
-    return np.asarray(own * ((2 * degrees + 1) * moments @ legvander(2.0 * points - 1.0, degrees[-1]).T))
+    return np.asarray(gauss_weights * ((2 * degrees + 1) * moments @ legvander(2.0 * points - 1.0, degrees[-1]).T))

@@ -1,6 +1,6 @@
 """One side of the plate: cubic Hermite functions on line elements, by scikit-fem.
 
-Where both ends of a side are alike each mode is even or odd about the middle, so that the first half tells the whole:
+Where both ends of a side are alike each mode is even or odd about the middle, so that the first half gives the whole:
 an even function has no slope in the middle, an odd one no value. Lengths enter later, as weights of the energies.
 """
 
@@ -13,27 +13,28 @@ from typing import Any, Literal
 import numpy as np
 
 from bayesplate.arrays import Bools, Floats, Indices
-from bayesplate.board.setup import Ends
+from bayesplate.board.setup import EdgeConditions
 
-Hold = Literal["clamped", "supported", "guided", "free"]
-"""What an end holds: value and slope, the value, the slope, nothing. No card can ask for a guided end: it is a clamped
-one that an effect has released."""
-Holds = tuple[Hold, Hold]
+EndCondition = Literal["clamped", "supported", "guided", "free"]
+"""What an end holds: value and slope, the value, the slope, nothing. No card can state a guided end: it is a clamped
+end that an effect has released."""
+EndConditions = tuple[EndCondition, EndCondition]
 
 N_POINTS = 5
 """Gauss points per element: the product of two cubics, with a field of degree three, is integrated exactly."""
 N_POINTS_CUT = 7
 """The same where an outline cuts elements; see `bayesplate.plate.fields`."""
 
-_LAYER = (1 / 4, 1 / 16)
+_EDGE_LAYER = (1 / 4, 1 / 16)
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
     """The functions of one side on [0, 1]; value and slope at node i are the unknowns 2 i and 2 i + 1."""
 
-    ends: Ends  # of the board: they name the modes and tell the rigid motions
-    held: Holds  # what the functions hold: the same, or less where an effect has put springs in place of a clamp
+    ends: EdgeConditions  # of the board: they name the modes and tell the rigid motions
+    # what the functions hold: the same, or less where an effect has put springs in place of a clamp
+    held: EndConditions
     is_split: bool  # the first half alone
     basis: Any
 
@@ -48,7 +49,7 @@ class Line:
 
     @property
     def share(self) -> float:
-        """What an integral over the whole is of one over the line's own elements."""
+        """Integral over the whole side over that of the line's own elements: 2 where the line is split."""
         return 2.0 if self.is_split else 1.0
 
     @cached_property
@@ -76,43 +77,43 @@ class Line:
     @cached_property
     def derivatives(self) -> Floats:
         """All functions and their two derivatives at all Gauss points: (3, n_points, n_functions) array."""
-        found = np.zeros((3, *self.local.shape[1:3], self.n_functions))
-        for element, own in enumerate(self.unknowns):
-            found[:, element][:, :, own] = self.local[:, element]
-        return found.reshape(3, -1, self.n_functions)
+        derivatives = np.zeros((3, *self.local.shape[1:3], self.n_functions))
+        for element, columns in enumerate(self.unknowns):
+            derivatives[:, element][:, :, columns] = self.local[:, element]
+        return derivatives.reshape(3, -1, self.n_functions)
 
     def shapes(self, points: Floats, parity: int = 0) -> Any:
         """Values of the functions at points of [0, 1]: (n_points, n_functions) sparse array.
 
-        Of a half line the functions of one parity, 0 even and 1 odd, go on beyond the middle.
+        The functions of a half line continue beyond the middle with a parity: 0 even, 1 odd.
         """
-        at = np.asarray(points, dtype=np.float64)
-        is_beyond = at > 0.5 if self.is_split else np.zeros(at.shape, dtype=bool)
-        values = self.basis.probes(np.where(is_beyond, 1.0 - at, at)[None, :]).tocsr()
+        positions = np.asarray(points, dtype=np.float64)
+        is_beyond = positions > 0.5 if self.is_split else np.zeros(positions.shape, dtype=bool)
+        values = self.basis.probes(np.where(is_beyond, 1.0 - positions, positions)[None, :]).tocsr()
         return values.multiply(np.where(is_beyond, (-1.0) ** parity, 1.0)[:, None]).tocsr()
 
     def at_ends(self, at: tuple[bool, bool], order: int) -> tuple[Floats, Floats]:
-        """Values (order 0) or slopes (1) at the ends asked for, and their weights in a sum: (n, n_functions), (n,).
+        """Values (order 0) or slopes (1) at the selected ends, and their weights in a sum: (n, n_functions), (n,).
 
-        Of a half line both ends are asked for, and its one counts twice.
+        A half line has one end, which is selected together with its mirror image and counts twice.
         """
-        both = [(0, at[0])] if self.is_split else [(0, at[0]), (len(self.nodes) - 1, at[1])]
-        nodes = [node for node, is_asked in both if is_asked]
+        ends = [(0, at[0])] if self.is_split else [(0, at[0]), (len(self.nodes) - 1, at[1])]
+        nodes = [node for node, is_selected in ends if is_selected]
         rows = np.zeros((len(nodes), self.n_functions))
         rows[np.arange(len(nodes)), [2 * node + order for node in nodes]] = 1.0
         return rows, np.full(len(nodes), self.share)
 
     def kept(self, parity: int, is_sheared: bool) -> Bools:
-        """Which functions the deflection has: (n_functions,) array.
+        """Which functions the deflection keeps: (n_functions,) array.
 
-        On a shear-flexible plate it keeps its slope at a clamp, where it stands at the angle of the shear strain.
+        On a shear-flexible plate the slope at a clamp stays free: it is the angle of the shear strain there.
         """
-        held = {"clamped": (True, not is_sheared), "supported": (True, False), "guided": (False, not is_sheared)}
-        return self._without([held.get(end, (False, False)) for end in self.held], parity)
+        fixed = {"clamped": (True, not is_sheared), "supported": (True, False), "guided": (False, not is_sheared)}
+        return self._without_fixed([fixed.get(end, (False, False)) for end in self.held], parity)
 
     def kept_strain(self, parity: int) -> Bools:
-        """Which functions the shear strain along this side has: where the turning is held, not its value."""
-        return self._without([(end in ("clamped", "guided"), False) for end in self.held], 1 - parity)
+        """Which functions the shear strain along this side keeps: its value is zero where the turning is held."""
+        return self._without_fixed([(end in ("clamped", "guided"), False) for end in self.held], 1 - parity)
 
     def ties(self) -> list[tuple[int, int]]:
         """Values of the shear strain that are slopes of the deflection, where an end holds the turning."""
@@ -120,17 +121,17 @@ class Line:
         nodes = [(0, self.held[0])] if self.is_split else [(0, self.held[0]), (last, self.held[1])]
         return [(value, value + 1) for value, end in nodes if end in ("clamped", "guided")]
 
-    def _without(self, held: list[tuple[bool, bool]], parity: int) -> Bools:
-        first, last = held
+    def _without_fixed(self, fixed: list[tuple[bool, bool]], parity: int) -> Bools:
+        first, last = fixed
         if self.is_split:
             last = (parity == 1, parity == 0)
-        kept = np.ones(self.n_functions, dtype=bool)
-        kept[:2] = np.logical_not(first)
-        kept[-2:] = np.logical_not(last)
-        return kept
+        is_kept = np.ones(self.n_functions, dtype=bool)
+        is_kept[:2] = np.logical_not(first)
+        is_kept[-2:] = np.logical_not(last)
+        return is_kept
 
 
-def rigid_degrees(ends: Ends) -> tuple[int, ...]:
+def rigid_degrees(ends: EdgeConditions) -> tuple[int, ...]:
     """Degrees of the rigid motions of a line, in the order of its beam functions.
 
     A free line can shift (0) and turn (1), a line supported at one end only can turn, others cannot move.
@@ -142,34 +143,34 @@ def rigid_degrees(ends: Ends) -> tuple[int, ...]:
     return ()
 
 
-def graded_nodes(ends: Holds, n_elements: int) -> Floats:
-    """Nodes of equal elements, save that the one at each free end is split at 1/4 and 1/16 of its length.
+def graded_nodes(ends: EndConditions, n_elements: int) -> Floats:
+    """Nodes of equal elements, but the element at each free end is split at 1/4 and 1/16 of its length.
 
     Along a free edge the twist of a shear-flexible plate dies out over about a third of the thickness times sqrt(G_xy /
-    G_xz): a layer too narrow for as many equal elements, whose frequencies lie up to 3 cents too high. The split ones
-    count among all elements; too few to be split stay equal.
+    G_xz): a layer too narrow for as many equal elements, whose frequencies lie up to 3 cents too high. The split
+    elements count among `n_elements`; where these are too few to be split, all stay equal.
     """
-    n_equal = n_elements - len(_LAYER) * ends.count("free")
+    n_equal = n_elements - len(_EDGE_LAYER) * ends.count("free")
     if n_equal < 3:
         return np.linspace(0.0, 1.0, n_elements + 1)
-    first, last = (np.array(_LAYER if end == "free" else ()) / n_equal for end in ends)
+    first, last = (np.array(_EDGE_LAYER if end == "free" else ()) / n_equal for end in ends)
     return np.sort(np.concatenate([np.linspace(0.0, 1.0, n_equal + 1), first, 1.0 - last]))
 
 
 @lru_cache(maxsize=64)
 def line(
-    ends: Ends,
+    ends: EdgeConditions,
     n_elements: int,
     is_sheared: bool = False,
     is_split: bool = True,
-    held: Holds | None = None,
+    held: EndConditions | None = None,
     n_points: int = N_POINTS,
 ) -> Line:
     """The functions of one side; the result is shared, so it must not be changed.
 
-    `is_sheared`: of a shear-flexible plate, graded towards free ends. `is_split`: the first half will do where both
-    ends are alike; not so if something else on the plate tells the halves apart, or an element lies across the middle.
-    `held`: what the ends hold where that is less than `ends` says.
+    `is_sheared`: of a shear-flexible plate, graded towards free ends. `is_split`: the first half alone where both ends
+    are alike; False if something else on the plate makes the halves differ. A line with an element across its middle is
+    never split. `held`: what the ends hold where that is less than `ends` says.
     """
     from skfem import Basis, ElementLineHermite, MeshLine
 

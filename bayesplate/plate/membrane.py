@@ -21,25 +21,25 @@ from typing import Any, Literal
 import numpy as np
 
 from bayesplate.arrays import Floats, Indices
-from bayesplate.board.setup import Ends
+from bayesplate.board.setup import EdgeConditions
 from bayesplate.plate.fields import Field
 from bayesplate.plate.terms import Deflections
 
 Curvature = Literal["bow", "cup", "twist"]
 
 CURVATURES: tuple[Curvature, ...] = ("bow", "cup", "twist")
-"""Of the strain along x, along y, and of the shear strain, of which a twist counts twice."""
+"""Curvatures of the strain along x, along y, and of the shear strain, in which a twist counts twice."""
 MODULI = ("Q_11", "Q_12", "Q_22", "Q_66")
 
-_Held = tuple[Ends, Ends, float, Field | None]
-"""How a membrane is held, its aspect ratio, and the field that its stiffness follows."""
+_Membrane = tuple[EdgeConditions, EdgeConditions, float, Field | None]
+"""End conditions of a membrane along x and along y, its aspect ratio, and the field that its stiffness follows."""
 
-_ELEMENTS = 24
-"""Of second order along the longer side: energies of shapes of four waves are within two parts in a thousand."""
-_FEWEST = 16
-_GROUNDED = 1e-9
-"""Share of the stiffness that holds a free membrane from drifting; no strain loads such a motion."""
-_DOUBLED = np.array([1.0, 1.0, 2.0])
+_MOST_ELEMENTS = 24
+"""Elements of second order along the longer side: energies of shapes of four waves are within two in a thousand."""
+_FEWEST_ELEMENTS = 16
+_GROUND_SHARE = 1e-9
+"""Share of the stiffness that keeps a free membrane from drifting; no strain loads such a motion."""
+_STRAIN_COUNTS = np.array([1.0, 1.0, 2.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class _Matrices:
     """Sparse matrices of a membrane of unit area."""
 
     stiffness: tuple[Any, ...]  # (n, n), by the moduli
-    # (n, n_w): of a stress along x, along y, and in shear, that goes with the deflection at the nodes
+    # (n, n_w): loads of a stress along x, along y, and in shear, proportional to the deflection at the nodes
     loads: tuple[Any, ...]
     mass: Any  # (n_w, n_w): integral of the product of two deflections
     places: Floats  # (2, n_w): of the deflections, as fractions of the sides
@@ -63,22 +63,22 @@ def membrane_terms(
 ) -> Floats:
     """Membrane energies, (n_pairs * 4, n_vectors, n_vectors), by `curvature_pairs` and by the moduli.
 
-    For a plate of unit area: what a unit of the product of the two curvatures (each pair once, a cross term both ways)
-    and of the modulus gives to the stiffness. The in-plane fields are solved at the `moduli` Q_11, Q_12, Q_22, Q_66, of
-    which the ratios count; the stiffness of the membrane goes with the `thickness` over the plate.
+    For a plate of unit area: the stiffness per unit of the product of two curvatures (each pair once, a cross term both
+    ways) and of the modulus. The in-plane fields are solved at the `moduli` Q_11, Q_12, Q_22, Q_66, of which only the
+    ratios matter; the stiffness of the membrane goes with the `thickness` over the plate.
     """
-    held = deflections.x.ends, deflections.y.ends, aspect_ratio, thickness
-    made = _matrices(*held)
-    at_nodes = _at(deflections, made.places)
-    loads = [load @ at_nodes for load in made.loads]
-    squares = at_nodes.T @ (made.mass @ at_nodes)
-    fields = {one: _solved(held, moduli, CURVATURES.index(one), loads) for one in curvatures}
-    found = []
-    for one, other in curvature_pairs(curvatures):
-        both = ((CURVATURES.index(each), fields[each]) for each in (one, other))
-        terms = _energies(made, loads, squares, *both)
-        found.append((0.5 if one == other else 1.0) * (terms + np.swapaxes(terms, -1, -2)))
-    return np.concatenate(found)
+    membrane = deflections.x.ends, deflections.y.ends, aspect_ratio, thickness
+    matrices = _matrices(*membrane)
+    at_nodes = _deflections_at(deflections, matrices.places)
+    loads = [load @ at_nodes for load in matrices.loads]
+    squares = at_nodes.T @ (matrices.mass @ at_nodes)
+    fields = {name: _in_plane_fields(membrane, moduli, CURVATURES.index(name), loads) for name in curvatures}
+    energies = []
+    for first, second in curvature_pairs(curvatures):
+        pair = ((CURVATURES.index(name), fields[name]) for name in (first, second))
+        terms = _energies(matrices, loads, squares, *pair)
+        energies.append((0.5 if first == second else 1.0) * (terms + np.swapaxes(terms, -1, -2)))
+    return np.concatenate(energies)
 
 
 def curvature_pairs(curvatures: Sequence[Curvature]) -> tuple[tuple[Curvature, Curvature], ...]:
@@ -86,68 +86,72 @@ def curvature_pairs(curvatures: Sequence[Curvature]) -> tuple[tuple[Curvature, C
     return tuple(combinations_with_replacement(curvatures, 2))
 
 
-def _at(deflections: Deflections, places: Floats) -> Floats:
-    """Deflections at places, which are those of a lattice: (n_places, n_vectors) array."""
-    sides, at = zip(*(np.unique(np.round(one, 9), return_inverse=True) for one in places), strict=True)
-    return np.asarray(deflections.on(*sides)[:, at[0], at[1]].T)
+def _deflections_at(deflections: Deflections, places: Floats) -> Floats:
+    """Deflections at places that lie on a lattice: (n_places, n_vectors) array."""
+    sides, indices = zip(*(np.unique(np.round(x, 9), return_inverse=True) for x in places), strict=True)
+    return np.asarray(deflections.on(*sides)[:, indices[0], indices[1]].T)
 
 
-def _coupling(moduli: tuple[float, ...]) -> Floats:
+def _stress_matrix(moduli: tuple[float, ...]) -> Floats:
     """Q as a matrix of the three strains."""
     q_11, q_12, q_22, q_66 = moduli
     return np.array([[q_11, q_12, 0.0], [q_12, q_22, 0.0], [0.0, 0.0, q_66]])
 
 
-def _solved(held: _Held, moduli: tuple[float, ...], curvature: int, loads: Sequence[Floats]) -> Floats:
-    """In-plane fields of deflections, of which the loads are given, under a unit of a curvature: (n, n_vectors)."""
-    stresses = _DOUBLED[curvature] * _coupling(moduli)[:, curvature]
-    load = sum(stress * one for stress, one in zip(stresses, loads, strict=True))
-    free, factors = _factors(held, moduli)
+def _in_plane_fields(membrane: _Membrane, moduli: tuple[float, ...], curvature: int, loads: Sequence[Floats]) -> Floats:
+    """In-plane fields under a unit of one curvature, from the loads of given deflections: (n, n_vectors)."""
+    stresses = _STRAIN_COUNTS[curvature] * _stress_matrix(moduli)[:, curvature]
+    total = sum(stress * load for stress, load in zip(stresses, loads, strict=True))
+    free, factors = _stiffness_factors(membrane, moduli)
     fields = np.zeros_like(loads[0])
-    fields[free] = factors.solve(np.asarray(load)[free])
+    fields[free] = factors.solve(np.asarray(total)[free])
     return fields
 
 
 @lru_cache(maxsize=16)
-def _factors(held: _Held, moduli: tuple[float, ...]) -> tuple[Indices, Any]:
+def _stiffness_factors(membrane: _Membrane, moduli: tuple[float, ...]) -> tuple[Indices, Any]:
     """Unknowns that no edge holds, and the factors of their stiffness."""
     from scipy.sparse import csc_array, diags_array
     from scipy.sparse.linalg import splu
 
-    made = _matrices(*held)
-    whole = sum(modulus * part for modulus, part in zip(moduli, made.stiffness, strict=True))
-    free = np.setdiff1d(np.arange(whole.shape[0]), made.held)
-    kept = csc_array(whole)[free][:, free]
-    ground = np.full(free.size, _GROUNDED * float(kept.diagonal().max()))
-    return free, splu(csc_array(kept + diags_array(ground)))
+    matrices = _matrices(*membrane)
+    stiffness = sum(modulus * matrix for modulus, matrix in zip(moduli, matrices.stiffness, strict=True))
+    free = np.setdiff1d(np.arange(stiffness.shape[0]), matrices.held)
+    free_stiffness = csc_array(stiffness)[free][:, free]
+    ground = np.full(free.size, _GROUND_SHARE * float(free_stiffness.diagonal().max()))
+    return free, splu(csc_array(free_stiffness + diags_array(ground)))
 
 
 def _energies(
-    made: _Matrices, loads: Sequence[Floats], squares: Floats, one: tuple[int, Floats], other: tuple[int, Floats]
+    matrices: _Matrices, loads: Sequence[Floats], squares: Floats, first: tuple[int, Floats], second: tuple[int, Floats]
 ) -> Floats:
     """Integrals of the product of the strains under two curvatures, by the moduli: (4, n_vectors, n_vectors) array."""
-    (a, fields_a), (b, fields_b) = one, other
-    found = []
-    for modulus, stiffness in enumerate(made.stiffness):
-        coupling = _DOUBLED[:, None] * _coupling(tuple(float(modulus == k) for k in range(4))) * _DOUBLED
+    (a, fields_a), (b, fields_b) = first, second
+    energies = []
+    for modulus, stiffness in enumerate(matrices.stiffness):
+        coupling = (
+            _STRAIN_COUNTS[:, None] * _stress_matrix(tuple(float(modulus == k) for k in range(4))) * _STRAIN_COUNTS
+        )
         terms = fields_a.T @ (stiffness @ fields_b) + coupling[a, b] * squares
         for i, load in enumerate(loads):
             if coupling[i, a]:
-                terms -= coupling[i, a] / _DOUBLED[i] * (load.T @ fields_b)
+                terms -= coupling[i, a] / _STRAIN_COUNTS[i] * (load.T @ fields_b)
             if coupling[i, b]:
-                terms -= coupling[i, b] / _DOUBLED[i] * (fields_a.T @ load)
-        found.append(terms)
-    return np.stack(found)
+                terms -= coupling[i, b] / _STRAIN_COUNTS[i] * (fields_a.T @ load)
+        energies.append(terms)
+    return np.stack(energies)
 
 
 @lru_cache(maxsize=16)
-def _matrices(ends_x: Ends, ends_y: Ends, aspect_ratio: float, thickness: Field | None) -> _Matrices:
+def _matrices(
+    ends_x: EdgeConditions, ends_y: EdgeConditions, aspect_ratio: float, thickness: Field | None
+) -> _Matrices:
     """The membrane by scikit-fem: two in-plane fields and the deflection, all of second order on rectangles."""
     from skfem import Basis, BilinearForm, ElementQuad2, ElementVector, MeshQuad
     from skfem.helpers import grad
 
     sides = np.sqrt(aspect_ratio), 1.0 / np.sqrt(aspect_ratio)
-    n_x, n_y = (max(_FEWEST, round(_ELEMENTS * side / max(sides))) for side in sides)
+    n_x, n_y = (max(_FEWEST_ELEMENTS, round(_MOST_ELEMENTS * side / max(sides))) for side in sides)
     mesh = MeshQuad.init_tensor(np.linspace(0.0, 1.0, n_x + 1), np.linspace(0.0, 1.0, n_y + 1)).with_defaults()
     fields = Basis(mesh, ElementVector(ElementQuad2()), intorder=6)
     deflection = fields.with_element(ElementQuad2())
@@ -161,9 +165,9 @@ def _matrices(ends_x: Ends, ends_y: Ends, aspect_ratio: float, thickness: Field 
 
     def stiffness(i: int, j: int) -> Any:
         def form(u: Any, v: Any, at: Any) -> Any:
-            of_u, of_v = strains(u), strains(v)
-            both = of_u[i] * of_v[j]
-            return at.factor * (both if i == j else both + of_u[j] * of_v[i])
+            strains_u, strains_v = strains(u), strains(v)
+            product = strains_u[i] * strains_v[j]
+            return at.factor * (product if i == j else product + strains_u[j] * strains_v[i])
 
         return BilinearForm(form).assemble(fields, factor=factor)
 

@@ -14,20 +14,20 @@ from bayesplate.plate.plate import Plate
 from bayesplate.plate.solve import ClassModes, Modes, solve_classes
 from bayesplate.plate.terms import Parity, Weights
 
-CERTAIN = 0.75
+CERTAIN_CORRELATION = 0.75
 """Correlation with its product of beam functions below which a mode's name is "cannot tell"."""
 
-_STRAY = 0.3
-"""Correlation below which a name was given to a mode that was merely left over: its own lies higher."""
+_STRAY_CORRELATION = 0.3
+"""Correlation below which a mode has its name only because no other was left: the mode of that name lies higher."""
 
-_SPARE = 3
+_SPARE_MODES = 3
 _MOST_MODES = 40
-_AHEAD = 12
-"""Modes beyond those that are asked for, where some turned out to be too few: to be solved for once more at most."""
+_MODES_AHEAD = 12
+"""Modes beyond the required ones when a class is solved again, so that it is solved again only once."""
 
 
 @dataclass(frozen=True)
-class Place:
+class ModePlace:
     """The place of a named mode: its class, its rank there, and how well the name fits."""
 
     parity: Parity
@@ -36,22 +36,22 @@ class Place:
 
     @property
     def is_certain(self) -> bool:
-        return self.correlation >= CERTAIN
+        return self.correlation >= CERTAIN_CORRELATION
 
 
-def reaching(places: Iterable[Place]) -> dict[Parity, int]:
-    """How many of the lowest modes of each class hold all places."""
-    found: dict[Parity, int] = {}
+def modes_to_hold(places: Iterable[ModePlace]) -> dict[Parity, int]:
+    """How many of the lowest modes of each class include all places."""
+    counts: dict[Parity, int] = {}
     for place in places:
-        found[place.parity] = max(found.get(place.parity, 0), place.rank + 1)
-    return found
+        counts[place.parity] = max(counts.get(place.parity, 0), place.rank + 1)
+    return counts
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class PlacedMode:
     """A named mode: its place, its eigenvalue (s^-2), and its energy in each stiffness and mass term."""
 
-    place: Place
+    place: ModePlace
     eigenvalue: float
     stiffness: Floats
     mass: Floats
@@ -60,15 +60,18 @@ class Found:
 def name_shapes(own: SymmetryClass, vectors: Floats, on_plate: Floats) -> list[tuple[Beams, float]]:
     """Beam product and correlation of each mode of a class, its lowest ones, each product given to one mode only.
 
-    `on_plate` is the share of the kinetic energy of each that is the plate's, with all that it carries along.
+    `on_plate` is the share of each mode's kinetic energy that is the plate's, with all that it carries along.
     """
     parts, squares = beam_parts(own, vectors)
-    products, named = own.plate.elastic_products[own.parity], name_parts(fits(parts, np.diagonal(squares), on_plate))
+    products, named = (
+        own.plate.elastic_products[own.parity],
+        assign_products(product_fits(parts, np.diagonal(squares), on_plate)),
+    )
     return [(products[column], correlation) for column, correlation in named]
 
 
 def beam_parts(own: SymmetryClass, vectors: Floats) -> tuple[Floats, Floats]:
-    """What deflections have of each of `elastic_products`, (n_vectors, n_products), and their mean products."""
+    """Components of deflections along each of `elastic_products`, (n_vectors, n_products), and their mean products."""
     x, y = own.plate.x, own.plate.y
     deflections = own.strains(["w"], vectors)["w"].reshape(-1, x.points.size, y.points.size)
     along_x, along_y = (side.weights * beam_functions(side.ends).at(side.points).T for side in (x, y))
@@ -78,7 +81,7 @@ def beam_parts(own: SymmetryClass, vectors: Floats) -> tuple[Floats, Floats]:
     return parts[:, orders[0], orders[1]], weighed @ deflections.reshape(len(deflections), -1).T
 
 
-def fits(parts: Floats, squares: Floats, on_plate: Floats) -> Floats:
+def product_fits(parts: Floats, squares: Floats, on_plate: Floats) -> Floats:
     """How well each shape fits each product: its correlation by the root of the plate's share of the motion.
 
     `squares` are the mean squares of the deflections: a shape is measured by itself, for the water that a plate carries
@@ -88,8 +91,8 @@ def fits(parts: Floats, squares: Floats, on_plate: Floats) -> Floats:
     return np.asarray(parts * np.sqrt(np.maximum(on_plate, 0.0) / squares)[:, None])
 
 
-def name_parts(parts: Floats) -> list[tuple[int, float]]:
-    """Product and correlation of each mode, from what it has of each (1: all); a product goes to one mode only."""
+def assign_products(parts: Floats) -> list[tuple[int, float]]:
+    """Product and correlation of each mode, from its correlations with all; a product goes to one mode only."""
     from scipy.optimize import linear_sum_assignment
 
     rows, columns = linear_sum_assignment(parts**2, maximize=True)
@@ -99,47 +102,49 @@ def name_parts(parts: Floats) -> list[tuple[int, float]]:
 def name_modes(modes: Modes) -> list[tuple[Beams, float]]:
     """Beam product and correlation of each of the lowest modes of a plate, in their order."""
     named = {
-        parity: list(zip(modes.rows(parity), name_shapes(one.own, one.vectors, one.on_plate), strict=True))
-        for parity, one in modes.by_class.items()
+        parity: list(zip(modes.rows(parity), name_shapes(c.own, c.vectors, c.on_plate), strict=True))
+        for parity, c in modes.by_class.items()
     }
-    names = dict(pair for of_class in named.values() for pair in of_class)
+    names = dict(row for rows in named.values() for row in rows)
     return [names[i] for i in range(len(names))]
 
 
-def find(plate: Plate, weights: Weights, wanted: Iterable[Beams]) -> dict[Beams, Found]:
+def find_named_modes(plate: Plate, weights: Weights, wanted: Iterable[Beams]) -> dict[Beams, PlacedMode]:
     """Each wanted name among the modes of a plate at the weights of one draw.
 
     A name without a certain mode gets its best remaining one, with the low correlation. KeyError if a name is no
     elastic mode of this plate or lies beyond the modes that can be resolved.
     """
     names = list(wanted)
-    # With as many modes as products a class has given all its names, and with more some modes would have none.
-    most = {c.parity: min(len(plate.elastic_products[c.parity]), c.n_dof - c.n_rigid - 1) for c in plate.classes}
-    counts = {p: min(n + _SPARE, most[p]) for p, n in _expected_ranks(plate, weights, names).items()}
+    # No more modes than products in a class: with as many, all names are given.
+    n_most = {c.parity: min(len(plate.elastic_products[c.parity]), c.n_dof - c.n_rigid - 1) for c in plate.classes}
+    counts = {p: min(n + _SPARE_MODES, n_most[p]) for p, n in _expected_ranks(plate, weights, names).items()}
     solved: dict[Parity, ClassModes] = {}
-    places: dict[Beams, Place] = {}
+    places: dict[Beams, ModePlace] = {}
     while counts:
         short = {p: n for p, n in counts.items() if p not in solved or solved[p].eigenvalues.size < n}
-        solved |= solve_classes(plate, weights, {p: min(n + _AHEAD * (p in solved), most[p]) for p, n in short.items()})
+        solved |= solve_classes(
+            plate, weights, {p: min(n + _MODES_AHEAD * (p in solved), n_most[p]) for p, n in short.items()}
+        )
         places = {name: place for name, place in places.items() if place.parity not in counts}
         for parity, n in counts.items():
             places |= _places(solved[parity].of(range(n)), names)
-        lost = {plate.parity(n) for n in names if n not in places or places[n].correlation < _STRAY}
-        unsure = {plate.parity(n) for n in names if n in places and not places[n].is_certain}
+        lost_classes = {plate.parity(n) for n in names if n not in places or places[n].correlation < _STRAY_CORRELATION}
+        unsure_classes = {plate.parity(n) for n in names if n in places and not places[n].is_certain}
         counts = {
-            p: min(n + 2 * _SPARE, most[p])
+            p: min(n + 2 * _SPARE_MODES, n_most[p])
             for p, n in counts.items()
-            if n < most[p] and (p in lost or (p in unsure and n < _MOST_MODES // len(plate.classes)))
+            if n < n_most[p] and (p in lost_classes or (p in unsure_classes and n < _MOST_MODES // len(plate.classes)))
         }
     missing = [name for name in names if name not in places]
     if missing:
         raise KeyError(missing)
-    found = _with_energies(solved, places)
-    return {name: found[name] for name in names}
+    modes = _placed_modes(solved, places)
+    return {name: modes[name] for name in names}
 
 
 def _expected_ranks(plate: Plate, weights: Weights, names: list[Beams]) -> dict[Parity, int]:
-    """How many products of each class lie at or below the highest wanted one, by their Rayleigh quotients."""
+    """How many products of each class lie at or below the highest wanted product, by their Rayleigh quotients."""
     values = np.tensordot(weights.stiffness[:4], product_coefficients(plate.x.ends, plate.y.ends), axes=1)
     unknown = [name for name in names if name not in plate.elastic_products[plate.parity(name)]]
     if unknown:
@@ -151,18 +156,18 @@ def _expected_ranks(plate: Plate, weights: Weights, names: list[Beams]) -> dict[
     return {p: sum(bool(values[b] <= top) for b in plate.elastic_products[p]) for p, top in highest.items()}
 
 
-def _places(modes: ClassModes, names: Sequence[Beams]) -> dict[Beams, Place]:
-    """Places of those wanted names that some of the lowest modes of a class have."""
-    of_each = name_shapes(modes.own, modes.vectors, modes.on_plate)
+def _places(modes: ClassModes, names: Sequence[Beams]) -> dict[Beams, ModePlace]:
+    """Places of the wanted names among the lowest modes of a class."""
+    named = name_shapes(modes.own, modes.vectors, modes.on_plate)
     parity = modes.own.parity
-    return {name: Place(parity, rank, fit) for rank, (name, fit) in enumerate(of_each) if name in names}
+    return {name: ModePlace(parity, rank, fit) for rank, (name, fit) in enumerate(named) if name in names}
 
 
-def _with_energies(solved: Mapping[Parity, ClassModes], places: Mapping[Beams, Place]) -> dict[Beams, Found]:
-    found = {}
+def _placed_modes(solved: Mapping[Parity, ClassModes], places: Mapping[Beams, ModePlace]) -> dict[Beams, PlacedMode]:
+    placed = {}
     for parity, modes in solved.items():
-        own = {name: place for name, place in places.items() if place.parity == parity}
-        energies = modes.of([place.rank for place in own.values()]).coefficients()
-        for (name, place), stiffness, mass in zip(own.items(), *energies, strict=True):
-            found[name] = Found(place, modes.eigenvalues[place.rank], stiffness, mass)
-    return found
+        class_places = {name: place for name, place in places.items() if place.parity == parity}
+        energies = modes.of([place.rank for place in class_places.values()]).coefficients()
+        for (name, place), stiffness, mass in zip(class_places.items(), *energies, strict=True):
+            placed[name] = PlacedMode(place, modes.eigenvalues[place.rank], stiffness, mass)
+    return placed

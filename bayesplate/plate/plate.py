@@ -14,10 +14,10 @@ from functools import cached_property
 
 from bayesplate.arrays import Floats
 from bayesplate.plate.classes import SymmetryClass
-from bayesplate.plate.fields import UNIFORM, Fabric, Group, layout
+from bayesplate.plate.fields import UNIFORM, Fabric, TermGroup, term_field_pairs
 from bayesplate.plate.forms import Forms
 from bayesplate.plate.line import Line
-from bayesplate.plate.terms import Kinematics, OverPlate, Pair, Parity, Term
+from bayesplate.plate.terms import Kinematics, Parity, PlateTerm, StrainPair, Term
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,21 +30,21 @@ class Plate(Forms):
         return tuple(SymmetryClass(self, parity) for parity in self.parities)
 
     def symmetry_class(self, parity: Parity) -> SymmetryClass:
-        return next(one for one in self.classes if one.parity == parity)
+        return next(candidate for candidate in self.classes if candidate.parity == parity)
 
 
 def plate_of(kinematics: Kinematics, x: Line, y: Line, fabric: Fabric = UNIFORM) -> Plate:
-    """A plate on two sides, with its own terms alone, as often as `layout` has fields for them.
+    """A plate on two sides, with its own terms alone, each once for every field of its group (`term_field_pairs`).
 
-    A line is whole along a side along which the halves differ.
+    The line of a side whose halves differ must not be split.
     """
     groups = kinematics.groups(fabric.is_turned)
     weights = fabric.weights({*groups[0], *groups[1]}, x, y)
-    counts = {group: len(made) for group, made in weights.items()}
+    counts = {group: len(grids) for group, grids in weights.items()}
 
-    def own(pairs: Sequence[Pair], group: Sequence[Group]) -> list[tuple[Term, Floats | None]]:
-        return [(OverPlate(pairs[term]), weights[group[term]][k]) for term, k in layout(group, counts)]
+    def terms(pairs: Sequence[StrainPair], group_of: Sequence[TermGroup]) -> list[tuple[Term, Floats | None]]:
+        return [(PlateTerm(pairs[term]), weights[group_of[term]][k]) for term, k in term_field_pairs(group_of, counts)]
 
     return Plate(
-        kinematics, x, y, tuple(own(kinematics.stiffnesses, groups[0])), tuple(own(kinematics.masses, groups[1]))
+        kinematics, x, y, tuple(terms(kinematics.stiffnesses, groups[0])), tuple(terms(kinematics.masses, groups[1]))
     )

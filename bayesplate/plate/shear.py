@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from bayesplate.board.setup import Ends
+from bayesplate.board.setup import EdgeConditions
 from bayesplate.plate.line import line
 from bayesplate.plate.plate import Plate, plate_of
 from bayesplate.plate.terms import Derivative, Kinematics
@@ -47,7 +47,7 @@ SHEAR_FLEXIBLE = Kinematics(
         "bend_x": (Derivative(1.0, "w", 2, 0), Derivative(-1.0, "g_x", 1, 0)),
         "bend_y": (Derivative(1.0, "w", 0, 2), Derivative(-1.0, "g_y", 0, 1)),
         "twist": _TWIST,
-        "twice_twist": tuple(one._replace(factor=2.0 * one.factor) for one in _TWIST),
+        "twice_twist": tuple(d._replace(factor=2.0 * d.factor) for d in _TWIST),
     },
     # The last three are there where the grain runs at an angle.
     stiffnesses=(
@@ -65,7 +65,7 @@ SHEAR_FLEXIBLE = Kinematics(
 
 
 @lru_cache(maxsize=16)
-def shear_flexible_plate(ends_x: Ends, ends_y: Ends, n_x: int, n_y: int) -> Plate:
+def shear_flexible_plate(ends_x: EdgeConditions, ends_y: EdgeConditions, n_x: int, n_y: int) -> Plate:
     """The bare shear-flexible plate, its terms as `SHEAR_TERMS` and `SHEAR_MASSES`; shared, so it must not be changed.
 
     A free edge holds nothing. A supported one (a hard support) holds the deflection and the turning along the edge. A

@@ -17,15 +17,15 @@ from bayesplate.plate.forms import Elements
 from bayesplate.plate.plate import Plate
 from bayesplate.plate.terms import Parity, Weights
 
-_SPARE_FOR_PROJECTED = 8
-_FIRST_OF_CLASS = 8
-_MORE, _FEWEST_MORE = 1.15, 4
-"""What is added to an estimate of how many modes there are."""
-_MASSLESS = 1e-12
+_SPARE_MODES = 8
+_FIRST_MODES = 8
+_MODE_MARGIN, _FEWEST_MORE_MODES = 1.15, 4
+"""Factor on an estimate of the number of modes, and the least number of modes that is added."""
+_MASSLESS_SHARE = 1e-12
 _TOLERANCE = 1e-8
-"""Of the solver's own values; those of the modes are Ritz values on its vectors, which err by the square of it."""
-_SHIFT = -1e-2
-"""Over the lowest elastic eigenvalue."""
+"""Relative, of the solver's own values; the modes have Ritz values on its vectors, which err by the square of it."""
+_SHIFT_RATIO = -1e-2
+"""Shift over the lowest elastic eigenvalue."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +39,9 @@ class ClassModes:
     on_plate: Floats  # (n_modes,): share of the kinetic energy that is not of coordinates beside the plate
 
     def of(self, ranks: Sequence[int] | Indices) -> ClassModes:
-        own = list(ranks)
+        rows = list(ranks)
         return replace(
-            self, eigenvalues=self.eigenvalues[own], vectors=self.vectors[:, own], on_plate=self.on_plate[own]
+            self, eigenvalues=self.eigenvalues[rows], vectors=self.vectors[:, rows], on_plate=self.on_plate[rows]
         )
 
     def coefficients(self) -> tuple[Floats, Floats]:
@@ -58,20 +58,23 @@ def solve_classes(plate: Plate, weights: Weights, n_modes: Mapping[Parity, int])
     LinAlgError if the weights are those of no plate.
     """
     elements = plate.elements(weights)
-    return {parity: _solved(plate.symmetry_class(parity), elements, weights, n) for parity, n in n_modes.items()}
+    return {parity: _solve_class(plate.symmetry_class(parity), elements, weights, n) for parity, n in n_modes.items()}
 
 
-def _solved(own: SymmetryClass, elements: tuple[Elements, Elements], weights: Weights, n_modes: int) -> ClassModes:
+def _solve_class(
+    symmetry_class: SymmetryClass, elements: tuple[Elements, Elements], weights: Weights, n_modes: int
+) -> ClassModes:
     from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
-    # The solver needs a positive mass; what is left out for that joins on the span of its vectors.
-    is_whole = elements[1].is_definite
-    whole = own.pencil(elements)
-    stiffness, mass = whole if is_whole else own.pencil((elements[0], elements[1].without_negative()))
-    shift = _shift_below(own, weights)
+    # The solver needs a positive mass; the negative terms, left out here, are added on the span of its vectors.
+    is_definite = elements[1].is_definite
+    pencil = symmetry_class.pencil(elements)
+    stiffness, mass = pencil if is_definite else symmetry_class.pencil((elements[0], elements[1].without_negative()))
+    shift = _shift_below(symmetry_class, weights)
     options = {"SymmetricMode": True}
     n_wanted = min(
-        own.n_rigid + n_modes + _SPARE_FOR_PROJECTED * (own.plate.is_projected or not is_whole), own.n_dof - 1
+        symmetry_class.n_rigid + n_modes + _SPARE_MODES * (symmetry_class.plate.is_projected or not is_definite),
+        symmetry_class.n_dof - 1,
     )
     try:
         factors = splu(stiffness - shift * mass, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
@@ -81,46 +84,55 @@ def _solved(own: SymmetryClass, elements: tuple[Elements, Elements], weights: We
             M=mass,
             sigma=shift,
             OPinv=LinearOperator(stiffness.shape, matvec=factors.solve, dtype=float),
-            v0=np.random.default_rng(0).standard_normal(own.n_dof),
-            ncv=min(own.n_dof, max(2 * n_wanted + 1, 20)),
+            v0=np.random.default_rng(0).standard_normal(symmetry_class.n_dof),
+            ncv=min(symmetry_class.n_dof, max(2 * n_wanted + 1, 20)),
             tol=_TOLERANCE,
         )
     except (ArpackError, RuntimeError) as failure:
         raise np.linalg.LinAlgError(str(failure)) from failure
     # The solver's own values carry the rounding of a nearly singular factorisation where the plate can move as a whole.
-    small = own.on_span([whole], Weights(*(part[None] for part in weights)), vectors)
-    values, combinations = _ritz(small[0][0], small[1][0])
+    on_span = symmetry_class.on_span([pencil], Weights(*(w[None] for w in weights)), vectors)
+    values, combinations = _ritz_vectors(on_span[0][0], on_span[1][0])
     vectors = vectors @ combinations
-    rigid, elastic = vectors[:, : own.n_rigid], vectors[:, own.n_rigid : own.n_rigid + n_modes]
-    on_plate = 1.0 - np.diagonal(np.tensordot(weights.mass, own.project_beside(elastic), axes=1))
-    return ClassModes(own, values[own.n_rigid : own.n_rigid + n_modes], elastic, rigid, on_plate)
+    rigid, elastic = (
+        vectors[:, : symmetry_class.n_rigid],
+        vectors[:, symmetry_class.n_rigid : symmetry_class.n_rigid + n_modes],
+    )
+    on_plate = 1.0 - np.diagonal(np.tensordot(weights.mass, symmetry_class.project_beside(elastic), axes=1))
+    return ClassModes(
+        symmetry_class, values[symmetry_class.n_rigid : symmetry_class.n_rigid + n_modes], elastic, rigid, on_plate
+    )
 
 
-def _ritz(stiffness: Floats, mass: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues on some vectors, increasing, and what combines these to modes of unit mass.
+def _ritz_vectors(stiffness: Floats, mass: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues on the span of vectors, increasing, and the combinations of these that are modes of unit mass.
 
-    Where the mass at a place is interpolated between others, the finest shapes may have a negative mass:
-    they are no modes, and left out.
+    Where the mass at a place is interpolated between others, the finest shapes may have a negative mass: they are no
+    modes, and left out.
     """
     shares, directions = np.linalg.eigh(mass)
-    kept = shares > _MASSLESS * shares[-1]
-    if not kept.any():
+    is_kept = shares > _MASSLESS_SHARE * shares[-1]
+    if not is_kept.any():
         raise np.linalg.LinAlgError("no shape has a mass above zero")
-    one = directions[:, kept] / np.sqrt(shares[kept])
-    values, turned = np.linalg.eigh(one.T @ stiffness @ one)
-    return np.asarray(values), np.asarray(one @ turned)
+    whitening = directions[:, is_kept] / np.sqrt(shares[is_kept])
+    values, rotations = np.linalg.eigh(whitening.T @ stiffness @ whitening)
+    return np.asarray(values), np.asarray(whitening @ rotations)
 
 
-def _shift_below(own: SymmetryClass, weights: Weights) -> float:
+def _shift_below(symmetry_class: SymmetryClass, weights: Weights) -> float:
     """A shift below zero that keeps rigid motions from making the shifted matrix singular, s^-2; 0 if there are none.
 
-    It lies well below the lowest elastic mode, as products of beam functions bound it: seen from there rigid motions
-    are far from all else, so that the solver, which finds like ones by rounding, has them before it is content.
+    It lies well below the lowest elastic mode, as products of beam functions bound it: from there rigid motions are far
+    from all other modes, so that the solver, which finds equal eigenvalues by rounding, has them all before it stops.
     """
-    if not own.n_rigid:
+    if not symmetry_class.n_rigid:
         return 0.0
-    values = np.tensordot(weights.stiffness[:4], product_coefficients(own.plate.x.ends, own.plate.y.ends), axes=1)
-    return _SHIFT * min(float(values[beams]) for beams in own.plate.elastic_products[own.parity])
+    values = np.tensordot(
+        weights.stiffness[:4], product_coefficients(symmetry_class.plate.x.ends, symmetry_class.plate.y.ends), axes=1
+    )
+    return _SHIFT_RATIO * min(
+        float(values[beams]) for beams in symmetry_class.plate.elastic_products[symmetry_class.parity]
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,32 +157,32 @@ class Modes:
 
     @cached_property
     def _energies(self) -> tuple[Floats, Floats]:
-        found = {parity: own.coefficients() for parity, own in self.by_class.items()}
-        stiffness, mass = (self.in_order({parity: both[i] for parity, both in found.items()}) for i in (0, 1))
+        energies = {parity: modes.coefficients() for parity, modes in self.by_class.items()}
+        stiffness, mass = (self.in_order({parity: pair[i] for parity, pair in energies.items()}) for i in (0, 1))
         return stiffness, mass
 
     @cached_property
     def by_class(self) -> dict[Parity, ClassModes]:
-        found = {}
+        by_class = {}
         for parity in dict.fromkeys(self.parities):
-            found[parity] = self.classes[parity].of(self.ranks[self.rows(parity)])
-        return found
+            by_class[parity] = self.classes[parity].of(self.ranks[self.rows(parity)])
+        return by_class
 
     def in_order(self, of_class: Mapping[Parity, Any]) -> Floats:
-        """What was worked out for the modes of each class (rows), in the order of frequency."""
+        """Rows of the modes of each class, sorted into the order of frequency."""
         order = np.argsort(np.concatenate([self.rows(parity) for parity in self.by_class]))
         return np.concatenate([of_class[parity] for parity in self.by_class])[order]
 
     def rows(self, parity: Parity) -> list[int]:
-        return [i for i, one in enumerate(self.parities) if one == parity]
+        return [i for i, p in enumerate(self.parities) if p == parity]
 
     def displacement(self, x: Floats, y: Floats) -> Floats:
         """Shapes on a grid: (n_modes, n_x, n_y) array; x and y are fractions of the sides in [0, 1]."""
-        return self.in_order({p: one.own.deflections(one.vectors).on(x, y) for p, one in self.by_class.items()})
+        return self.in_order({p: c.own.deflections(c.vectors).on(x, y) for p, c in self.by_class.items()})
 
     def displacement_across(self, x: Floats, y: Floats) -> Floats:
         """Shapes at points y, (n_x, n_y), of their own at each x, (n_x,)."""
-        return self.in_order({p: one.own.deflections(one.vectors).across(x, y) for p, one in self.by_class.items()})
+        return self.in_order({p: c.own.deflections(c.vectors).across(x, y) for p, c in self.by_class.items()})
 
 
 def solve(plate: Plate, weights: Weights, n_modes: int) -> Modes:
@@ -179,39 +191,39 @@ def solve(plate: Plate, weights: Weights, n_modes: int) -> Modes:
     Each class is solved for a few modes more than its share, and for more again until no class can hide a mode below
     the highest that is returned.
     """
-    asked = dict.fromkeys(plate.parities, -(-n_modes // len(plate.parities)) + 2)
-    solved = solve_classes(plate, weights, asked)
+    counts = dict.fromkeys(plate.parities, -(-n_modes // len(plate.parities)) + 2)
+    solved = solve_classes(plate, weights, counts)
     while True:
         values = np.sort(np.concatenate([c.eigenvalues for c in solved.values()]))
         limit = values[min(n_modes, values.size) - 1]
         short = [p for p, c in solved.items() if c.eigenvalues[-1] < limit]
         if not short and values.size >= n_modes:
-            return collect(plate, solved, n_modes)
-        asked |= {p: 2 * asked[p] for p in short or asked}
-        solved |= solve_classes(plate, weights, {p: asked[p] for p in short or asked})
+            return collect_modes(plate, solved, n_modes)
+        counts |= {p: 2 * counts[p] for p in short or counts}
+        solved |= solve_classes(plate, weights, {p: counts[p] for p in short or counts})
 
 
 def solve_up_to(plate: Plate, weights: Weights, highest: float, n_least: int = 1) -> Modes:
     """All elastic modes of a plate up to an eigenvalue (s^-2), and at least so many; see `solve`."""
-    asked = dict.fromkeys(plate.parities, _FIRST_OF_CLASS)
-    solved = solve_classes(plate, weights, asked)
+    counts = dict.fromkeys(plate.parities, _FIRST_MODES)
+    solved = solve_classes(plate, weights, counts)
     eigenvalues = np.sort(np.concatenate([c.eigenvalues for c in solved.values()]))
     highest = max(highest, eigenvalues[min(n_least, eigenvalues.size) - 1])
     while short := [p for p, c in solved.items() if c.eigenvalues[-1] < highest]:
-        # A class that came back with fewer than were asked for is asked for more all the same.
-        asked |= {p: max(_enough(solved[p].eigenvalues, highest), asked[p] + _FEWEST_MORE) for p in short}
-        solved |= solve_classes(plate, weights, {p: asked[p] for p in short})
+        # A class that returned fewer modes than it was solved for is solved for more all the same.
+        counts |= {p: max(_modes_needed(solved[p].eigenvalues, highest), counts[p] + _FEWEST_MORE_MODES) for p in short}
+        solved |= solve_classes(plate, weights, {p: counts[p] for p in short})
     n_modes = sum(int(np.sum(c.eigenvalues <= highest)) for c in solved.values())
-    return collect(plate, solved, n_modes)
+    return collect_modes(plate, solved, n_modes)
 
 
-def _enough(eigenvalues: Floats, highest: float) -> int:
+def _modes_needed(eigenvalues: Floats, highest: float) -> int:
     """How many modes will reach up to an eigenvalue: those of a plate are about as dense at every frequency."""
     ratio = float(np.sqrt(highest / eigenvalues[-1]))
-    return max(eigenvalues.size + _FEWEST_MORE, math.ceil(_MORE * ratio * eigenvalues.size))
+    return max(eigenvalues.size + _FEWEST_MORE_MODES, math.ceil(_MODE_MARGIN * ratio * eigenvalues.size))
 
 
-def collect(plate: Plate, solved: Mapping[Parity, ClassModes], n_modes: int | None = None) -> Modes:
+def collect_modes(plate: Plate, solved: Mapping[Parity, ClassModes], n_modes: int | None = None) -> Modes:
     """Sort the modes of several classes into one list, keeping the lowest `n_modes` (all if None)."""
     eigenvalues = np.concatenate([c.eigenvalues for c in solved.values()])
     order = np.argsort(eigenvalues, kind="stable")[:n_modes]

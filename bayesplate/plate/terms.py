@@ -1,4 +1,4 @@
-"""The terms of a plate: what is integrated over it, along its edges, at places, or on given deflections only.
+"""The terms of a plate: integrals over it or along its edges, products at places, or projections on given deflections.
 
 A term is a form: the product of two strains, which are derivatives of the deflection or of a shear strain.
 """
@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bayesplate.arrays import Floats
-from bayesplate.plate.fields import Group, Outline, weights_within
+from bayesplate.plate.fields import Outline, TermGroup, weights_within
 from bayesplate.plate.line import Line
 
 
@@ -48,7 +48,7 @@ class Derivative(NamedTuple):
 Strain = tuple[Derivative, ...]
 """A strain or a motion: a sum of derivatives."""
 
-Pair = tuple[str, str]
+StrainPair = tuple[str, str]
 """Names of two strains whose product is integrated: twice where they differ, so that the form is symmetric."""
 
 
@@ -57,46 +57,46 @@ class Kinematics(NamedTuple):
 
     fields: tuple[str, ...]  # unknowns: the deflection "w", then the shear strains if there are any
     strains: Mapping[str, Strain]  # "turn_x" and "turn_y" are how the cross-sections turn
-    stiffnesses: tuple[Pair, ...]  # of the plate's own terms, those that a turned grain adds last
-    masses: tuple[Pair, ...]
-    groups_of_stiffnesses: tuple[Group, ...]
-    turned_groups: tuple[Group, ...]  # of the stiffnesses where the grain runs at an angle
-    groups_of_masses: tuple[Group, ...]
+    stiffnesses: tuple[StrainPair, ...]  # of the plate's own terms, those that a turned grain adds last
+    masses: tuple[StrainPair, ...]
+    groups_of_stiffnesses: tuple[TermGroup, ...]
+    turned_groups: tuple[TermGroup, ...]  # of the stiffnesses where the grain runs at an angle
+    groups_of_masses: tuple[TermGroup, ...]
 
-    def groups(self, is_turned: bool) -> tuple[tuple[Group, ...], tuple[Group, ...]]:
+    def groups(self, is_turned: bool) -> tuple[tuple[TermGroup, ...], tuple[TermGroup, ...]]:
         """Group of each stiffness and of each mass term that is the plate's own."""
         return self.turned_groups if is_turned else self.groups_of_stiffnesses, self.groups_of_masses
 
 
 @dataclass(frozen=True)
-class OverPlate:
-    """A term: two strains, integrated over the plate or what an outline leaves of it."""
+class PlateTerm:
+    """A term: two strains, integrated over the plate or its part within an outline."""
 
-    strains: Pair
+    strains: StrainPair
     outline: Outline | None = None
 
 
 @dataclass(frozen=True)
-class AlongEdges:
-    """A term: the square of a strain, integrated along the edges x0 and x1 (axis 0) or y0 and y1 that are asked for."""
+class EdgeTerm:
+    """A term: the square of a strain, integrated along the selected edges of x0 and x1 (axis 0) or of y0 and y1."""
 
     axis: int
     at: tuple[bool, bool]
     strain: str
 
 
-class Amount(NamedTuple):
-    """Deflections at places (factor, x, y), summed; or a coordinate beside the plate, such as a magnet's rise."""
+class PointMotion(NamedTuple):
+    """A sum of deflections at places (factor, x, y); or a coordinate beside the plate, such as a magnet's rise."""
 
     places: tuple[tuple[float, float, float], ...] = ()
     beside: int = -1
 
 
 @dataclass(frozen=True)
-class AtPlaces:
-    """A term: products of two amounts, each with its factor."""
+class PointTerm:
+    """A term: products of two point motions, each with its factor."""
 
-    products: tuple[tuple[float, Amount, Amount], ...]
+    products: tuple[tuple[float, PointMotion, PointMotion], ...]
 
     @property
     def is_on_plate(self) -> bool:
@@ -104,18 +104,18 @@ class AtPlaces:
 
     @property
     def n_beside(self) -> int:
-        return 1 + max(one.beside for _, *both in self.products for one in both)
+        return 1 + max(motion.beside for _, *motions in self.products for motion in motions)
 
 
 @dataclass(frozen=True)
-class OnDeflections:
-    """Terms that exist on given deflections only, for they reach all over the plate."""
+class ProjectedTerms:
+    """Terms that can only be projected on given deflections, because they couple the whole plate."""
 
     project: Callable[[Deflections], Floats]  # to (n_terms, n_vectors, n_vectors) matrices
     n_terms: int = 1
 
 
-Term = OverPlate | AlongEdges | AtPlaces | OnDeflections
+Term = PlateTerm | EdgeTerm | PointTerm | ProjectedTerms
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,13 +133,13 @@ class Deflections:
         return np.asarray(along_x @ self.coefficients @ along_y.T)
 
     def across(self, x: Floats, y: Floats) -> Floats:
-        """Values at points y, (n_x, n_y), of their own at each x, (n_x,): (n_vectors, n_x, n_y) array."""
+        """Values at points x, (n_x,), and y, (n_x, n_y), which differ with x: (n_vectors, n_x, n_y) array."""
         along_x = self.x.shapes(x, self.parity.x).toarray()
         along_y = self.y.shapes(y.ravel(), self.parity.y).toarray().reshape(*y.shape, -1)
         return np.einsum("xi,nij,xyj->nxy", along_x, self.coefficients, along_y, optimize=True)
 
     def integrals(self, outline: Outline | None) -> Floats:
-        """Integrals over the plate, or what an outline leaves of it: (n_vectors,) array; zero where they are odd."""
+        """Integrals over the plate, or its part within an outline: (n_vectors,) array; zero where they are odd."""
         if any(self.parity[axis] and side.is_split for axis, side in enumerate((self.x, self.y))):
             return np.zeros(len(self.coefficients))
         grid = self.x.derivatives[0] @ self.coefficients @ self.y.derivatives[0].T

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from bayesplate.board.setup import Ends
+from bayesplate.board.setup import EdgeConditions
 from bayesplate.plate.line import line
 from bayesplate.plate.plate import Plate, plate_of
 from bayesplate.plate.terms import Derivative, Kinematics
@@ -47,7 +47,7 @@ THIN = Kinematics(
 
 
 @lru_cache(maxsize=16)
-def thin_plate(ends_x: Ends, ends_y: Ends, n_x: int, n_y: int) -> Plate:
+def thin_plate(ends_x: EdgeConditions, ends_y: EdgeConditions, n_x: int, n_y: int) -> Plate:
     """The bare thin plate, its terms as `THIN_TERMS`; the result is shared, so it must not be changed.
 
     Ducceschi et al., eq. (1) and (2), as energies.

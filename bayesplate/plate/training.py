@@ -15,10 +15,10 @@ import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.board.material import rigidities
-from bayesplate.board.setup import Ends
+from bayesplate.board.setup import EdgeConditions
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.plate.beams import Beams
-from bayesplate.plate.naming import find
+from bayesplate.plate.naming import find_named_modes
 from bayesplate.plate.plate import Plate
 from bayesplate.plate.shear import SHEAR_CORRECTION, SHEAR_ELEMENTS_PER_SIDE, shear_flexible_plate
 from bayesplate.plate.solve import Modes, solve
@@ -27,10 +27,10 @@ from bayesplate.plate.thin import thin_plate
 
 Theory = Literal["thin", "shear-flexible"]
 
-FACTORS = (0.8, 0.9, 1.0, 1.1, 1.2)
-"""By which E_x and E_y are multiplied, each with each."""
+MODULUS_FACTORS = (0.8, 0.9, 1.0, 1.1, 1.2)
+"""Factors on E_x and on E_y, in all combinations."""
 
-REFERENCE = (0.8, 0.8)
+REFERENCE_FACTORS = (0.8, 0.8)
 """The plate whose shapes name the modes: the paper's batch p = 4.36, q = 0.29."""
 
 LOWEST_MAC = 0.9
@@ -82,8 +82,8 @@ class Training:
 
 
 def train(
-    ends_x: Ends,
-    ends_y: Ends,
+    ends_x: EdgeConditions,
+    ends_y: EdgeConditions,
     aspect_ratio: float,
     thickness_ratio: float,
     constants: TrainingConstants,
@@ -99,19 +99,20 @@ def train(
     plate = training_matrices(ends_x, ends_y, theory)
     weights = {
         (f, g): training_weights(aspect_ratio, thickness_ratio, constants, theory, (f, g))
-        for f in FACTORS
-        for g in FACTORS
+        for f in MODULUS_FACTORS
+        for g in MODULUS_FACTORS
     }
-    found = find(plate, weights[REFERENCE], beams)
-    n_modes = _modes_to_hold(plate, weights[REFERENCE], max(mode.eigenvalue for mode in found.values()))
-    solved = {factors: solve(plate, each, n_modes) for factors, each in weights.items()}
-    places = list(zip(solved[REFERENCE].parities, solved[REFERENCE].ranks, strict=True))
-    rows = [places.index((mode.place.parity, mode.place.rank)) for mode in found.values()]
-    reference = _sampled(solved[REFERENCE])[rows]
+    modes = find_named_modes(plate, weights[REFERENCE_FACTORS], beams)
+    n_modes = _count_modes(plate, weights[REFERENCE_FACTORS], max(mode.eigenvalue for mode in modes.values()))
+    solved = {factors: solve(plate, plate_weights, n_modes) for factors, plate_weights in weights.items()}
+    places = list(zip(solved[REFERENCE_FACTORS].parities, solved[REFERENCE_FACTORS].ranks, strict=True))
+    rows = [places.index((mode.place.parity, mode.place.rank)) for mode in modes.values()]
+    reference = _sample_shapes(solved[REFERENCE_FACTORS])[rows]
     plates = tuple(
-        _tracked(factors, weights[factors], aspect_ratio, modes, reference, beams) for factors, modes in solved.items()
+        _track_modes(factors, weights[factors], aspect_ratio, modes, reference, beams)
+        for factors, modes in solved.items()
     )
-    return Training({name: _fitted(name, plates) for name in beams}, plates)
+    return Training({name: _fit_plane(name, plates) for name in beams}, plates)
 
 
 def training_weights(
@@ -140,27 +141,27 @@ def training_weights(
     return Weights(np.array([*thin, shear_x, shear_y]), np.array([1.0, over_x**2 / 12.0, over_y**2 / 12.0]))
 
 
-def training_matrices(ends_x: Ends, ends_y: Ends, theory: Theory) -> Plate:
+def training_matrices(ends_x: EdgeConditions, ends_y: EdgeConditions, theory: Theory) -> Plate:
     assemble = thin_plate if theory == "thin" else shear_flexible_plate
     return assemble(ends_x, ends_y, SHEAR_ELEMENTS_PER_SIDE, SHEAR_ELEMENTS_PER_SIDE)
 
 
-def _modes_to_hold(plate: Plate, weights: Weights, highest: float) -> int:
-    """How many modes reach the highest wanted one of the reference plate, and a few more for crossings."""
+def _count_modes(plate: Plate, weights: Weights, highest: float) -> int:
+    """How many modes reach the highest wanted mode of the reference plate, and a few more for crossings."""
     n_modes = 2 * _SPARE_MODES
     while solve(plate, weights, n_modes).eigenvalues[-1 - _SPARE_MODES] < highest * (1.0 - 1e-9):
         n_modes += 1
     return n_modes
 
 
-def _sampled(modes: Modes) -> Floats:
+def _sample_shapes(modes: Modes) -> Floats:
     """Shapes on a grid of cell centres, where sums stand for integrals: (n_modes, n_points) array of unit norm."""
     points = (np.arange(_GRID) + 0.5) / _GRID
     shapes = modes.displacement(points, points).reshape(len(modes.eigenvalues), -1)
     return np.asarray(shapes / np.linalg.norm(shapes, axis=1, keepdims=True))
 
 
-def _tracked(
+def _track_modes(
     factors: tuple[float, float],
     weights: Weights,
     aspect_ratio: float,
@@ -168,7 +169,7 @@ def _tracked(
     reference: Floats,
     beams: Sequence[Beams],
 ) -> TrainingPlate:
-    mac = (reference @ _sampled(modes).T) ** 2
+    mac = (reference @ _sample_shapes(modes).T) ** 2
     matches = {}
     for row, name in enumerate(beams):
         column = int(mac[row].argmax())
@@ -178,17 +179,17 @@ def _tracked(
     return TrainingPlate(factors, float(p), float(q), modes.eigenvalues, mac, matches)
 
 
-def _fitted(name: Beams, plates: Sequence[TrainingPlate]) -> TrainedMode:
+def _fit_plane(name: Beams, plates: Sequence[TrainingPlate]) -> TrainedMode:
     from scipy.optimize import nnls
 
-    kept = [plate for plate in plates if name in plate.matches]
-    if len(kept) < 3:
+    recognised = [plate for plate in plates if name in plate.matches]
+    if len(recognised) < 3:
         raise NotIdentifiableError(
-            f"beam functions {name}: recognised in {len(kept)} of {len(plates)} training plates, a plane needs three; "
-            "take the coefficients from the energy shares of one solve"
+            f"beam functions {name}: recognised in {len(recognised)} of {len(plates)} training plates, a plane needs "
+            "three; take the coefficients from the energy shares of one solve"
         )
-    planes = np.array([[plate.p, plate.q, 1.0] for plate in kept])
-    squared = np.array([plate.squared[plate.matches[name]] for plate in kept])
+    planes = np.array([[plate.p, plate.q, 1.0] for plate in recognised])
+    squared = np.array([plate.squared[plate.matches[name]] for plate in recognised])
     (a, b, c), distance = nnls(planes, squared)
     r_squared = 1.0 - distance**2 / np.sum((squared - squared.mean()) ** 2)
-    return TrainedMode(float(a), float(b), float(c), float(r_squared), len(kept))
+    return TrainedMode(float(a), float(b), float(c), float(r_squared), len(recognised))

@@ -1,4 +1,4 @@
-"""Assessment of a fit besides its draws: errors, leverages, both frequency laws, spectra and doubts."""
+"""Assessment of a converged fit: prediction errors, leverages, both frequency laws, spectra and doubts."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import get_args
 import numpy as np
 
 from bayesplate.arrays import Floats
-from bayesplate.board.sessions import same_modes
+from bayesplate.board.sessions import readings_by_mode
 from bayesplate.estimates.least_squares import log_measured
-from bayesplate.estimates.leave_one_out import CarryingMode, Errors, carrying_modes, prediction_errors
+from bayesplate.estimates.leave_one_out import CarryingMode, PredictionErrors, carrying_modes, prediction_errors
 from bayesplate.estimates.refit import deviance_misfit
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.reading_errors import reading_sd
@@ -25,20 +25,20 @@ from bayesplate.posterior.veerings import contradicted_labels
 
 _N_STARTS = 500
 _N_NAMED = 32
-"""Draws on which modes are named."""
+"""Number of draws at which modes are named."""
 
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
     """Quantities computed once from the draws of a converged fit."""
 
-    left_out: Floats  # (n_modes,), ln measured - ln predicted by the constants of the others; nan if these are too few
+    left_out: Floats  # (n_modes,), ln measured - ln predicted from the other modes; nan if these are too few
     leverages: Floats  # (n_modes,), share of each mode in its own prediction, at the posterior's median noise
     carrying: tuple[CarryingMode, ...]  # modes that alone carry a constant or a size
     linear_errors: Floats  # (n_some, n_every), cents: linear less exact law over the posterior
-    linear_is_enough: bool  # these stay below their share of the posterior's own noise
+    linear_is_enough: bool  # the linear errors stay below their share of the posterior's own noise
     exact_worst: float  # cents, largest error of the exact law against full solves
-    surrogate_errors: Floats  # (n_draws, n_every), cents, less the exact law; no draws where the walk needed none
+    surrogate_errors: Floats  # (n_draws, n_every), cents, surrogate less exact law; no draws without a surrogate
     means: Mapping[LawName, tuple[Mapping[str, float], float]]  # posterior means of E_x ... D_s, and effective draws
     doubts: tuple[str, ...]  # labels that the fit contradicts or that hardly fit, and signs that contradict them
 
@@ -48,14 +48,14 @@ def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = No
     problem = inference.problem
     models = problem.posterior.models
     values = posterior_mean_values(problem, draws)
-    found = spectra(models, values)
+    spectrum_by_setup = spectra(models, values)
     errors = linearisation(inference, draws) if linear_errors is None else linear_errors
     errors_of_modes = mode_errors(inference, draws)
     conflicts = (
         sentence
         for model in models
         if model.setup.hammer is not None
-        for sentence in sign_conflicts(model.setup, *found[model.setup.name], values, model.system.shaped)
+        for sentence in sign_conflicts(model.setup, *spectrum_by_setup[model.setup.name], values, model.system.shaped)
     )
     return Assessment(
         left_out=errors_of_modes.left_out,
@@ -70,11 +70,11 @@ def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = No
     )
 
 
-def mode_errors(inference: Inference, draws: Draws) -> Errors:
-    """Errors of the most likely constants under the exact law, in sample and left out.
+def mode_errors(inference: Inference, draws: Draws) -> PredictionErrors:
+    """Prediction errors of the most likely constants under the exact law, in sample and left out.
 
-    One estimator for both, with the likelihood of the fit at the posterior's median noise: rounded readings are
-    intervals, a robust fit has Student's errors. Uncertain inputs move within their priors.
+    Both have the same estimator, with the likelihood of the fit at the posterior's median noise: rounded readings are
+    intervals, a robust fit has Student's errors. Uncertain inputs are fitted within their priors.
     """
     problem, noise = inference.problem, draws.median_noise
     predict = predictor(problem.board, problem.posterior.models, "exact", problem.centre)
@@ -84,23 +84,23 @@ def mode_errors(inference: Inference, draws: Draws) -> Errors:
         starts = np.concatenate([starts, draws.flat[:: max(1, len(draws.flat) // _N_STARTS)]])
     starts, bounds = starts[:, problem.parameters.fitted_columns], problem.parameters.fitted_bounds
     scales = reading_sd(problem.board.setups, noise)
-    target, modes = log_measured(problem.board), same_modes(problem.board)
+    target, modes = log_measured(problem.board), readings_by_mode(problem.board)
     return prediction_errors(predict, target, misfit, starts, bounds, modes, scales)
 
 
-def carried_in_fit(inference: Inference, errors: Errors) -> tuple[CarryingMode, ...]:
-    """Modes that alone carry a constant or a size of a fit."""
+def carried_in_fit(inference: Inference, errors: PredictionErrors) -> tuple[CarryingMode, ...]:
+    """Modes on which alone a constant or a size of the fit depends."""
     board = inference.problem.board
-    names = (*board.symmetry.moduli, *(one.effect or one.name for one in board.uncertain))
+    names = (*board.symmetry.moduli, *(parameter.effect or parameter.name for parameter in board.uncertain))
     return carrying_modes(board, errors.leverages, names)
 
 
 def labels_contradicted(posterior: Posterior, draws: Draws) -> tuple[str, ...]:
-    """A sentence per setup whose labels the draws contradict; under the linear law labels follow the shapes."""
+    """A sentence for each setup whose labels the draws contradict; under the linear law labels follow the shapes."""
     if posterior.law == "linear":
         return ()
-    some = draws.flat[:: max(1, len(draws.flat) // _N_NAMED)]
-    return contradicted_labels(posterior.models, posterior.parameters.values(some))
+    plates = draws.flat[:: max(1, len(draws.flat) // _N_NAMED)]
+    return contradicted_labels(posterior.models, posterior.parameters.values(plates))
 
 
 def _surrogate_errors(inference: Inference, draws: Draws) -> Floats:

@@ -1,7 +1,7 @@
-"""The checkpoint of a sampling run: the chains of its ensembles in one file, written whole every few seconds.
+"""The checkpoint of a sampling run: the chains of its ensembles in one file, rewritten every few seconds.
 
-A folder holds `chains.h5`, in the form of emcee's HDF backend with one group for each ensemble, and `lock`. Written are
-whole chunks of steps with emcee's random state behind them, so that a run that goes on makes the same draws.
+A folder holds `chains.h5`, in the format of emcee's HDF backend with one group for each ensemble, and `lock`. Only
+whole chunks of steps are saved, with emcee's random state after them, so that a continued run makes the same draws.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ import numpy as np
 
 from bayesplate.errors import CheckpointError, UnwritableError
 from bayesplate.files import write_bytes
-from bayesplate.locks import take
+from bayesplate.locks import lock_folder
 
 FORMAT = 8
 """To be raised whenever the same seed would give other draws, so that two programs never share one run."""
 CHAINS = "chains.h5"
 EVERY_SECONDS = 5.0
 _LEAST_PAUSE = 20.0
-"""Pauses between two writings over the time that one takes."""
+"""Least pause between two saves, over the time that a save takes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
     """State of a run at the end of a chunk."""
 
-    backends: Sequence[Any]  # emcee's, one per ensemble; steps beyond `n_steps` are of a chunk that was not ended
+    backends: Sequence[Any]  # emcee's, one per ensemble; steps beyond `n_steps` are of an unfinished chunk
     random_states: Sequence[Any]  # of emcee's samplers, as numpy states them
     n_steps: int
 
@@ -40,7 +40,7 @@ class Snapshot:
 class Checkpoint:
     """The checkpoint folder of one run, made when first needed.
 
-    The fingerprint is a hash of all that defines the run besides the sampler settings: card, priors, effects, law.
+    The fingerprint is a hash of all that defines the run except the sampler settings: card, priors, effects, law.
     """
 
     def __init__(self, folder: Path, fingerprint: str) -> None:
@@ -65,7 +65,7 @@ class Checkpoint:
 
         `identity` holds the sampler settings that decide the draws. CheckpointError if the folder is in use.
         """
-        with take(self.folder):
+        with lock_folder(self.folder):
             session = Session(self, {"format": FORMAT, "fingerprint": self.fingerprint, **identity})
             try:
                 yield session
@@ -77,7 +77,7 @@ class Checkpoint:
         """Remove the checkpoint: after success or to start anew, outside a session."""
         if not self.folder.is_dir():
             return
-        with take(self.folder):
+        with lock_folder(self.folder):
             self.file.unlink(missing_ok=True)
         (self.folder / "lock").unlink(missing_ok=True)
         with suppress(OSError):  # not empty: something is not ours
@@ -89,7 +89,7 @@ class Checkpoint:
 
 
 class Session:
-    """Sole use of a checkpoint by a run; a run that is continued must have the same `identity`."""
+    """Exclusive use of a checkpoint by a run; a continued run must have the same `identity`."""
 
     def __init__(self, checkpoint: Checkpoint, identity: dict[str, int | str]) -> None:
         self.checkpoint, self.identity = checkpoint, identity
@@ -98,7 +98,7 @@ class Session:
         self._due = 0.0  # the first chunk is saved at once
 
     def load(self) -> Snapshot | None:
-        """The saved run, None if there is none; CheckpointError if it is damaged or another run."""
+        """The saved run, None if there is none; CheckpointError if it is damaged or of another run."""
         if not self.checkpoint.file.exists():
             return None
         import h5py
@@ -107,17 +107,17 @@ class Session:
         path = str(self.checkpoint.file)
         try:
             with h5py.File(path, "r") as file:
-                found = {key: getattr(value, "item", lambda v=value: v)() for key, value in file.attrs.items()}
+                attributes = {key: getattr(value, "item", lambda v=value: v)() for key, value in file.attrs.items()}
                 names = sorted(file)
-            saved = [HDFBackend(path, name=name, read_only=True) for name in names]
-            states = [one.random_state for one in saved]
-            chains = [(one.get_chain(), one.get_log_prob()) for one in saved]
+            saved_backends = [HDFBackend(path, name=name, read_only=True) for name in names]
+            states = [backend.random_state for backend in saved_backends]
+            chains = [(backend.get_chain(), backend.get_log_prob()) for backend in saved_backends]
         except (OSError, KeyError, ValueError, RuntimeError, AttributeError):
             raise self.checkpoint.error(f"wanted a readable {CHAINS}, got a damaged one") from None
-        for key in [*self.identity, *(key for key in found if key not in self.identity)]:
-            if found.get(key) != self.identity.get(key):
-                differs = f"wanted {self.identity.get(key)!r}, got {found.get(key)!r}"
-                raise self.checkpoint.error(f"the saved run differs in its {key}: {differs}")
+        for key in [*self.identity, *(key for key in attributes if key not in self.identity)]:
+            if attributes.get(key) != self.identity.get(key):
+                difference = f"wanted {self.identity.get(key)!r}, got {attributes.get(key)!r}"
+                raise self.checkpoint.error(f"the saved run differs in its {key}: {difference}")
         backends = []
         for (chain, log_prob), state in zip(chains, states, strict=True):
             backend = Backend()
@@ -129,16 +129,16 @@ class Session:
         return Snapshot(backends, states, self._n_saved)
 
     def reached(self, snapshot: Snapshot) -> None:
-        """Note the state of the run, and save it the first time, then if the last time is long enough ago."""
+        """Record the state of the run, and save it if it is the first or the last save is long enough ago."""
         self._latest = snapshot
         if time.monotonic() >= self._due:
-            begun = time.monotonic()
+            start = time.monotonic()
             self.save()
-            took = time.monotonic() - begun
-            self._due = begun + took + max(EVERY_SECONDS, _LEAST_PAUSE * took)
+            duration = time.monotonic() - start
+            self._due = start + duration + max(EVERY_SECONDS, _LEAST_PAUSE * duration)
 
     def save(self) -> None:
-        """Save the state of the run; CheckpointError if it cannot be written, and the last file stays intact."""
+        """Save the state of the run; CheckpointError if it cannot be written: the last file stays intact."""
         if self._latest is None or self._latest.n_steps == self._n_saved:
             return
         try:
@@ -149,9 +149,9 @@ class Session:
 
 
 def _content(snapshot: Snapshot, identity: dict[str, int | str]) -> bytes:
-    """A file that emcee's HDF backend reads, one group for each ensemble.
+    """Content of a file that emcee's HDF backend reads, one group for each ensemble.
 
-    Made in memory: HDF5 ends the process at its end where a disk was full.
+    It is made in memory: where the disk is full, HDF5 would crash the process at its exit.
     """
     import emcee
     import h5py
@@ -164,7 +164,7 @@ def _content(snapshot: Snapshot, identity: dict[str, int | str]) -> bytes:
             _, n_walkers, n_dim = backend.chain.shape
             shape = {"nwalkers": n_walkers, "ndim": n_dim, "iteration": n_steps, "has_blobs": False}
             group.attrs.update({"version": emcee.__version__, **shape})
-            group.attrs.update({f"random_state_{k}": part for k, part in enumerate(state)})
+            group.attrs.update({f"random_state_{k}": value for k, value in enumerate(state)})
             group.create_dataset("accepted", data=np.zeros(n_walkers))
             group.create_dataset("chain", data=backend.chain[:n_steps], fletcher32=True)
             group.create_dataset("log_prob", data=backend.log_prob[:n_steps], fletcher32=True)

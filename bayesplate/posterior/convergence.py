@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesplate.arrays import Bools, Floats
-from bayesplate.posterior.statistics import effective_sizes, rhat, thinning, walker_major
+from bayesplate.posterior.statistics import effective_sizes, rhat, thinning_step, walker_major
 
-_TARGET_TAUS = 100  # what a suggestion aims at: twice the least, so that the next run does not end just short
+_TARGET_TAUS = 100  # suggested length: twice the least, so that the next run does not end just short
 
 
 @dataclass(frozen=True)
 class Gate:
-    """Limits that the draws must keep before any constant is printed.
+    """Limits that the draws must meet before any constant is printed.
 
     Acceptance has no upper limit: good independent proposals are all accepted, and steps that are too short fail by
     their autocorrelation time.
@@ -57,8 +57,8 @@ class Convergence:
 def burn_in_steps(n_steps: int) -> int:
     """Number of `n_steps` to discard: a sixth, and at least 50 (or half of a very short run).
 
-    A sixth depends on the count alone, yet it is long enough whenever the gate passes: if the other five sixths hold
-    50 autocorrelation times, the discarded one holds 10, twice what is asked for.
+    A sixth is long enough whenever the gate passes: if the other five sixths hold 50 autocorrelation times, the
+    discarded sixth holds 10, twice the recommended length.
     """
     return min(max(50, -(-n_steps // 6)), n_steps // 2)
 
@@ -78,83 +78,86 @@ def autocorrelation_times(draws: Floats) -> Floats:
 def length_in_taus(draws: Floats) -> float:
     """Length of (n_ensembles, n_steps, n_walkers, n_dim) draws in autocorrelation times of the slowest parameter.
 
-    By every fourth walker, for a quick look.
+    By every fourth walker, for a quick check.
     """
-    return float(draws.shape[1] / max(autocorrelation_times(one[:, ::4]).max() for one in draws))
+    return float(draws.shape[1] / max(autocorrelation_times(ensemble[:, ::4]).max() for ensemble in draws))
 
 
 def acceptance_by_walker(draws: Floats) -> Floats:
-    """Share of the steps at which each walker moved, (n_ensembles, n_walkers), read off the draws that are kept."""
+    """Share of the steps at which each walker moved, from the kept draws: (n_ensembles, n_walkers) array."""
     fraction: Floats = np.any(draws[:, 1:] != draws[:, :-1], axis=-1).mean(axis=1)
     return fraction
 
 
-def assess(draws: Floats, gate: Gate | None = None, *, names: Sequence[str] = ()) -> Convergence:
+def judge_convergence(draws: Floats, gate: Gate | None = None, *, names: Sequence[str] = ()) -> Convergence:
     """Judge (n_ensembles, n_steps, n_walkers, n_dim) draws after burn-in by the gate; `names` for the reasons."""
     gate = Gate() if gate is None else gate
     _, n_steps, _, n_dim = draws.shape
     tau = np.array([autocorrelation_times(ensemble) for ensemble in draws]).max(axis=0)
-    thinned = draws[:, :: thinning(float(tau.max()))]
-    largest = rhat(thinned.reshape(len(draws), -1, n_dim))
+    thinned = draws[:, :: thinning_step(float(tau.max()))]
+    rhats = rhat(thinned.reshape(len(draws), -1, n_dim))
     never_moves = np.any(np.ptp(draws, axis=(1, 2)) == 0.0, axis=0)
-    smallest = np.where(never_moves, 0.0, effective_sizes(walker_major(thinned)))
-    by_walker = acceptance_by_walker(draws)
+    ess = np.where(never_moves, 0.0, effective_sizes(walker_major(thinned)))
+    acceptance = acceptance_by_walker(draws)
     needed = int(np.ceil(_TARGET_TAUS * tau.max())) if np.isfinite(tau.max()) else 2 * n_steps
     unjudged = Convergence(
         passed=False,
         reasons=(),
         tau=tau,
-        rhat=largest,
-        ess=smallest,
+        rhat=rhats,
+        ess=ess,
         tau_max=float(tau.max()),
-        rhat_max=float(largest.max()),
-        ess_min=float(smallest.min()),
-        acceptance=float(by_walker.mean()),
+        rhat_max=float(rhats.max()),
+        ess_min=float(ess.min()),
+        acceptance=float(acceptance.mean()),
         n_kept_steps=n_steps,
         suggested_steps=max(n_steps, needed),
     )
     names = tuple(names) or tuple(f"parameter {dim + 1}" for dim in range(n_dim))
-    reasons = (*_faults_of_parameters(unjudged, gate, names, never_moves), *_faults_of_walkers(by_walker, gate))
+    reasons = (*_faults_of_parameters(unjudged, gate, names, never_moves), *_faults_of_walkers(acceptance, gate))
     return replace(unjudged, passed=not reasons, reasons=reasons)
 
 
-def _faults_of_parameters(found: Convergence, gate: Gate, names: tuple[str, ...], never_moves: Bools) -> list[str]:
-    """Sentences about the rules that hold for each parameter; the comparisons are such that nan fails."""
+def _faults_of_parameters(
+    convergence: Convergence, gate: Gate, names: tuple[str, ...], never_moves: Bools
+) -> list[str]:
+    """Sentences on the failed rules about parameters; comparisons are written so that nan fails."""
     reasons = []
     if never_moves.any():
-        frozen = ", ".join(name for name, still in zip(names, never_moves, strict=True) if still)
+        frozen = ", ".join(name for name, is_frozen in zip(names, never_moves, strict=True) if is_frozen)
         reasons.append(f"{frozen} never moves in an ensemble: check its prior and its bounds.")
-    if not found.n_taus >= gate.tau_count_min:
+    if not convergence.n_taus >= gate.tau_count_min:
         reasons.append(
-            f"The ensembles hold {found.n_taus:.1f} autocorrelation times of "
-            f"{names[int(np.argmax(found.tau))]}, {gate.tau_count_min:.0f} are wanted: "
-            f"{found.suggested_steps} steps after burn-in would do."
+            f"The ensembles hold {convergence.n_taus:.1f} autocorrelation times of "
+            f"{names[int(np.argmax(convergence.tau))]}, {gate.tau_count_min:.0f} are wanted: "
+            f"{convergence.suggested_steps} steps after burn-in would do."
         )
-    if not found.rhat_max <= gate.rhat_max:
+    if not convergence.rhat_max <= gate.rhat_max:
         reasons.append(
-            f"The ensembles disagree about {names[int(np.argmax(found.rhat))]} (R-hat {found.rhat_max:.3f}, at most "
-            f"{gate.rhat_max:g} is wanted): the posterior may have several peaks; look at labels, sizes and prior."
+            f"The ensembles disagree about {names[int(np.argmax(convergence.rhat))]} "
+            f"(R-hat {convergence.rhat_max:.3f}, at most {gate.rhat_max:g} is wanted): the posterior may have several "
+            "peaks; look at labels, sizes and prior."
         )
-    if not found.ess_min >= gate.ess_min:
+    if not convergence.ess_min >= gate.ess_min:
         reasons.append(
-            f"The effective sample size of {names[int(np.argmin(found.ess))]} is {found.ess_min:.0f}, "
+            f"The effective sample size of {names[int(np.argmin(convergence.ess))]} is {convergence.ess_min:.0f}, "
             f"{gate.ess_min:.0f} is wanted: more steps would do."
         )
     return reasons
 
 
-def _faults_of_walkers(by_walker: Floats, gate: Gate) -> list[str]:
+def _faults_of_walkers(acceptance: Floats, gate: Gate) -> list[str]:
     reasons = [
         f"Ensemble {number} accepts {100 * fraction:.0f} % of its proposals, at least "
         f"{100 * gate.acceptance_min:.0f} % is wanted: the posterior has a sharp edge or a long thin tail; "
         "tighten the priors or check the data."
-        for number, fraction in enumerate(by_walker.mean(axis=1), start=1)
+        for number, fraction in enumerate(acceptance.mean(axis=1), start=1)
         if not fraction >= gate.acceptance_min
     ]
-    n_stuck = int(np.sum(by_walker < gate.walker_acceptance_min))
+    n_stuck = int(np.sum(acceptance < gate.walker_acceptance_min))
     if n_stuck:
         reasons.append(
-            f"{n_stuck} of {by_walker.size} walkers hardly ever move: they sit far from the others; change the seed, "
+            f"{n_stuck} of {acceptance.size} walkers hardly ever move: they sit far from the others; change the seed, "
             "and check the data if it stays."
         )
     return reasons

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.arrays import Floats
-from bayesplate.board.board import density
-from bayesplate.board.material import MODULI, RIGIDITIES, Derived, derived_quantities, moduli
+from bayesplate.board.board import board_density
+from bayesplate.board.material import MODULI, RIGIDITIES, DerivedQuantity, derived_quantities, moduli
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.posing import PosedProblem
-from bayesplate.streams import stream
+from bayesplate.streams import random_stream
 
 
 @dataclass(frozen=True, eq=False)
 class Draws:
-    """Thinned draws of an inference; every array starts with (n_chains, n_draws), chain = ensemble; SI."""
+    """Thinned draws of an inference; all arrays start with (n_chains, n_draws), chain = ensemble; SI."""
 
     theta: Floats  # (..., n_dim)
     log_posterior: Floats
@@ -25,11 +25,11 @@ class Draws:
     moduli: Mapping[str, Floats]
     inputs: Mapping[str, Floats]
     noise: Floats  # (..., n_setups), relative
-    derived: Mapping[str, Derived]
+    derived: Mapping[str, DerivedQuantity]
     log_frequency: Floats  # (..., n_modes), ln Hz, under the law of the fit
     every_log_frequency: tuple[Floats, ...]  # per setup (..., n_every): labelled modes, then those that peaks may be
     log_likelihood: Floats  # (..., n_factors), in the order of `Posterior.factors`
-    predictive: Floats  # (..., n_modes), Hz, that the next measurement would read: with noise, rounded as the readings
+    predictive: Floats  # (..., n_modes), Hz, readings of the next measurement: with noise, rounded as the readings
 
     @property
     def flat(self) -> Floats:
@@ -39,7 +39,7 @@ class Draws:
     @property
     def flat_log_frequency(self) -> list[Floats]:
         """ln f (Hz) of all modes at `flat`: one (n, n_every) array per setup."""
-        return [each.reshape(-1, each.shape[-1]) for each in self.every_log_frequency]
+        return [log_frequency.reshape(-1, log_frequency.shape[-1]) for log_frequency in self.every_log_frequency]
 
     @property
     def median_noise(self) -> Floats:
@@ -48,7 +48,7 @@ class Draws:
 
 
 def named_draws(inference: Inference, seed: int, every_log_frequency: Sequence[Floats] | None = None) -> Draws:
-    """Draws of an inference by name; `seed` is of the predictive ones.
+    """Draws of an inference by name; `seed` is for the predictive draws.
 
     `every_log_frequency` is ln f (Hz) of all modes at the thinned draws, (n_draws, n_every) per setup, if known.
     """
@@ -62,10 +62,12 @@ def named_draws(inference: Inference, seed: int, every_log_frequency: Sequence[F
     if every_log_frequency is None:
         every_log_frequency = inference.every_log_frequency
     if every_log_frequency is None:
-        distinct, which = np.unique(flat, axis=0, return_inverse=True)  # where a step was refused the draw stays
-        every_log_frequency = [part[which.ravel()] for part in posterior.every_log_frequency(distinct)]
+        distinct, distinct_index = np.unique(flat, axis=0, return_inverse=True)  # a rejected step repeats its draw
+        every_log_frequency = [
+            log_frequency[distinct_index.ravel()] for log_frequency in posterior.every_log_frequency(distinct)
+        ]
     by_setup = list(every_log_frequency)
-    rng = stream(seed, "predictive")
+    rng = random_stream(seed, "predictive")
     labelled = posterior.labelled(by_setup)
     predictive = [
         readings.simulate(predicted, noise[:, i], rng)
@@ -75,7 +77,7 @@ def named_draws(inference: Inference, seed: int, every_log_frequency: Sequence[F
     def shaped(array: Floats) -> Floats:
         return np.broadcast_to(array, flat.shape[:1] + array.shape[1:]).reshape(*shape, *array.shape[1:])
 
-    derived = derived_quantities(constants, density(values))
+    derived = derived_quantities(constants, board_density(values))
     return Draws(
         theta=inference.theta,
         log_posterior=inference.log_posterior,
@@ -83,9 +85,9 @@ def named_draws(inference: Inference, seed: int, every_log_frequency: Sequence[F
         moduli={name: shaped(array) for name, array in zip(MODULI, constants, strict=True)},
         inputs={name: shaped(values[name]) for name in problem.parameters.inputs},
         noise=shaped(noise),
-        derived={name: Derived(shaped(item.values), item.unit) for name, item in derived.items()},
+        derived={name: DerivedQuantity(shaped(item.values), item.unit) for name, item in derived.items()},
         log_frequency=shaped(np.concatenate(labelled, axis=1)),
-        every_log_frequency=tuple(shaped(each) for each in by_setup),
+        every_log_frequency=tuple(shaped(log_frequency) for log_frequency in by_setup),
         log_likelihood=shaped(posterior.log_likelihood_of(by_setup, flat)),
         predictive=shaped(np.concatenate(predictive, axis=1)),
     )
@@ -93,5 +95,5 @@ def named_draws(inference: Inference, seed: int, every_log_frequency: Sequence[F
 
 def posterior_mean_values(problem: PosedProblem, draws: Draws) -> dict[str, Floats]:
     """Constants and inputs at their posterior means."""
-    means = {name: np.asarray(v.mean()) for name, v in {**draws.rigidities, **draws.inputs}.items()}
+    means = {name: np.asarray(values.mean()) for name, values in {**draws.rigidities, **draws.inputs}.items()}
     return {**problem.board.nominal(), **means}

@@ -1,4 +1,4 @@
-"""Walkers: ensembles of emcee with random streams of their own, and the pilot that shows them where to begin."""
+"""Walkers: ensembles of emcee with separate random streams, and the pilot walk that gives their starting points."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from bayesplate.arrays import Floats
 from bayesplate.posterior.checkpoint import Snapshot
 from bayesplate.posterior.mixture import Mixture
 from bayesplate.posterior.moves import moves
-from bayesplate.posterior.starts import LogDensity, around_estimate, finite_starts
-from bayesplate.streams import stream
+from bayesplate.posterior.starts import LogDensity, draws_around_estimate, finite_starts
+from bayesplate.streams import random_stream
 
 _PILOT_STEPS = 40
 FEWEST_ROUNDS, _MOST_ROUNDS = 3, 60
 _PAIRS_A_ROUND = 8
-"""Pairs of parameters for which a pilot that teaches proposals makes one round."""
-_TEACH_AGAIN = 1.2
-"""Times as many rounds, after which proposals are taught anew."""
-_RISE = 1.0
-"""Of the mean log density from one round of the pilot to the next, from which on it is still on its way."""
+"""Pairs of parameters for each round of a pilot whose proposals the ensembles use."""
+_REFIT_RATIO = 1.2
+"""Ratio of the number of rounds from one fit of the proposals to the next."""
+_LEAST_RISE = 1.0
+"""A pilot whose mean log density rises by this much from one round to the next has not arrived."""
 
 
 class Ensembles:
@@ -43,7 +43,7 @@ class Ensembles:
         self._backends: list[Any] = []
 
     def begin(self, saved: Snapshot | None) -> None:
-        """Take up a run that was saved, or begin a new one."""
+        """Continue a saved run, or begin a new one."""
         from emcee.backends import Backend
 
         if saved is None:
@@ -54,48 +54,48 @@ class Ensembles:
     @cached_property
     def pilot(self) -> Pilot:
         """The walk from the starts to where the ensembles begin."""
-        rng, n_walkers = stream(self.seed, "pilot"), self.shape[0] * self.shape[1]
+        rng, n_walkers = random_stream(self.seed, "pilot"), self.shape[0] * self.shape[1]
         if self.near is not None:
-            return pilot_from(self.log_density, self.near, rng, n_walkers)
+            return pilot_from_draws(self.log_density, self.near, rng, n_walkers)
         n_rounds = len(self.centre) ** 2 // _PAIRS_A_ROUND
         return pilot(self.log_density, self.centre, self.factor, rng, n_walkers, n_rounds)
 
     @property
     def chain(self) -> Floats:
         """(n_ensembles, n_steps, n_walkers, n_dim) array."""
-        return np.stack([one.chain for one in self._backends])
+        return np.stack([backend.chain for backend in self._backends])
 
     @property
     def log_prob(self) -> Floats:
         """(n_ensembles, n_steps, n_walkers) array."""
-        return np.stack([one.log_prob for one in self._backends])
+        return np.stack([backend.log_prob for backend in self._backends])
 
     @property
     def snapshot(self) -> Snapshot:
         """State of the run."""
-        states = [one.random_state for one in self._backends]
+        states = [backend.random_state for backend in self._backends]
         return Snapshot(tuple(self._backends), states, self.n_steps)
 
     def advance(self, n_steps: int) -> None:
-        """Let all ensembles make `n_steps`."""
+        """Advance all ensembles by `n_steps`."""
         for i, backend in enumerate(self._backends):
             start = None if self.n_steps else self._start(i)
-            walk(self.log_density, self.pilot.mixture, backend, start, n_steps)
+            advance_ensemble(self.log_density, self.pilot.mixture, backend, start, n_steps)
         self.n_steps += n_steps
 
     def _start(self, ensemble: int) -> Any:
-        """Start of an ensemble: its share of the pilot's walkers, and random numbers of its own."""
+        """Start of an ensemble: its share of the pilot's walkers, and its own random stream."""
         import emcee
 
-        own = slice(ensemble, None, self.shape[0])
-        state = random_state(stream(self.seed, "ensemble", ensemble))
-        return emcee.State(self.pilot.points[own], log_prob=self.pilot.log_prob[own], random_state=state)
+        walkers = slice(ensemble, None, self.shape[0])
+        state = random_state(random_stream(self.seed, "ensemble", ensemble))
+        return emcee.State(self.pilot.points[walkers], log_prob=self.pilot.log_prob[walkers], random_state=state)
 
 
-def walk(log_density: LogDensity, mixture: Mixture, backend: Any, start: Any, n_steps: int) -> None:
-    """Let the walkers of one ensemble make `n_steps`, from the end of its backend unless a start is given.
+def advance_ensemble(log_density: LogDensity, mixture: Mixture, backend: Any, start: Any, n_steps: int) -> None:
+    """Advance the walkers of one ensemble by `n_steps`, from the end of its backend unless a start is given.
 
-    emcee's own check that walkers span the space depends on the units of the parameters, and is left out.
+    emcee's check that walkers span the space depends on the units of the parameters, and is skipped.
     """
     import emcee
 
@@ -114,11 +114,11 @@ def random_state(rng: np.random.Generator) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Pilot:
-    """Result of a walk to the posterior: where the ensembles begin, and their proposals."""
+    """Result of a pilot walk to the posterior: starting points of the ensembles, and their proposals."""
 
     draws: Floats  # (n_draws, n_dim), of the last third of its rounds: near the posterior
     mixture: Mixture  # fitted to the last two thirds of its rounds
-    points: Floats  # (n_walkers, n_dim), the last ones
+    points: Floats  # (n_walkers, n_dim), the last points of the walkers
     log_prob: Floats  # (n_walkers,)
 
 
@@ -130,27 +130,27 @@ def pilot(
     n_walkers: int = 128,
     fewest_rounds: int = FEWEST_ROUNDS,
 ) -> Pilot:
-    """Walk from three standard errors around the estimate, in rounds each of which teaches the next, until arrived.
+    """Walk from three standard errors around the estimate to the posterior, in rounds that improve the proposals.
 
     `factor` is the lower Cholesky factor of the estimate's covariance.
     """
     import emcee
 
-    points, log_prob = finite_starts(log_density, around_estimate(centre, factor, rng), n_walkers)
+    points, log_prob = finite_starts(log_density, draws_around_estimate(centre, factor, rng), n_walkers)
     start: Any = emcee.State(points, log_prob=log_prob, random_state=random_state(rng))
-    backend, mixture, before = emcee.backends.Backend(), Mixture.with_covariance(centre, factor @ factor.T), -np.inf
+    backend, mixture, previous = emcee.backends.Backend(), Mixture.with_covariance(centre, factor @ factor.T), -np.inf
     fewest_rounds = min(max(fewest_rounds, FEWEST_ROUNDS), _MOST_ROUNDS)
-    due = 1
+    next_fit = 1
     for n_rounds in range(1, _MOST_ROUNDS + 1):
-        walk(log_density, mixture, backend, start, _PILOT_STEPS)
-        start, now = None, float(backend.log_prob[-_PILOT_STEPS:].mean())
-        is_last = n_rounds == _MOST_ROUNDS or (n_rounds >= fewest_rounds and now - before < _RISE)
-        if n_rounds >= due or is_last:
+        advance_ensemble(log_density, mixture, backend, start, _PILOT_STEPS)
+        start, mean = None, float(backend.log_prob[-_PILOT_STEPS:].mean())
+        is_last = n_rounds == _MOST_ROUNDS or (n_rounds >= fewest_rounds and mean - previous < _LEAST_RISE)
+        if n_rounds >= next_fit or is_last:
             mixture = Mixture.fitted(_last_rounds(backend, n_rounds, 2))
-            due = max(n_rounds + 1, int(_TEACH_AGAIN * n_rounds))
+            next_fit = max(n_rounds + 1, int(_REFIT_RATIO * n_rounds))
         if is_last:
             break
-        before = now
+        previous = mean
     draws = _last_rounds(backend, n_rounds, 1).reshape(-1, len(centre))
     return Pilot(draws, mixture, backend.chain[-1], backend.log_prob[-1])
 
@@ -160,7 +160,7 @@ def _last_rounds(backend: Any, n_rounds: int, thirds: int) -> Floats:
     return np.asarray(backend.chain[-_PILOT_STEPS * max(1, thirds * n_rounds // 3) :])
 
 
-def pilot_from(log_density: LogDensity, near: Floats, rng: np.random.Generator, n_walkers: int) -> Pilot:
+def pilot_from_draws(log_density: LogDensity, near: Floats, rng: np.random.Generator, n_walkers: int) -> Pilot:
     """A pilot without a walk, from (n_draws, n_dim) draws of nearly the same density."""
     starts = finite_starts(log_density, lambda n: near[rng.integers(len(near), size=n)], n_walkers)
     return Pilot(near, Mixture.fitted(near), *starts)

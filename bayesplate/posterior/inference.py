@@ -1,4 +1,4 @@
-"""From a problem to draws of its posterior, under its law or weighted to it from a surrogate."""
+"""Draws of a problem's posterior, sampled under its law or weighted to it from a surrogate."""
 
 from __future__ import annotations
 
@@ -12,15 +12,21 @@ from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
-from bayesplate.posterior.statistics import effective_share, may_stand, resampled, smoothed, thin_walker_major
-from bayesplate.posterior.surrogate import Solved, Surrogate, find_surrogate, with_surrogate
+from bayesplate.posterior.statistics import (
+    effective_share,
+    resample,
+    smooth_weights,
+    thin_walker_major,
+    weights_suffice,
+)
+from bayesplate.posterior.surrogate import LawPoints, Surrogate, find_surrogate, with_surrogate
 from bayesplate.posterior.tails import TailCoordinates
 from bayesplate.posterior.target import Posterior
-from bayesplate.streams import stream
+from bayesplate.streams import random_stream
 
 MOST_DRAWS_A_CHAIN, MOST_WEIGHTED_A_CHAIN = 4000, 1000
 _WALKS = "surrogate", "surrogate-taught"
-"""Walks on a surrogate, by their places in a checkpoint."""
+"""Walks on a surrogate, by their folders in a checkpoint."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +36,9 @@ class Inference:
     problem: PosedProblem
     chains: Chains  # the whole walk, under the law of the problem or under a surrogate of it
     convergence: Convergence
-    theta: Floats  # (n_chains, n_draws, n_dim), thinned, chain = ensemble; of a surrogate drawn again by weight
+    theta: Floats  # (n_chains, n_draws, n_dim), thinned, chain = ensemble; resampled by weight if from a surrogate
     log_posterior: Floats  # (n_chains, n_draws)
-    # of each setup (n_chains * n_draws, n_every), ln Hz, if known
+    # for each setup (n_chains * n_draws, n_every), ln Hz, if known
     every_log_frequency: tuple[Floats, ...] | None = None
     surrogate: Surrogate | None = None  # of the exact law, on which the walkers walked
     pareto_k: float | None = None  # k-hat of the weights from the surrogate to the exact law
@@ -47,9 +53,9 @@ def infer(
 ) -> Inference:
     """Sample the posterior of a problem in coordinates that shorten its tails.
 
-    Under the exact law the walkers walk on a surrogate of it, unless the law was asked for, and the draws are weighted
-    to the law by Pareto-smoothed importance sampling. Where too few count, what the law gave at them teaches the
-    surrogate, and the walk is made again; where too few count then, the law itself is sampled.
+    Under the exact law the walkers walk on a surrogate of it, unless the user chose the law, and the draws are weighted
+    to the law by Pareto-smoothed importance sampling. Where the effective sample is too small, the surrogate is fitted
+    again with the law's values at these draws, and the walk is repeated; if that fails, the law itself is sampled.
 
     The chains hold theta, the columns of `Parameters`, and the log density of theta under the surrogate or the law.
 
@@ -63,7 +69,9 @@ def infer(
     )
     posterior = problem.posterior
 
-    def walked(density: Posterior, saved: Checkpoint | None, near: Floats | None = None) -> tuple[Chains, Convergence]:
+    def walk(
+        density: Posterior, walk_checkpoint: Checkpoint | None, near: Floats | None = None
+    ) -> tuple[Chains, Convergence]:
         chains, convergence = sample(
             coordinates.density(density),
             coordinates.start,
@@ -71,7 +79,7 @@ def infer(
             settings,
             names=problem.parameters.names,
             near=None if near is None else coordinates.y(near),
-            checkpoint=saved,
+            checkpoint=walk_checkpoint,
             progress=progress,
         )
         log_density = chains.log_prob - coordinates.log_jacobian(chains.draws)
@@ -80,46 +88,49 @@ def infer(
     surrogate, near = None, None
     if posterior.law == "exact" and not problem.is_forced:
         surrogate = find_surrogate(posterior, problem.centre, problem.covariance, coordinates)
-    for part in _WALKS:
+    for stage in _WALKS:
         if surrogate is None:
             break
-        quick = with_surrogate(posterior, surrogate)
-        found = walked(quick, None if checkpoint is None else checkpoint.part(part), near)
-        weighted, solved = _weighted(problem, surrogate, *found, stream(settings.seed, "weights"))
-        is_walked = found[1].passed
-        if weighted is not None and (weighted.convergence.ess_min >= settings.gate.ess_min or not is_walked):
-            return weighted
+        surrogate_posterior = with_surrogate(posterior, surrogate)
+        run = walk(surrogate_posterior, None if checkpoint is None else checkpoint.part(stage), near)
+        reweighted, law_points = _reweighted(problem, surrogate, *run, random_stream(settings.seed, "weights"))
+        is_walked = run[1].passed
+        if reweighted is not None and (reweighted.convergence.ess_min >= settings.gate.ess_min or not is_walked):
+            return reweighted
         if not is_walked:
             break
-        near = found[0].pooled
-        log_jacobian = coordinates.log_jacobian(coordinates.y(solved.theta))
-        surrogate = surrogate.taught(solved._replace(log_density=solved.log_density + log_jacobian))
-    chains, convergence = walked(posterior, checkpoint, near)
+        near = run[0].pooled
+        log_jacobian = coordinates.log_jacobian(coordinates.y(law_points.theta))
+        surrogate = surrogate.taught(law_points._replace(log_density=law_points.log_density + log_jacobian))
+    chains, convergence = walk(posterior, checkpoint, near)
     theta, log_posterior = (
-        thin_walker_major(part, chains.burn_in, convergence.tau_max, n_draws_max=MOST_DRAWS_A_CHAIN)
-        for part in (chains.draws, chains.log_prob)
+        thin_walker_major(values, chains.burn_in, convergence.tau_max, n_draws_max=MOST_DRAWS_A_CHAIN)
+        for values in (chains.draws, chains.log_prob)
     )
     return Inference(problem, chains, convergence, theta, log_posterior)
 
 
-def _weighted(
+def _reweighted(
     problem: PosedProblem, surrogate: Surrogate, chains: Chains, convergence: Convergence, rng: np.random.Generator
-) -> tuple[Inference | None, Solved]:
-    """Draws of a surrogate, drawn again by their weights under the law, None where too few count; and the law there."""
+) -> tuple[Inference | None, LawPoints]:
+    """Draws of a surrogate resampled by weight under the law, None if the weights do not suffice; and the law there."""
     posterior = problem.posterior
-    thinned, log_walked = (
-        thin_walker_major(part, chains.burn_in, convergence.tau_max, n_draws_max=MOST_WEIGHTED_A_CHAIN)
-        for part in (chains.draws, chains.log_prob)
+    thinned, log_surrogate = (
+        thin_walker_major(values, chains.burn_in, convergence.tau_max, n_draws_max=MOST_WEIGHTED_A_CHAIN)
+        for values in (chains.draws, chains.log_prob)
     )
     n_chains, n_draws, n_dim = thinned.shape
     theta = thinned.reshape(-1, n_dim)
     log_posterior, log_frequency = posterior.evaluate(theta)
-    solved = Solved(theta, log_frequency, log_posterior)
-    weights, pareto_k = smoothed(log_posterior - log_walked.ravel())
-    if not may_stand(weights, pareto_k):
-        return None, solved
-    picked = np.concatenate(
-        [i * n_draws + resampled(part, n_draws, rng) for i, part in enumerate(weights.reshape(n_chains, -1))]
+    law_points = LawPoints(theta, log_frequency, log_posterior)
+    weights, pareto_k = smooth_weights(log_posterior - log_surrogate.ravel())
+    if not weights_suffice(weights, pareto_k):
+        return None, law_points
+    indices = np.concatenate(
+        [
+            i * n_draws + resample(chain_weights, n_draws, rng)
+            for i, chain_weights in enumerate(weights.reshape(n_chains, -1))
+        ]
     )
     share = effective_share(weights)
     ess = np.minimum(convergence.ess, thinned[..., 0].size) * share
@@ -127,10 +138,10 @@ def _weighted(
         problem,
         chains,
         replace(convergence, ess=ess, ess_min=float(ess.min())),
-        theta[picked].reshape(thinned.shape),
-        log_posterior[picked].reshape(n_chains, n_draws),
-        tuple(posterior.by_setup(log_frequency[picked])),
+        theta[indices].reshape(thinned.shape),
+        log_posterior[indices].reshape(n_chains, n_draws),
+        tuple(posterior.by_setup(log_frequency[indices])),
         surrogate,
         pareto_k,
     )
-    return inference, solved
+    return inference, law_points

@@ -1,4 +1,4 @@
-"""Place of the posterior before sampling: its mode, a normal approximation, and the exact law for that region."""
+"""Location of the posterior before sampling: its mode, a normal approximation, and the exact law for that region."""
 
 from __future__ import annotations
 
@@ -13,34 +13,34 @@ from bayesplate.board.board import Board, Values
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.least_squares import Estimate, log_measured
-from bayesplate.estimates.refit import design, most_likely, normal_misfit
+from bayesplate.estimates.refit import design_matrix, most_likely, normal_misfit
 from bayesplate.frequencies.laws import LawName, cents
-from bayesplate.frequencies.model import SetupModel, setup_model, with_exact, with_others
-from bayesplate.frequencies.peaks import takes_part
+from bayesplate.frequencies.model import SetupModel, setup_model, with_exact_law, with_other_modes
+from bayesplate.frequencies.peaks import needs_assignment
 from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.posterior.parameters import Parameters
-from bayesplate.posterior.robust import highest_student, student_weights
+from bayesplate.posterior.robust import most_likely_student, student_weights
 
 _BOX_SDS = 3.0
 _NARROWEST, _WIDEST = 0.1, 0.6
 _N_HELD_OUT = 8
-_INSIDE = 0.1
+_BOUND_MARGIN = 0.1
 _SHARE_OF_NOISE = 0.2
 _ROUGH_CENTS = 1.0
-"""Error of the law that finds the place where it is then made for good: small beside what any reading scatters."""
+"""Accepted error, cents, of the rough law that locates the posterior: small beside the scatter of any reading."""
 _MOST_PLACES = 3
 _SAME_PLACE = 0.1
-"""Of a standard error: by how much the models that are made at a place may disagree with those that found it."""
+"""Difference, in standard errors, of the optima under old and new models at which the models need no further update."""
 _MOST_LEVELS = 20
 _SAME_LEVEL = 1e-3
-"""Change of the logarithm of the noise below which a fit of the inputs is not made again."""
+"""Change of the logarithm of the noise below which the fit of the inputs is not repeated."""
 
 
 class LaplaceApproximation(NamedTuple):
-    """A normal approximation of the posterior, and models made at its centre."""
+    """A normal approximation of the posterior, and models computed at its centre."""
 
-    centre: Floats  # (n_dim,), weighted least squares under the exact law, uncertain inputs moved within their priors
+    centre: Floats  # (n_dim,), weighted least squares under the exact law, uncertain inputs fitted within their priors
     covariance: Floats  # (n_dim, n_dim)
     models: tuple[SetupModel, ...]  # with the linear law at the centre and the exact law around it
 
@@ -50,20 +50,29 @@ def laplace_approximation(
 ) -> LaplaceApproximation:
     """Locate the posterior of a board.
 
-    The rigidities have the covariance of the weighted fit, widened where the residuals exceed the expected noise as
-    far as its prior lets them; noise has its prior's. Where inputs are uncertain the fit may move them, which changes
-    the noise, and the models are made anew at the point it finds, until they find it themselves: a rough law, or names
-    that modes exchange at a veering, may have led astray. Under Student's errors a reading far off weighs little.
-    `spread` is a further covariance of ln D: between several ways to take peaks for modes.
+    The rigidities have the covariance of the weighted fit, widened where the residuals exceed the expected noise as far
+    as the noise's prior allows; the noise has the covariance of its prior. Where inputs are uncertain the fit may move
+    them, which changes the noise; the models are then computed again at the optimum until they give the same optimum,
+    since a rough law, or modes that exchange their names at a veering, may have misled the first fit. Under Student's
+    errors an outlying reading has little weight. `spread` is a further covariance of ln D: between several labellings
+    of the peaks.
     """
     parameters = Parameters(board)
     medians = np.array([setup.noise.median for setup in board.setups])
-    noise, values, made = medians * noise_widenings(board, estimate.residuals), dict(estimate.values), estimate.models
+    noise, values, start_models = (
+        medians * noise_widenings(board, estimate.residuals),
+        dict(estimate.values),
+        estimate.models,
+    )
     if robust:
-        rigidities, noise = highest_student(board, estimate)
+        rigidities, noise = most_likely_student(board, estimate)
         values |= dict(zip(RIGIDITIES, rigidities, strict=True))
-        made = tuple(setup_model(model.system, values, model.plate) for model in made)
-    centre, models, scales = parameters.theta(values, noise), with_peaks(made, values), reading_sd(board.setups, noise)
+        start_models = tuple(setup_model(model.system, values, model.plate) for model in start_models)
+    centre, models, scales = (
+        parameters.theta(values, noise),
+        with_peak_modes(start_models, values),
+        reading_sd(board.setups, noise),
+    )
     if robust:
         residuals = log_measured(board) - np.concatenate([m.log_frequencies(values, "linear")[0] for m in models])
         scales = scales / np.sqrt(student_weights(residuals / scales))
@@ -71,49 +80,49 @@ def laplace_approximation(
     if not parameters.inputs:
         return LaplaceApproximation(centre, covariance, exact_models(board, models, centre, covariance))
     models = exact_models(board, models, centre, covariance, is_rough=True, accepted_cents=_ROUGH_CENTS)
-    found, scales = _fitted(board, models, centre, noise, scales, is_once=robust)
+    optimum, scales = _refit(board, models, centre, noise, scales, is_once=robust)
     for k in range(_MOST_PLACES):
-        centre, values = found, parameters.values_at(found)
-        # Named once, where the rough law led: at a veering names would lead back and forth between two places.
-        made = tuple(setup_model(model.system, values, model.plate, model if k else None) for model in models)
-        models = with_peaks(made, values)
+        centre, values = optimum, parameters.values_at(optimum)
+        # Modes are named only once, at the optimum of the rough law: names would alternate across a veering.
+        start_models = tuple(setup_model(model.system, values, model.plate, model if k else None) for model in models)
+        models = with_peak_modes(start_models, values)
         covariance = _covariance(board, models, scales, centre, spread)
         models = exact_models(board, models, centre, covariance)
         noise = np.exp(parameters.log_noise(centre[None])[0])
-        found, scales = _fitted(board, models, centre, noise, scales, is_once=robust)
-        if np.all(np.abs(found - centre) <= _SAME_PLACE * np.sqrt(np.diagonal(covariance))):
+        optimum, scales = _refit(board, models, centre, noise, scales, is_once=robust)
+        if np.all(np.abs(optimum - centre) <= _SAME_PLACE * np.sqrt(np.diagonal(covariance))):
             break
     return LaplaceApproximation(centre, covariance, models)
 
 
-def _fitted(
+def _refit(
     board: Board, models: Sequence[SetupModel], centre: Floats, noise: Floats, scales: Floats, *, is_once: bool
 ) -> tuple[Floats, Floats]:
-    """Best fit of rigidities and inputs under the exact law, and of the noises to the residuals: theta and scales.
+    """Fit rigidities and inputs under the exact law, and the noises to the residuals: theta and scales.
 
-    `is_once` where the scales are Student's, at the noise that goes with them.
+    `is_once` where the scales are those of Student's errors, whose noise is known already.
     """
     parameters, target = Parameters(board), log_measured(board)
     medians = np.array([setup.noise.median for setup in board.setups])
     columns, bounds = parameters.fitted_columns, parameters.fitted_bounds
     predict, centre = predictor(board, models, "exact", centre), centre.copy()
     for _ in range(_MOST_LEVELS):
-        start = np.clip(centre[columns], bounds.lower + _INSIDE, bounds.upper - _INSIDE)
+        start = np.clip(centre[columns], bounds.lower + _BOUND_MARGIN, bounds.upper - _BOUND_MARGIN)
         if not np.isfinite(predict(start[None, :])).all():
-            raise NotIdentifiableError(_no_plate(board, models, parameters.values_at(centre)))
+            raise NotIdentifiableError(_no_plate_message(board, models, parameters.values_at(centre)))
         centre[columns] = most_likely(predict, normal_misfit(target, scales), start, bounds)
         if is_once:
             break
-        before, noise = noise, medians * noise_widenings(board, target - predict(centre[None, columns])[0])
+        previous_noise, noise = noise, medians * noise_widenings(board, target - predict(centre[None, columns])[0])
         scales = reading_sd(board.setups, noise)
-        if np.abs(np.log(noise / before)).max() < _SAME_LEVEL:
+        if np.abs(np.log(noise / previous_noise)).max() < _SAME_LEVEL:
             break
     centre[parameters.n_constants : parameters.first_input] = np.log(noise)
     return centre, scales
 
 
-def _no_plate(board: Board, models: Sequence[SetupModel], values: Values) -> str:
-    """Message that the plate of least squares is not even near the readings, with the reading it misses most."""
+def _no_plate_message(board: Board, models: Sequence[SetupModel], values: Values) -> str:
+    """Message that the least-squares plate is far from the readings, with the worst reading."""
     target = log_measured(board)
     residuals = target - np.concatenate([model.log_frequencies(values, "linear")[0] for model in models])
     worst = int(np.argmax(np.abs(residuals)))
@@ -124,18 +133,19 @@ def _no_plate(board: Board, models: Sequence[SetupModel], values: Values) -> str
     )
 
 
-def with_peaks(models: Iterable[SetupModel], values: Values) -> tuple[SetupModel, ...]:
-    """The models, with all modes that peaks may be where a setup has such peaks."""
-    return tuple(with_others(model, values) if takes_part(model.setup) else model for model in models)
+def with_peak_modes(models: Iterable[SetupModel], values: Values) -> tuple[SetupModel, ...]:
+    """The models, with all modes that peaks may be where a setup has peaks to assign."""
+    return tuple(with_other_modes(model, values) if needs_assignment(model.setup) else model for model in models)
 
 
 def noise_widenings(board: Board, residuals: Floats) -> Floats:
     """Likely noise of each setup over its prior median, at least 1, from (n_modes,) residuals of ln f: (n_setups,).
 
-    Where all noises are w times their medians a residual r has the variance v = (w median)^2 + own, so that it tells of
-    w by the share s = (w median)^2 / v. With a part p of each reading to spare, the density of ln w is highest where
-    the sum of s (r^2 / v - p) is ln(w) / log_sd^2. A narrow prior keeps the noise at its median whatever the residuals;
-    a wide one lets it follow them as far as rounding and own uncertainties leave them unexplained.
+    Where all noises are w times their medians, a residual r has the variance v = (w median)^2 + its own variance, and
+    informs on w by the share s = (w median)^2 / v. With a fraction p of a degree of freedom for each reading, the
+    density of ln w is highest where the sum of s (r^2 / v - p) is ln(w) / log_sd^2. A narrow prior keeps the noise at
+    its median whatever the residuals; a wide one lets it follow the part of the residuals that rounding and own
+    uncertainties do not explain.
     """
     from scipy.optimize import brentq
 
@@ -158,7 +168,7 @@ def noise_widenings(board: Board, residuals: Floats) -> Floats:
     return np.array([likely(setup.noise.log_sd) for setup in board.setups])
 
 
-def every_predictor(board: Board, models: Sequence[SetupModel], law: LawName, centre: Floats) -> Predictor:
+def all_modes_predictor(board: Board, models: Sequence[SetupModel], law: LawName, centre: Floats) -> Predictor:
     """ln f (Hz) of all modes that peaks may be as a function of the fitted columns, noise as in `centre`."""
     parameters = Parameters(board)
 
@@ -171,17 +181,17 @@ def every_predictor(board: Board, models: Sequence[SetupModel], law: LawName, ce
 
 
 def predictor(board: Board, models: Sequence[SetupModel], law: LawName, centre: Floats) -> Predictor:
-    """ln f (Hz) of the labelled modes, as `every_predictor`."""
-    return every_predictor(board, models, law, centre).of_labelled()
+    """ln f (Hz) of the labelled modes, as `all_modes_predictor`."""
+    return all_modes_predictor(board, models, law, centre).of_labelled()
 
 
 def _covariance(
     board: Board, models: Sequence[SetupModel], scales: Floats, centre: Floats, spread: Floats | None
 ) -> Floats:
-    """Covariance of all columns: of the weighted fit for the fitted ones, of the prior for the noise."""
+    """Covariance of all columns: from the weighted fit for the fitted columns, from the prior for the noise."""
     parameters = Parameters(board)
     n, columns = parameters.n_constants, parameters.fitted_columns
-    weighted = design(predictor(board, models, "linear", centre), scales, centre[columns])
+    weighted = design_matrix(predictor(board, models, "linear", centre), scales, centre[columns])
     covariance = np.zeros((parameters.n_dim, parameters.n_dim))
     covariance[np.ix_(columns, columns)] = np.linalg.inv(weighted.T @ weighted)
     for i, setup in enumerate(board.setups, start=n):
@@ -203,14 +213,13 @@ def exact_models(
     """Models with the exact law, trained at the centre and at the corners of a box around it.
 
     The box spans D_x / D_s, D_y / D_s and, where it is uncertain, nu_xy: frequencies of a bare plate are homogeneous in
-    the rigidities, so a common factor needs no training, and side lengths only rescale the same terms; of an isotropic
+    the rigidities, so a common factor needs no training, and side lengths only rescale the same terms; for an isotropic
     board it spans D itself, which does no harm. Parameters of effects, and inputs that their fields follow, add the two
-    ends of their own range, each beside an opposite corner of the box, and effects whose place is open the places all
-    over the board. The law is checked at places of the box with sizes of effects as likely as their own normal
-    approximation says, and further points are solved until the error there is below `accepted_cents`.
+    ends of their own range, each combined with an opposite corner of the box; effects at an unknown place add places
+    over the whole board. The law is checked at points of the box with sizes of effects drawn from their normal
+    approximation, and further points are solved until the error there is below `accepted_cents`.
 
-    A rough law has two opposite corners, one end per effect and one check: near the centre the error is small all the
-    same.
+    A rough law has two opposite corners, one end for each effect and one check: its error near the centre is small too.
     """
     parameters = Parameters(board)
     n = parameters.n_constants
@@ -221,60 +230,60 @@ def exact_models(
     half_widths[boxed] = np.clip(_BOX_SDS * np.sqrt(np.diagonal(spread)), _NARROWEST, _WIDEST)
     sds = np.sqrt(np.diagonal(covariance))
     followed = {name for model in models for effect in model.system.effects for name in effect.goes_with}
-    alone = []
+    stretched = []
     for i, parameter in enumerate(parameters.uncertain, start=parameters.first_input):
         if parameter.name == "poisson_xy":
             boxed.append(i)
             half_widths[i] = _BOX_SDS
         elif parameter.is_of_effect or parameter.name in followed:
-            alone.append(i)
+            stretched.append(i)
             half_widths[i] = _BOX_SDS * sds[i]
     corners = np.zeros((2 ** len(boxed), parameters.n_dim))
     corners[:, boxed] = list(product((-1.0, 1.0), repeat=len(boxed)))
-    ends = np.zeros((2 * len(alone), parameters.n_dim))
-    for row, i in enumerate(alone):
+    ends = np.zeros((2 * len(stretched), parameters.n_dim))
+    for row, i in enumerate(stretched):
         ends[2 * row, [*boxed, i]] = [*corners[row % len(corners), boxed], 1.0]
         ends[2 * row + 1, [*boxed, i]] = [*-corners[row % len(corners), boxed], -1.0]
-    half = [corners[[0, -1]], ends[::2]]
+    half_box = [corners[[0, -1]], ends[::2]]
     reach = _BOX_SDS * sds
-    everywhere = _also_at(models, parameters, centre, reach) / np.where(half_widths > 0.0, half_widths, 1.0)
-    corners = np.concatenate(half if is_rough else [*half, corners[1:-1], ends[1::2], everywhere])
+    effect_points = _effect_steps(models, parameters, centre, reach) / np.where(half_widths > 0.0, half_widths, 1.0)
+    corners = np.concatenate(half_box if is_rough else [*half_box, corners[1:-1], ends[1::2], effect_points])
     n_held_out = 1 if is_rough else _N_HELD_OUT
     rng = np.random.default_rng(0)
     held_out = half_widths * rng.uniform(-1.0, 1.0, (n_held_out, parameters.n_dim))
-    # Sizes of effects are often known to a factor only: what lies far out in all of them at once counts for nothing.
-    held_out[:, alone] = sds[alone] * rng.standard_normal((n_held_out, len(alone)))
+    # Sizes of effects are often known to a factor only: points far out in all of them at once have no probability.
+    held_out[:, stretched] = sds[stretched] * rng.standard_normal((n_held_out, len(stretched)))
 
     def points(steps: Floats) -> list[Values]:
         values = parameters.values(parameters.within_bounds(centre + steps))
         columns = {name: np.broadcast_to(value, len(steps)) for name, value in values.items()}
         return [{name: column[i] for name, column in columns.items()} for i in range(len(steps))]
 
-    (middle,) = points(np.zeros((1, parameters.n_dim)))
+    (centre_values,) = points(np.zeros((1, parameters.n_dim)))
     around, checks = points(half_widths * corners), points(held_out)
     tolerance = law_tolerance(board) if accepted_cents is None else accepted_cents
-    return tuple(with_exact(model, middle, around, checks, tolerance) for model in models)
+    return tuple(with_exact_law(model, centre_values, around, checks, tolerance) for model in models)
 
 
 def law_tolerance(board: Board) -> float:
-    """Error of an exact law, cents, that is small beside the scatter of any reading: a fifth of the least."""
+    """Accepted error of an exact law, cents: a fifth of the least scatter of any reading."""
     medians = np.array([setup.noise.median for setup in board.setups])
     return _SHARE_OF_NOISE * float(cents(reading_sd(board.setups, medians).min()))
 
 
-def _also_at(models: Sequence[SetupModel], parameters: Parameters, centre: Floats, reach: Floats) -> Floats:
-    """Steps from the centre to further places where effects want the law to be made: (n_points, n_dim) array.
+def _effect_steps(models: Sequence[SetupModel], parameters: Parameters, centre: Floats, reach: Floats) -> Floats:
+    """Steps from the centre to further training points that effects need: (n_points, n_dim) array.
 
-    A share of 0 is the lower end of what a parameter reaches within the bounds of its prior, and 1 the upper end; one
-    that is exact stays.
+    A share of 0 is the lower end of a parameter's range within the bounds of its prior, and 1 the upper end; an exact
+    parameter is not moved.
     """
-    asked = dict.fromkeys(
-        tuple(each.items()) for model in models for effect in model.system.effects for each in effect.also_at()
+    share_sets = dict.fromkeys(
+        tuple(shares.items()) for model in models for effect in model.system.effects for shares in effect.also_at()
     )
     column = {name: i for i, name in enumerate(parameters.inputs, start=parameters.first_input)}
     low, high = parameters.within_bounds(np.stack([centre - reach, centre + reach]))
-    steps = np.zeros((len(asked), parameters.n_dim))
-    for step, shares in zip(steps, asked, strict=True):
+    steps = np.zeros((len(share_sets), parameters.n_dim))
+    for step, shares in zip(steps, share_sets, strict=True):
         for name, share in shares:
             if name in column:
                 i = column[name]
@@ -291,5 +300,5 @@ def linearisation_errors(board: Board, models: Sequence[SetupModel], theta: Floa
     """Linear less exact law at each draw, of all modes of the likelihood: (n_draws, n_every) array, cents."""
     values = Parameters(board).values(theta)
     laws = [[model.every_log_frequency(values, law) for model in models] for law in get_args(LawName)]
-    parts = [linear - exact for linear, exact in zip(*laws, strict=True)]
-    return cents(np.concatenate(parts, axis=1))
+    errors = [linear - exact for linear, exact in zip(*laws, strict=True)]
+    return cents(np.concatenate(errors, axis=1))

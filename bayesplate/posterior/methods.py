@@ -1,4 +1,4 @@
-"""Every method's constants of a board, and how far the exact frequencies at each of them miss the readings."""
+"""The constants of a board by each method, and the errors of the exact frequencies at these constants."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Method:
 
     name: str
     mean: Mapping[str, float]  # E_x, E_y, G_xy; nan where the method finds no plate
-    misses: Floats  # (n_modes,), ln predicted - ln measured by full solves at these; nan if they are no plate's
+    misses: Floats  # (n_modes,), ln predicted - ln measured by full solves; nan if the constants are of no plate
     sd: Mapping[str, float] = field(default_factory=dict)  # empty where the method gives none
     interval: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # middle 90 % of a posterior, or empty
     condition_number: float | None = None  # of least squares
@@ -35,23 +35,23 @@ class Method:
 def point_methods(problem: PosedProblem, system: PaperSystem, expected_sd: Mapping[str, float]) -> list[Method]:
     """The methods without sampling: the paper's least squares, weighted least squares, percentile.
 
-    The last is left out where there are too many modes, or none of its estimates is positive. `expected_sd` is the
-    relative standard deviation of the weighted estimate of each modulus.
+    The percentile method is left out where there are too many modes, or none of its estimates is positive.
+    `expected_sd` is the relative standard deviation of the weighted estimate of each modulus.
     """
     nominal, estimate, paper = problem.board.nominal(), problem.estimate, system.solve()
     D_x, D_y, D_s = estimate.rigidities
-    weighted = _named(moduli(D_x, D_y, D_s, estimate.values["thickness"], estimate.values["poisson_xy"]))
+    weighted = _by_modulus(moduli(D_x, D_y, D_s, estimate.values["thickness"], estimate.values["poisson_xy"]))
     methods = [
         Method(
             "paper_least_squares",
-            _named(system.moduli(paper)),
-            misses(problem, nominal | dict(zip(RIGIDITIES, paper, strict=True))),
+            _by_modulus(system.moduli(paper)),
+            prediction_misses(problem, nominal | dict(zip(RIGIDITIES, paper, strict=True))),
             condition_number=system.condition_number,
         ),
         Method(
             "weighted_least_squares",
             weighted,
-            misses(problem, estimate.values),
+            prediction_misses(problem, estimate.values),
             sd={name: expected_sd[name] * value for name, value in weighted.items()},
             condition_number=problem.identifiability.condition_number,
         ),
@@ -64,7 +64,7 @@ def point_methods(problem: PosedProblem, system: PaperSystem, expected_sd: Mappi
             Method(
                 "percentile",
                 percentile.mean,
-                misses(problem, nominal | constants._asdict()),
+                prediction_misses(problem, nominal | constants._asdict()),
                 sd=percentile.sd,
                 n_subsets=percentile.n_subsets,
             )
@@ -80,22 +80,22 @@ def posterior_method(name: str, problem: PosedProblem, draws: Draws, weights: Fl
         mean[modulus] = weighted_mean(values, weights)
         sd[modulus] = float(np.sqrt(weighted_mean((values - mean[modulus]) ** 2, weights)))
         order = np.argsort(values)
-        places = np.cumsum(weights[order]) - 0.5 * weights[order]
-        low, high = np.interp([0.05, 0.95], places, values[order])
+        levels = np.cumsum(weights[order]) - 0.5 * weights[order]
+        low, high = np.interp([0.05, 0.95], levels, values[order])
         interval[modulus] = (float(low), float(high))
     sampled = {**draws.rigidities, **draws.inputs}
     means = {key: np.asarray(weighted_mean(values.ravel(), weights)) for key, values in sampled.items()}
-    at_means = misses(problem, {**posterior_mean_values(problem, draws), **means})
+    at_means = prediction_misses(problem, {**posterior_mean_values(problem, draws), **means})
     return Method(name, mean, at_means, sd=sd, interval=interval)
 
 
-def misses(problem: PosedProblem, values: Values) -> Floats:
-    """ln predicted - ln measured of each reading, by full solves: (n_modes,); nan if the constants are no plate's."""
+def prediction_misses(problem: PosedProblem, values: Values) -> Floats:
+    """ln predicted - ln measured of each reading, by full solves: (n_modes,); nan if the constants are of no plate."""
     if not all(float(values[name]) > 0 for name in RIGIDITIES):
         return np.full(log_measured(problem.board).size, np.nan)
     predicted = [full_log_frequencies(model, values) for model in problem.posterior.models]
     return np.asarray(np.concatenate(predicted) - log_measured(problem.board))
 
 
-def _named(constants: tuple[Floats, ...]) -> dict[str, float]:
+def _by_modulus(constants: tuple[Floats, ...]) -> dict[str, float]:
     return {name: float(value) for name, value in zip(MODULI, constants, strict=True)}

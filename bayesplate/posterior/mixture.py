@@ -1,8 +1,8 @@
 """A mixture of Student distributions, fitted to draws: the distribution of independent proposals.
 
-A posterior of a plate is nearly normal given its noise, and the wider the larger the noise is: one ellipsoid fits it
-but roughly, a few of them fit it well. Proposals from a mixture of four are accepted seven times out of ten where those
-from one Student distribution are accepted five times, and the autocorrelation time of such steps is half as long.
+The posterior of a plate is nearly normal given the noise, and wider for a larger noise: one ellipsoid fits it only
+roughly, a few fit it well. Proposals from a mixture of four are accepted seven times out of ten where those from one
+Student distribution are accepted five times, and the autocorrelation time is half as long.
 
 References
 ----------
@@ -20,13 +20,13 @@ import numpy as np
 from bayesplate.arrays import Floats
 
 DEGREES_OF_FREEDOM = 6.0
-"""Of each part: heavier tails than the posterior's, or walkers far out would stay there."""
+"""Degrees of freedom of each part: with lighter tails than the posterior's, distant walkers would not move."""
 N_PARTS = 4
 _N_PASSES = 15
 _FEWEST_PER_NUMBER, _MOST_PER_NUMBER = 10, 200
-"""Draws for each number of a part's mean and covariance: fewer, and it follows single walkers; more only add time."""
+"""Draws for each number in a part's mean and covariance: fewer would fit single walkers, more would only add time."""
 _FLOOR = 1e-3
-"""Share of the covariance of all draws that each part keeps, so that none shrinks to a point."""
+"""Share of the covariance of all draws added to that of each part, so that none shrinks to a point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,10 +51,10 @@ class Mixture:
 
     @classmethod
     def fitted(cls, draws: Floats) -> Mixture:
-        """The mixture of greatest likelihood, nearly, for (..., n_dim) draws; fewer parts where the draws are few.
+        """Nearly the mixture of greatest likelihood for (..., n_dim) draws; with fewer parts where the draws are few.
 
-        Started from the draws in order of their distance from the mean, in as many shells as there are parts: what one
-        ellipsoid misses first is how the density falls off, so the start needs no random numbers.
+        The parts start as shells of draws by distance from the mean: the fall of the density is the first thing that
+        one ellipsoid misses, and such a start needs no random numbers.
         """
         flat = draws.reshape(-1, draws.shape[-1])
         n_dim = flat.shape[1]
@@ -69,7 +69,7 @@ class Mixture:
         shares = np.eye(n_parts)[order * n_parts // len(flat)].T * 0.9 + 0.1 / n_parts
         pulls = np.ones_like(shares)
         for _ in range(_N_PASSES):
-            mixture = cls._of_shares(flat, shares, pulls, floor)
+            mixture = cls._from_shares(flat, shares, pulls, floor)
             distances = mixture.squared_distances(flat)
             logs = mixture._log_shares(distances)
             shares = np.exp(logs - np.logaddexp.reduce(logs, axis=0))
@@ -77,23 +77,23 @@ class Mixture:
         return mixture
 
     @classmethod
-    def _of_shares(cls, flat: Floats, shares: Floats, pulls: Floats, floor: Floats) -> Mixture:
-        """The mixture of greatest likelihood given which part each draw belongs to, in (n_parts, n_draws) shares."""
+    def _from_shares(cls, flat: Floats, shares: Floats, pulls: Floats, floor: Floats) -> Mixture:
+        """The mixture of greatest likelihood given the (n_parts, n_draws) shares of each draw in the parts."""
         centres, factors = [], []
         for share, weight in zip(shares, shares * pulls, strict=True):
             centres.append(weight @ flat / weight.sum())
-            away = flat - centres[-1]
-            factors.append(_cholesky((weight[:, None] * away).T @ away / share.sum() + floor))
+            deviations = flat - centres[-1]
+            factors.append(_cholesky((weight[:, None] * deviations).T @ deviations / share.sum() + floor))
         return cls(shares.mean(axis=1), np.stack(centres), np.stack(factors))
 
     def widened(self, factor: float) -> Mixture:
-        """The same and itself `factor` times as wide, half and half."""
+        """Half this mixture and half the same one `factor` times as wide."""
         factors = np.concatenate([self.factors, factor * self.factors])
         return Mixture(np.tile(0.5 * self.weights, 2), np.tile(self.centres, (2, 1)), factors)
 
     @cached_property
     def _whitenings(self) -> Floats:
-        """Inverses of the factors, transposed: solving at each step would wake threads that cost ten steps."""
+        """Inverses of the factors, transposed: a solve at each step would start threads that cost ten steps."""
         return np.swapaxes(np.linalg.inv(self.factors), 1, 2)
 
     @cached_property
@@ -101,8 +101,8 @@ class Mixture:
         """Logarithm of each part's density at its centre, times its weight: (n_parts,) array."""
         n_dim, nu = self.centres.shape[1], DEGREES_OF_FREEDOM
         log_volumes = np.log(np.diagonal(self.factors, axis1=1, axis2=2)).sum(axis=1)
-        of_all = lgamma(0.5 * (nu + n_dim)) - lgamma(0.5 * nu) - 0.5 * n_dim * np.log(nu * np.pi)
-        return np.log(self.weights) + of_all - log_volumes
+        log_constant = lgamma(0.5 * (nu + n_dim)) - lgamma(0.5 * nu) - 0.5 * n_dim * np.log(nu * np.pi)
+        return np.log(self.weights) + log_constant - log_volumes
 
     def squared_distances(self, points: Floats) -> Floats:
         """Squared Mahalanobis distances in units of the scale matrices: (n_parts, n) array from (n, n_dim) points."""
@@ -110,7 +110,7 @@ class Mixture:
         return np.einsum("kni,kni->kn", z, z)
 
     def _log_shares(self, distances: Floats) -> Floats:
-        """Logarithm of what each part has of the density, from squared distances: (n_parts, n) array."""
+        """Logarithm of each part's contribution to the density, from squared distances: (n_parts, n) array."""
         power = 0.5 * (DEGREES_OF_FREEDOM + self.centres.shape[1])
         return np.asarray(self._log_peaks[:, None] - power * np.log1p(distances / DEGREES_OF_FREEDOM))
 
@@ -126,8 +126,8 @@ class Mixture:
         chosen = np.searchsorted(np.cumsum(self.weights)[:-1], rng.uniform(size=n_points), side="right")
         result = np.empty_like(normal)
         for i, (centre, factor) in enumerate(zip(self.centres, self.factors, strict=True)):
-            own = chosen == i
-            result[own] = centre + normal[own] @ factor.T
+            is_chosen = chosen == i
+            result[is_chosen] = centre + normal[is_chosen] @ factor.T
         return result
 
 

@@ -15,7 +15,7 @@ from bayesplate.estimates.refit import Bounds
 
 @dataclass(frozen=True)
 class Parameters:
-    """Names, order and meaning of the columns that are sampled.
+    """Names, order and meaning of the sampled columns.
 
     Columns: ln D_x, ln D_y, ln D_s (N m), of an isotropic board ln D alone; ln of the relative noise, one per setup;
     the standard coordinate z of each uncertain parameter of the board (`bayesplate.board.quantity`).
@@ -63,13 +63,13 @@ class Parameters:
 
     @cached_property
     def fitted_columns(self) -> Indices:
-        """Columns that frequencies depend on: all but the noise."""
+        """Columns that the frequencies depend on: all but the noise."""
         return np.r_[: self.n_constants, self.first_input : self.n_dim]
 
     @cached_property
     def effect_columns(self) -> list[int]:
         """Columns of the sizes of effects."""
-        return [i for i, one in enumerate(self.uncertain, start=self.first_input) if one.is_of_effect]
+        return [i for i, parameter in enumerate(self.uncertain, start=self.first_input) if parameter.is_of_effect]
 
     @cached_property
     def fitted_bounds(self) -> Bounds:
@@ -120,7 +120,7 @@ class Parameters:
 
     @cached_property
     def _input_priors(self) -> tuple[Floats, Floats, float]:
-        """Bounds of the input columns, and the constant of their log density, which is that less z^2 / 2."""
+        """Bounds of the input columns, and the constant of their log density: constant - z^2 / 2."""
         priors = [parameter.prior for parameter in self.uncertain]
         lower, upper = np.array([prior.standard_bounds for prior in priors]).reshape(-1, 2).T
         inside = np.clip(0.0, lower, upper)
@@ -136,5 +136,5 @@ class Parameters:
 
     def theta(self, values: Values, noise: Floats) -> Floats:
         """Columns of one point from rigidities, inputs and relative noises: (n_dim,) array; inverse of `values`."""
-        inputs = [float(one.prior.standard(values[one.name])) for one in self.uncertain]
+        inputs = [float(parameter.prior.standard(values[parameter.name])) for parameter in self.uncertain]
         return np.array([*np.log(self.board.symmetry.free_of(values)), *np.log(noise), *inputs])

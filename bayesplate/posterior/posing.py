@@ -1,4 +1,4 @@
-"""From a board to a problem of inference, in three steps: the estimate, the law that serves, and the posterior."""
+"""From a board to a problem of inference, in three steps: the estimate, the choice of the law, and the posterior."""
 
 from __future__ import annotations
 
@@ -21,32 +21,32 @@ from bayesplate.estimates.identifiability import (
     require_labels,
 )
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
-from bayesplate.estimates.unusual import unusual
+from bayesplate.estimates.unusual import unusual_sentences
 from bayesplate.frequencies.laws import LawName
-from bayesplate.posterior.first_labels import Proposed, propose_labels
+from bayesplate.posterior.first_labels import ProposedLabels, propose_labels
 from bayesplate.posterior.laplace import laplace_approximation, linearisation_errors
 from bayesplate.posterior.parameters import Parameters
-from bayesplate.posterior.slips import Remarks, is_too_wide, noise_remarks, reading_remarks
+from bayesplate.posterior.slips import Remarks, is_noise_large, noise_remarks, reading_remarks
 from bayesplate.posterior.target import Posterior, linear_suffices
-from bayesplate.posterior.veerings import with_doubts
+from bayesplate.posterior.veerings import with_veering_doubts
 
 _N_CHECKS = 256
 _N_NAMED = 64
-"""Of these checks, on which modes are named."""
+"""Number of these draws at which modes are named."""
 _N_TRIED = 1000
 _SPREAD = 3.0
-"""Standard errors of the draws on which a prior is tried, as of the sampler's starts."""
+"""Spread, in standard errors, of the draws on which a prior is tested, as of the sampler's starts."""
 _NOISE_SDS = 6.0
-"""The largest noise that a prior is taken to allow lies this many standard deviations of its logarithm above."""
+"""The largest noise that a prior allows is taken so many standard deviations of its logarithm above the median."""
 _IMPOSSIBLE_MISFIT = 1e4
-"""Chi^2 per degree of freedom at that noise from which it contradicts the readings: residuals a hundred times as
-large. An effect that the model lacks leaves less, and is for `diagnose` to find."""
+"""Chi^2 per degree of freedom at that noise above which its prior contradicts the readings: residuals a hundred times
+as large. A missing effect leaves smaller residuals, and is for `diagnose` to find."""
 _UNITS = {**dict.fromkeys(MODULI, (1e9, "GPa")), **dict.fromkeys(RIGIDITIES, (1.0, "N m"))}
 
 
 @dataclass(frozen=True, eq=False)
 class PosedProblem:
-    """A board posed as a problem of inference: its estimate, both laws, and the place of the posterior."""
+    """A board posed as a problem of inference: its estimate, both laws, and the location of the posterior."""
 
     board: Board
     prior: PriorCard
@@ -55,8 +55,8 @@ class PosedProblem:
     posterior: Posterior  # its models hold both laws
     centre: Floats  # (n_dim,), with the covariance a normal approximation of the posterior, for the starts
     covariance: Floats  # (n_dim, n_dim)
-    is_forced: bool = False  # the law was asked for: it is sampled itself, and no surrogate of it
-    veerings: tuple[str, ...] = ()  # a sentence per setup about labels in doubt near a veering
+    is_forced: bool = False  # the user chose the law: it is sampled itself, without a surrogate
+    veerings: tuple[str, ...] = ()  # a sentence for each setup with doubtful labels near a veering
 
     @property
     def parameters(self) -> Parameters:
@@ -64,20 +64,20 @@ class PosedProblem:
 
     @cached_property
     def doubts(self) -> tuple[str, ...]:
-        """A sentence each about unusual constants and readings, before anything is sampled."""
-        # where the uncertain inputs have moved: at their nominal sizes a soft core looks like another board
-        there = self.parameters.values_at(self.centre)
-        constants = unusual(self.board, self.prior, np.array([there[name] for name in RIGIDITIES]))
+        """Sentences about unusual constants and readings, before anything is sampled."""
+        # at the fitted inputs: at the nominal sizes a board with a soft core looks like another board
+        values = self.parameters.values_at(self.centre)
+        constants = unusual_sentences(self.board, self.prior, np.array([values[name] for name in RIGIDITIES]))
         return (*constants, *self.slips, *self._readings.others)
 
     @property
     def slips(self) -> tuple[str, ...]:
-        """The doubts that name a reading or two as a slip."""
+        """The doubts that identify a reading or two as a slip."""
         return self._readings.slips
 
     @cached_property
     def _readings(self) -> Remarks:
-        if any(self.posterior.peaks):  # whose assignments say what a label may be
+        if any(self.posterior.peaks):  # the assignment of peaks treats doubtful labels
             return Remarks((), (*self.veerings, *noise_remarks(self.board, self.log_widening)))
         return reading_remarks(self.posterior, self.centre)
 
@@ -87,75 +87,79 @@ class PosedProblem:
         return self.parameters.log_widening(self.centre)
 
     def under(self, law: LawName) -> PosedProblem:
-        """The same problem under the law of that name."""
-        one = self.posterior
-        return replace(self, posterior=Posterior(one.board, one.prior, one.models, law, one.robust))
+        """The same problem under another law."""
+        posterior = self.posterior
+        return replace(
+            self, posterior=Posterior(posterior.board, posterior.prior, posterior.models, law, posterior.robust)
+        )
 
 
 def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: bool = False) -> PosedProblem:
     """Estimate by least squares, check that the constants are identifiable, build both laws and choose one.
 
-    By default the linear law serves where its error over the normal approximation of the posterior, widened because
-    the noise is not known, stays below a quarter of the expected noise for every mode. Labels that may name another
-    mode near a veering are in doubt (`bayesplate.posterior.veerings`). InputError if a published table is of another
-    setup; NotIdentifiableError if the labelled modes leave a constant open, or contradict the prior or the noise.
+    By default the linear law is chosen where its error over the normal approximation of the posterior, widened because
+    the noise is unknown, stays below a quarter of the expected noise for all modes. Labels that may belong to another
+    mode near a veering become doubtful (`bayesplate.posterior.veerings`). InputError if a published table is of another
+    setup; NotIdentifiableError if the labelled modes do not determine a constant, or contradict the prior or the noise.
     """
     faults = coefficient_faults(board)
     if faults:
         raise InputError(faults)
-    problem = _posed(propose_labels(board, prior), prior, law, robust)
-    if law == "linear":  # as it was asked for: it follows the shapes, not the ranks
+    problem = _pose_labelled(propose_labels(board, prior), prior, law, robust)
+    if law == "linear":  # chosen by the user: it follows the shapes, not the ranks
         return problem
-    return _with_doubts(problem, law)
+    return _pose_with_doubts(problem, law)
 
 
-def _posed(proposed: Proposed, prior: PriorCard, law: LawName | None, robust: bool) -> PosedProblem:
-    """The problem with the labels as they are."""
+def _pose_labelled(proposed: ProposedLabels, prior: PriorCard, law: LawName | None, robust: bool) -> PosedProblem:
+    """Pose the problem with its labels as they are."""
     board = with_discrepancies(proposed.board)
     require_labels(board)
     estimate = weighted_least_squares(board, start=proposed.rigidities)
-    found = identifiability(estimate.sensitivities, estimate.scales, board.symmetry)
-    require_identifiable(board, found)
+    verdict = identifiability(estimate.sensitivities, estimate.scales, board.symmetry)
+    require_identifiable(board, verdict)
     centre, covariance, models = laplace_approximation(board, estimate, robust, proposed.spread)
-    there = Parameters(board).values_at(centre)
-    sensitivities = np.concatenate([model.sensitivities(there) for model in models])
-    # At the centre of the posterior modes may stand in another order than at the estimate.
+    values = Parameters(board).values_at(centre)
+    sensitivities = np.concatenate([model.sensitivities(values) for model in models])
+    # The order of the modes may be different at the centre of the posterior and at the estimate.
     require_identifiable(board, identifiability(sensitivities, estimate.scales, board.symmetry))
-    serving = law
-    if serving is None:
-        errors = linearisation_errors(board, models, _plausible(board, centre, covariance))
+    chosen_law = law
+    if chosen_law is None:
+        errors = linearisation_errors(board, models, _plausible_draws(board, centre, covariance))
         medians = [setup.noise.median for setup in board.setups]
         is_linear = linear_suffices([len(model.every_place) for model in models], errors, medians)
-        serving = "linear" if is_linear else "exact"
-    posterior = Posterior(board, prior, models, serving, robust)
+        chosen_law = "linear" if is_linear else "exact"
+    posterior = Posterior(board, prior, models, chosen_law, robust)
     _require_reachable(posterior, centre, covariance)
     require_possible_noise(posterior, centre)
-    return PosedProblem(board, prior, estimate, found, posterior, centre, covariance, law is not None)
+    return PosedProblem(board, prior, estimate, verdict, posterior, centre, covariance, law is not None)
 
 
-def _with_doubts(problem: PosedProblem, law: LawName | None) -> PosedProblem:
-    """The problem posed again with labels in doubt near a veering, where there are such."""
-    draws = _plausible(problem.board, problem.centre, problem.covariance)[:_N_NAMED]
-    named = problem.parameters.values(np.concatenate([problem.centre[None], draws]))
-    doubted, remarks = with_doubts(problem.board, problem.posterior.models, named)
-    if doubted is problem.board:
+def _pose_with_doubts(problem: PosedProblem, law: LawName | None) -> PosedProblem:
+    """The problem posed again with doubtful labels near a veering, if there are any."""
+    draws = _plausible_draws(problem.board, problem.centre, problem.covariance)[:_N_NAMED]
+    plates = problem.parameters.values(np.concatenate([problem.centre[None], draws]))
+    doubtful_board, remarks = with_veering_doubts(problem.board, problem.posterior.models, plates)
+    if doubtful_board is problem.board:
         return problem
     try:
-        again = _posed(propose_labels(doubted, problem.prior), problem.prior, law, problem.posterior.robust)
+        reposed = _pose_labelled(
+            propose_labels(doubtful_board, problem.prior), problem.prior, law, problem.posterior.robust
+        )
     except NotIdentifiableError:
         return problem
-    if all(is_too_wide(one.board, one.log_widening) for one in (problem, again)):
-        return problem  # something else is wrong, and makes wrong plates look plausible
-    return replace(again, veerings=remarks)
+    if all(is_noise_large(posed.board, posed.log_widening) for posed in (problem, reposed)):
+        return problem  # another fault makes wrong plates look plausible
+    return replace(reposed, veerings=remarks)
 
 
-def _plausible(board: Board, centre: Floats, covariance: Floats) -> Floats:
-    """Draws of the normal approximation, wider because the noise is not known, within the limits of the inputs."""
+def _plausible_draws(board: Board, centre: Floats, covariance: Floats) -> Floats:
+    """Draws of the normal approximation, wider because the noise is unknown, within the limits of the inputs."""
     parameters = Parameters(board)
     draws = np.random.default_rng(0).multivariate_normal(centre, covariance, _N_CHECKS)
     spare = max(sum(len(setup.readings) for setup in board.setups) - board.symmetry.n, 0)
     log_sd = max(setup.noise.log_sd for setup in board.setups)
-    # Root mean square of the noise over its median: the precision of its ln is the prior's and two per spare reading.
+    # Root mean square of the noise over its median: the precision of ln noise is the prior's plus 2 per spare reading.
     widening = float(np.exp(1.0 / (1.0 / log_sd**2 + 2.0 * spare)))
     constants = slice(parameters.n_constants)
     draws[:, constants] += (widening - 1.0) * (draws - centre)[:, constants]
@@ -163,30 +167,30 @@ def _plausible(board: Board, centre: Floats, covariance: Floats) -> Floats:
 
 
 def _require_reachable(posterior: Posterior, centre: Floats, covariance: Floats) -> None:
-    """Refuse a prior that is zero at all draws three times as wide as the normal approximation of the readings."""
+    """Refuse a prior that is zero at all draws from the normal approximation, widened three times."""
     draws = np.random.default_rng(0).multivariate_normal(centre, _SPREAD**2 * covariance, _N_TRIED)
     if np.isfinite(posterior.log_prior_constants(posterior.parameters.within_bounds(draws))).any():
         return
     values = posterior.parameters.values_at(centre)
     elastic = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
-    by_name = values | elastic._asdict()
+    constants = values | elastic._asdict()
     outside = []
     for name, density in posterior.priors.items():
-        value = float(by_name[name])
+        value = float(constants[name])
         if not density.lower <= value <= density.upper:
             factor, unit = _UNITS[name]
             low, high = density.lower / factor, density.upper / factor
             outside.append(f"{name} is about {value / factor:.3g} {unit}, the prior wants {low:g} to {high:g}")
-    where = f" ({'; '.join(outside)})" if outside else ""
+    ranges = f" ({'; '.join(outside)})" if outside else ""
     raise NotIdentifiableError(
         f"{posterior.board.name}: the prior {posterior.prior.name} excludes the data: 0 of {_N_TRIED} draws around the "
-        f"least-squares estimate have a density under it{where}; nothing was sampled: "
+        f"least-squares estimate have a density under it{ranges}; nothing was sampled: "
         "check the prior, the labels and the units"
     )
 
 
 def require_possible_noise(posterior: Posterior, centre: Floats) -> None:
-    """Refuse a noise so small that no draw from its prior comes near the residuals at the centre, by the exact law."""
+    """Refuse a prior of the noise that is far too small for the residuals at the centre, by the exact law."""
     board, values = posterior.board, posterior.parameters.values(centre[None, :])
     largest = [setup.noise.median * np.exp(_NOISE_SDS * setup.noise.log_sd) for setup in board.setups]
     squares, n_modes = 0.0, 0

@@ -1,7 +1,7 @@
 """Draws from a posterior: four ensembles of emcee with random streams of their own, until the convergence gate passes.
 
-A pilot walks first, from three standard errors around the estimate to the posterior. It teaches what independent
-proposals are drawn from, and where it ends the ensembles begin; nothing of it is kept.
+A pilot walks first, from three standard errors around the estimate to the posterior. The distribution of independent
+proposals is fitted to its draws, and the ensembles begin at its last points; its draws are not part of the result.
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.convergence import (
     Convergence,
     Gate,
-    assess,
     burn_in_steps,
+    judge_convergence,
     length_in_taus,
 )
 from bayesplate.posterior.ensembles import Ensembles
-from bayesplate.posterior.starts import LogDensity, cholesky_factor, guarded
+from bayesplate.posterior.starts import LogDensity, cholesky_factor, guard_log_density
 
-_FIRST_LOOK, _LOOK_AGAIN = 200, 1.15
-_LONG_ENOUGH = 4.0
-"""Times the length that the gate wants, from which on a small acceptance stays small."""
+_FIRST_CHECK, _CHECK_RATIO = 200, 1.15
+_LONG_RUN = 4.0
+"""Length of a run, over that which the gate wants, at which a small acceptance fails for good."""
 
 
 @dataclass(frozen=True)
 class SamplerSettings:
-    """How to sample; everything random follows from the seed."""
+    """Settings of the sampler; the seed determines all random numbers."""
 
     seed: int
     n_ensembles: int = 4  # at least two
     n_walkers: int | None = None  # of each: even, at least twice the number of parameters; by default at least 32
     chunk_steps: int = 50  # between two reports of progress
-    max_steps: int = 20_000  # where to stop without convergence, rounded up to whole chunks
+    max_steps: int = 20_000  # steps after which to stop without convergence, rounded up to whole chunks
     gate: Gate = field(default_factory=Gate)
 
     def walkers(self, n_dim: int) -> int:
@@ -84,7 +84,7 @@ class Progress:
 
     n_steps: int
     max_steps: int
-    n_taus: float | None = None  # autocorrelation times in the shortest ensemble at the last look; None before
+    n_taus: float | None = None  # autocorrelation times in the shortest ensemble at the last check; None before
     stage: str = ""  # of a longer run; empty if this sampling is all of it
     done: float | None = None  # share of that run, 0 to 1; None where it is not known
 
@@ -107,9 +107,9 @@ def sample(
 ) -> tuple[Chains, Convergence]:
     """Sample until the gate passes or further steps are of no use.
 
-    They are of none where `settings.max_steps` are made, where more than twice as many would be needed, and where the
-    chains are four times as long as the gate wants and accept too few proposals. All else may pass later: effective
-    draws add up, and a walker that sits in a narrow place leaves it.
+    Sampling stops without convergence after `settings.max_steps`, where more than twice as many would be needed, and
+    where the chains are four times as long as the gate wants and accept too few proposals. Any other rule may pass
+    later: effective draws add up, and a walker in a narrow region leaves it.
 
     The draws depend on the seed alone: a run that was killed and continued from its checkpoint gives the same bytes.
 
@@ -120,22 +120,22 @@ def sample(
     names = tuple(names) or tuple(f"parameter {dim + 1}" for dim in range(n_dim))
     starts = np.asarray(centre), cholesky_factor(covariance)
     shape = settings.n_ensembles, n_walkers
-    ensembles = Ensembles(guarded(log_density, names), *starts, settings.seed, shape, near)
+    ensembles = Ensembles(guard_log_density(log_density, names), *starts, settings.seed, shape, near)
     identity = {"seed": settings.seed, "n_ensembles": settings.n_ensembles, "n_walkers": n_walkers, "n_dim": n_dim}
-    kept = nullcontext() if checkpoint is None else checkpoint.session(**identity, chunk_steps=settings.chunk_steps)
-    with kept as session:
+    context = nullcontext() if checkpoint is None else checkpoint.session(**identity, chunk_steps=settings.chunk_steps)
+    with context as session:
         ensembles.begin(None if session is None else session.load())
         n_taus = None
         while True:
             n_steps, burn_in = ensembles.n_steps, burn_in_steps(ensembles.n_steps)
             is_last = n_steps >= settings.max_steps
-            if n_steps and (is_last or _is_due(n_steps, settings.chunk_steps)):
+            if n_steps and (is_last or _is_check_due(n_steps, settings.chunk_steps)):
                 n_taus = length_in_taus(ensembles.chain[:, burn_in:])
                 is_last |= is_hopeless(n_taus, n_steps - burn_in, settings)
                 if is_last or n_taus >= settings.gate.tau_count_min:
                     chains = Chains(ensembles.chain, ensembles.log_prob, burn_in)
-                    convergence = assess(chains.kept, settings.gate, names=names)
-                    is_long = n_taus >= _LONG_ENOUGH * settings.gate.tau_count_min
+                    convergence = judge_convergence(chains.kept, settings.gate, names=names)
+                    is_long = n_taus >= _LONG_RUN * settings.gate.tau_count_min
                     is_last |= is_long and convergence.acceptance < settings.gate.acceptance_min
                     if is_last or convergence.passed:
                         if session is not None:
@@ -149,17 +149,17 @@ def sample(
 
 
 def is_hopeless(n_taus: float, n_kept: int, settings: SamplerSettings) -> bool:
-    """Whether twice the steps allowed would hold too few autocorrelation times, from those in `n_kept` steps.
+    """Whether twice the allowed steps would hold too few autocorrelation times, from those in `n_kept` steps.
 
-    Draws of fewer steps than an autocorrelation time show less of it, never more, so that this never comes too early;
-    while a walker has not moved yet, `n_taus` is 0.
+    Draws of fewer steps than an autocorrelation time underestimate it, so this is never true too early; while a walker
+    has not moved yet, `n_taus` is 0.
     """
     return 0.0 < n_taus * 2 * settings.max_steps < settings.gate.tau_count_min * n_kept
 
 
-def _is_due(n_steps: int, chunk_steps: int) -> bool:
-    """Whether to judge now, at steps that grow by 15 %; by the count alone, so that resuming repeats it."""
-    due = -(-_FIRST_LOOK // chunk_steps) * chunk_steps
-    while due < n_steps:
-        due = -(-int(_LOOK_AGAIN * due) // chunk_steps) * chunk_steps
-    return due == n_steps
+def _is_check_due(n_steps: int, chunk_steps: int) -> bool:
+    """Whether a convergence check is due, at steps that grow by 15 %; a resumed run has the same checks."""
+    next_check = -(-_FIRST_CHECK // chunk_steps) * chunk_steps
+    while next_check < n_steps:
+        next_check = -(-int(_CHECK_RATIO * next_check) // chunk_steps) * chunk_steps
+    return next_check == n_steps

@@ -1,6 +1,6 @@
-"""Starts of the walkers: three standard errors around the estimate, on points that the posterior allows.
+"""Starting points of the walkers: three standard errors around the estimate, where the posterior is not zero.
 
-Ensembles that agree after starting so far apart have forgotten where they came from.
+Ensembles that agree after such distant starts no longer depend on them.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ _SPREAD = 3.0  # standard errors
 _TRIES = 1000
 
 
-def guarded(log_density: LogDensity, names: Sequence[str]) -> LogDensity:
+def guard_log_density(log_density: LogDensity, names: Sequence[str]) -> LogDensity:
     """A log density that raises BayesplateError where its value is nan or plus infinity; `names` for the message."""
 
-    def checked(points: Floats) -> Floats:
+    def checked_log_density(points: Floats) -> Floats:
         values = np.asarray(log_density(points), dtype=np.float64)
         if values.shape != points.shape[:1]:
             raise BayesplateError(f"log posterior: wanted shape {points.shape[:1]}, got {values.shape}")
-        wrong = np.isnan(values) | (values == np.inf)
-        if wrong.any():
-            i = int(np.argmax(wrong))
+        is_invalid = np.isnan(values) | (values == np.inf)
+        if is_invalid.any():
+            i = int(np.argmax(is_invalid))
             point = ", ".join(f"{name} = {float(value)!r}" for name, value in zip(names, points[i], strict=True))
             raise BayesplateError(
                 f"log posterior: wanted a finite number or -inf, got {values[i]} at {point}; "
@@ -36,7 +36,7 @@ def guarded(log_density: LogDensity, names: Sequence[str]) -> LogDensity:
             )
         return values
 
-    return checked
+    return checked_log_density
 
 
 def cholesky_factor(covariance: Floats) -> Floats:
@@ -57,7 +57,7 @@ def cholesky_factor(covariance: Floats) -> Floats:
         ) from None
 
 
-def around_estimate(centre: Floats, factor: Floats, rng: np.random.Generator) -> Callable[[int], Floats]:
+def draws_around_estimate(centre: Floats, factor: Floats, rng: np.random.Generator) -> Callable[[int], Floats]:
     """Draws of points three standard errors around the estimate, from the Cholesky factor of its covariance."""
     return lambda n: centre + _SPREAD * rng.standard_normal((n, len(centre))) @ factor.T
 

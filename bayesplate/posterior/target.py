@@ -20,7 +20,7 @@ from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.posterior.parameters import Parameters
 
 LINEAR_SHARE = 0.25
-"""The linear law serves while its error over the posterior stays below this share of the noise."""
+"""The linear law suffices while its error over the posterior stays below this share of the noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,14 +49,14 @@ class Posterior:
         return tuple(ReadingErrors.of(setup, self.robust) for setup in self.board.setups)
 
     @cached_property
-    def _sure(self) -> tuple[tuple[Bools, ReadingErrors], ...]:
-        """Of each setup the readings whose label is sure, and their errors."""
-        masks = (np.array([one.is_sure for one in setup.readings], dtype=bool) for setup in self.board.setups)
+    def _sure_readings(self) -> tuple[tuple[Bools, ReadingErrors], ...]:
+        """For each setup, the mask of readings with a sure label, and their errors."""
+        masks = (np.array([reading.is_sure for reading in setup.readings], dtype=bool) for setup in self.board.setups)
         return tuple((mask, errors.at(mask)) for mask, errors in zip(masks, self.readings, strict=True))
 
     @cached_property
     def peaks(self) -> tuple[PeakLikelihood | None, ...]:
-        """Likelihood of all other peaks of each setup; None where every label is sure."""
+        """Likelihood of all other peaks of each setup; None where all labels are sure."""
         return tuple(PeakLikelihood.of(model, self.robust) for model in self.models)
 
     def __call__(self, theta: Floats) -> Floats:
@@ -108,41 +108,42 @@ class Posterior:
     def prior_transform(self, u: Floats) -> Floats:
         """Columns under the prior from the unit cube: uniform (n_draws, n_dim) u become draws from the prior.
 
-        Moduli become rigidities with the drawn thickness and nu_xy; those of no material become rigidities of none.
+        Moduli become rigidities with the drawn thickness and nu_xy; moduli of no possible material become rigidities of
+        no possible material.
         """
         u = np.asarray(u, dtype=np.float64)
         parameters = self.parameters
         theta = np.zeros_like(u)
-        for i, one in enumerate(parameters.uncertain, start=parameters.first_input):
-            theta[:, i] = one.prior.standard_quantile(u[:, i])
+        for i, parameter in enumerate(parameters.uncertain, start=parameters.first_input):
+            theta[:, i] = parameter.prior.standard_quantile(u[:, i])
         for i, noise in enumerate(parameters.noises, start=parameters.n_constants):
             theta[:, i] = np.log(noise.prior.quantile(u[:, i]))
-        drawn = {name: prior.quantile(u[:, i]) for i, (name, prior) in enumerate(self.priors.items())}
-        if set(drawn) == set(MODULI):
+        constant_draws = {name: prior.quantile(u[:, i]) for i, (name, prior) in enumerate(self.priors.items())}
+        if set(constant_draws) == set(MODULI):
             values = parameters.values(theta)
-            E_x, E_y, G_xy = (drawn[name] for name in MODULI)
+            E_x, E_y, G_xy = (constant_draws[name] for name in MODULI)
             stiffness = rigidities(E_x, E_y, G_xy, values["thickness"], values["poisson_xy"])
-            # At another Poisson ratio D_y / D_x is E_y / E_x still, so that nu_xy nu_yx is what it was.
-            without = rigidities(E_x, E_y, G_xy, values["thickness"], 0.0)
-            pairs = zip(stiffness, without, strict=True)
-            constants = [np.where(np.isnan(stiffness.D_x), other, one) for one, other in pairs]
+            # Rigidities at nu_xy = 0 keep D_y / D_x = E_y / E_x, so that nu_xy nu_yx is still that of no material.
+            without_poisson = rigidities(E_x, E_y, G_xy, values["thickness"], 0.0)
+            pairs = zip(stiffness, without_poisson, strict=True)
+            constants = [np.where(np.isnan(stiffness.D_x), fallback, rigidity) for rigidity, fallback in pairs]
         elif self.board.isotropic:
             values = parameters.values(theta)
             nu = values["poisson_xy"]
-            constants = [rigidities(*isotropic_moduli(drawn["E_x"], nu), values["thickness"], nu).D_x]
+            constants = [rigidities(*isotropic_moduli(constant_draws["E_x"], nu), values["thickness"], nu).D_x]
         else:
-            constants = [drawn[name] for name in RIGIDITIES]
+            constants = [constant_draws[name] for name in RIGIDITIES]
         theta[:, : parameters.n_constants] = np.log(np.stack(constants, axis=1))
         return theta
 
     @property
     def n_every(self) -> tuple[int, ...]:
-        """Number of modes in the likelihood of each setup: the labelled ones, and those that peaks may be."""
+        """Number of modes in the likelihood of each setup: labelled modes, and modes that peaks may be."""
         return tuple(len(model.every_place) for model in self.models)
 
     @property
     def factors(self) -> tuple[str, ...]:
-        """Names of the factors of the likelihood: each reading whose label is sure, and all other peaks of a setup."""
+        """Names of the factors of the likelihood: each reading with a sure label, and all other peaks of a setup."""
         names = []
         for setup, peaks in zip(self.board.setups, self.peaks, strict=True):
             names += [f"{setup.name} {reading.label}" for reading in setup.readings if reading.is_sure]
@@ -161,28 +162,28 @@ class Posterior:
     def labelled(self, every_log_frequency: Sequence[Floats]) -> list[Floats]:
         """Columns of the labelled modes among those of `every_log_frequency`."""
         pairs = zip(every_log_frequency, self.board.setups, strict=True)
-        return [every[:, : len(setup.readings)] for every, setup in pairs]
+        return [log_frequency[:, : len(setup.readings)] for log_frequency, setup in pairs]
 
     def log_likelihood(self, theta: Floats) -> Floats:
-        """Log probability of every one of `factors`: (n_draws, n_factors) array."""
+        """Log probability of each of `factors`: (n_draws, n_factors) array."""
         return self.log_likelihood_of(self.every_log_frequency(theta), theta)
 
     def log_likelihood_of(self, every_log_frequency: Sequence[Floats], theta: Floats) -> Floats:
-        """The same from the frequencies that `every_log_frequency` gives."""
+        """`log_likelihood` from the frequencies of `every_log_frequency`."""
         noise = np.exp(self.parameters.log_noise(theta))
-        parts = []
+        factors = []
         labelled = self.labelled(every_log_frequency)
-        for i, ((sure, errors), peaks) in enumerate(zip(self._sure, self.peaks, strict=True)):
-            parts.append(errors.log_likelihood(labelled[i][:, sure], noise[:, i]))
+        for i, ((is_sure, errors), peaks) in enumerate(zip(self._sure_readings, self.peaks, strict=True)):
+            factors.append(errors.log_likelihood(labelled[i][:, is_sure], noise[:, i]))
             if peaks is not None:
-                parts.append(peaks.log_likelihood(every_log_frequency[i], noise[:, i])[:, None])
-        return np.concatenate(parts, axis=1)
+                factors.append(peaks.log_likelihood(every_log_frequency[i], noise[:, i])[:, None])
+        return np.concatenate(factors, axis=1)
 
 
 def linear_suffices(n_every: Sequence[int], errors: Floats, noise: Sequence[float] | Floats) -> bool:
     """Whether (n_draws, n_modes) linearisation errors, cents, stay below a quarter of the noise, rms over draws.
 
-    Of each setup: how many modes it has, and its relative noise.
+    `n_every` is the number of modes of each setup, `noise` its relative noise.
     """
     limit = LINEAR_SHARE * cents(np.repeat(noise, n_every))
     finite = np.isfinite(errors).all(axis=1)

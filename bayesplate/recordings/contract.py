@@ -1,16 +1,16 @@
-"""What `pick` found, as its JSON has it and as tables and pages are made from it."""
+"""The result of `pick` as its JSON holds it; tables and pages are made from it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-_NOTED = 0.1
-"""Probability of having no label from which on it is listed among the labels."""
+_NOTED_PROBABILITY = 0.1
+"""Probability of having no label from which on "none" is listed among the labels."""
 
 
 @dataclass(frozen=True)
 class LabelChance:
-    """A label that a peak may have, and the probability that it is this one."""
+    """A label that a peak may have, and its probability."""
 
     label: str
     probability: float
@@ -18,22 +18,22 @@ class LabelChance:
 
 @dataclass(frozen=True)
 class PickedRow:
-    """One peak.
+    """One picked peak.
 
     Attributes
     ----------
     hz, sd_hz : float
         Frequency and its standard error.
     noise_hz, scatter_hz, window_hz : float
-        Its parts: noise, scatter between hits and places beyond it, choice of lines.
+        Its parts: noise, scatter between hits and places beyond the noise, choice of lines.
     sign : str
         "+" or "-" between hammer and sensor, where their polarity is known or was found; otherwise empty.
     amplitude : float
-        Strength over the strongest.
+        Strength over that of the strongest peak.
     spurious_probability : float
-        That it is no mode of the board.
+        Probability that it is no mode of the board.
     kind : str
-        What it would be then; empty where nothing speaks of it.
+        What it is if it is no mode; empty where no other explanation is likely.
     seen : float
         Share of the widths of windows in which the search found it.
     alike : float
@@ -41,8 +41,8 @@ class PickedRow:
     labels : tuple of LabelChance
         The most probable first; none without a card.
     unlabelled_probability : float or None
-        That it is none of the modes that the board of the card has, though a mode by the recordings; None without a
-        card, and for a peak that is likely no mode.
+        Probability that it is none of the modes that the board of the card has, though a mode by the recordings; None
+        without a card, and for a peak that is likely no mode.
     """
 
     hz: float
@@ -71,16 +71,16 @@ class PickedRow:
         return (1.0 - self.spurious_probability) * (1.0 - (self.unlabelled_probability or 0.0))
 
     def may_be(self, most: int) -> dict[str, float]:
-        """The most probable labels and that it has none where that is not improbable; empty without a card."""
-        found = {one.label: one.probability for one in self.labels[:most]}
-        if self.unlabelled_probability is not None and self.unlabelled_probability >= _NOTED:
-            found["none"] = self.unlabelled_probability
-        return found
+        """Probabilities of the most probable labels, and of "none" where it is not small; empty without a card."""
+        chances = {chance.label: chance.probability for chance in self.labels[:most]}
+        if self.unlabelled_probability is not None and self.unlabelled_probability >= _NOTED_PROBABILITY:
+            chances["none"] = self.unlabelled_probability
+        return chances
 
 
 @dataclass(frozen=True)
 class PickReport:
-    """What `pick` found.
+    """The result of `pick`.
 
     Attributes
     ----------
@@ -90,15 +90,15 @@ class PickReport:
     seconds : float
         Of each ring-down.
     lowest_hz, highest_hz : float
-        Between which modes were looked for.
+        Band in which modes were searched.
     peaks : tuple of PickedRow
         In the order of frequency, those that are likely no mode included.
     polarity : str
         "same" or "opposite" of force and response, as given or found; empty where it is not known.
     board : str
-        Of the card from which labels were computed; empty without one.
+        Name of the board of the card from which labels were computed; empty without one.
     fragment : str
-        The [setup] that a card takes.
+        The [setup] to put into a card.
     remarks : tuple of str
     """
 

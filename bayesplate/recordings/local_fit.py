@@ -1,10 +1,10 @@
 """A local rational fit: a few damped modes in a window of frequencies, common to all records, by maximum likelihood.
 
 The spectrum of a free decay that was cut out without a taper is, line by line, a sum of one simple rational term for
-each mode, whatever the decay has lost when it is cut off; modes beyond the window are a low polynomial. With the
+each mode, however far it has decayed where it is cut off; modes beyond the window are a low polynomial. With the
 frequencies f_m and the decay rates d_m of the modes given, the residues of every record are linear: they are projected
-out (variable projection), and Gauss's steps are taken in f_m and d_m alone. Modes that are not known are found one by
-one: where what a fit leaves looks most like a mode, one is added and all are refitted.
+out (variable projection), and Gauss's steps are taken in f_m and d_m alone. Unknown modes are found one by one: a mode
+is added where the residual of a fit looks most like one, and all are refitted.
 
 References
 ----------
@@ -23,23 +23,23 @@ from scipy.linalg import solve_triangular
 from bayesplate.arrays import Complex, Floats
 
 DEGREE = 2
-"""Of the polynomial that stands for what lies beyond the window."""
+"""Degree of the polynomial that stands for modes beyond the window."""
 _MOST_STEPS, _FEW_STEPS, _SEARCH_STEPS = 30, 4, 10
-_SHRUNK, _GROWN, _FIRST_DAMPING = 0.2, 6.0, 1e-3
-_SETTLED = 1e-7
-"""Of the sum of squares, relative."""
+_DAMPING_CUT, _DAMPING_RISE, _FIRST_DAMPING = 0.2, 6.0, 1e-3
+_COST_TOLERANCE = 1e-7
+"""Relative change of the cost at which a fit has converged."""
 _LEAST_DECAY = 1e-4
-"""Decay rate over the spacing of the lines, at least: a steady line must not need another beside it."""
-STEADY = 0.11
+"""Least decay rate over the spacing of the lines: a steady line must not need another beside it."""
+STEADY_DECAY = 0.11
 """Decay rate times duration below which a line has not fallen by half: it may be steady."""
 MOST_MODES = 14
-"""In one window."""
-_BEYOND = 0.15
-"""Share of the window's width beyond its ends up to which a mode may lie whose tail is seen."""
-_DAMPINGS, _STEP = (0.001, 0.004, 0.012, 0.035), 0.7
-"""Damping ratios that are tried in a search, and the step of frequencies, in lines."""
-_LEAST_OWN = 1e-4
-"""Share of a mode's shape that those before it must leave."""
+"""Most modes in one window."""
+_OUTSIDE_SHARE = 0.15
+"""Share of the window's width beyond its ends within which modes are tried: their tails reach into the window."""
+_DAMPINGS, _FREQUENCY_STEP = (0.001, 0.004, 0.012, 0.035), 0.7
+"""Damping ratios that a search tries, and its step of frequencies, in lines."""
+_LEAST_ORTHOGONAL = 1e-4
+"""Least share of a trial mode's power that must be orthogonal to the fitted modes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +48,11 @@ class Window:
 
     frequency: Floats
     values: Complex  # (n_lines, n_records): spectra over the standard deviation of each record's noise
-    fixed: Floats  # (n_fixed, 2), Hz: frequency and decay rate of strong modes outside, which reach in with tails
-    # share of a line that no simple mode describes: no mode of a real board is simple to the last digit
+    fixed: Floats  # (n_fixed, 2), Hz: frequency and decay rate of modes outside, whose tails reach in
+    # share of a line that no simple mode describes: no mode of a real board is perfectly simple
     unlike: float = 0.0
-    floor: float = 0.0  # share of the window's highest line that other lines may be off by
-    least_variance: float = 0.0  # of a record's noise; 1 is what was expected of it
+    floor: float = 0.0  # error of each line as a share of the window's highest line
+    least_variance: float = 0.0  # of a record's noise; 1 is the expected noise
 
     @cached_property
     def weights(self) -> Floats:
@@ -65,14 +65,16 @@ class Window:
         return float(self.frequency[1] - self.frequency[0])
 
     def basis(self, poles: Floats) -> Complex:
-        """Shapes of modes (n_modes, 2: Hz), of what is fixed, and the polynomial: (n_lines, n_basis) array."""
+        """Resonance terms of modes (n_modes, 2: Hz) and of fixed modes, then the polynomial: (n_lines, n_basis)."""
         low, high = self.frequency[0], self.frequency[-1]
-        at = (2.0 * self.frequency - low - high) / (high - low)
-        every = np.concatenate([poles, self.fixed])
-        return np.concatenate([shapes(self.frequency, every), at[:, None] ** np.arange(DEGREE + 1)], axis=1)
+        position = (2.0 * self.frequency - low - high) / (high - low)
+        all_poles = np.concatenate([poles, self.fixed])
+        return np.concatenate(
+            [resonance_terms(self.frequency, all_poles), position[:, None] ** np.arange(DEGREE + 1)], axis=1
+        )
 
     def compressed(self, most: int) -> Window:
-        """The strongest combinations of the records: any combination has the same modes."""
+        """The window of the strongest combinations of its records: any combination has the same modes."""
         if self.values.shape[1] <= most:
             return self
         _, _, right = np.linalg.svd(self.values, full_matrices=False)
@@ -80,106 +82,106 @@ class Window:
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
-    """Modes fitted in a window; `rest`, `jacobian` and `orthogonal` are weighted."""
+class WindowFit:
+    """A fit of modes in a window; `rest`, `jacobian` and `orthogonal` are weighted."""
 
     window: Window
     poles: Floats  # (n_modes, 2), Hz: frequency, and decay rate: half the width of the peak at half its power
-    residues: Complex  # (n_modes, n_records): of the values of the window
-    rest: Complex  # (n_lines, n_records): what the fit leaves
-    # (n_lines, 2 n_modes): change of a shape with its frequency, then its decay rate, less what other shapes take up
+    residues: Complex  # (n_modes, n_records), in the units of the window's values
+    rest: Complex  # (n_lines, n_records): residual of the fit
+    # (n_lines, 2 n_modes): derivatives of the resonance terms by frequency, then by decay rate, orthogonal to the basis
     jacobian: Complex
-    orthogonal: Complex  # (n_lines, n_basis): an orthonormal basis of the shapes
+    orthogonal: Complex  # (n_lines, n_basis): an orthonormal basis of the resonance terms and the polynomial
 
     @property
     def n_free(self) -> int:
-        """Lines beyond the shapes of each record."""
+        """Degrees of freedom of the residual of each record: lines less basis functions."""
         return self.window.frequency.size - len(self.poles) - len(self.window.fixed) - DEGREE - 1
 
     @property
     def variance(self) -> Floats:
-        """Noise variance of each record, (n_records,): the mean square of the rest, but not below the least one."""
+        """Noise variance of each record, (n_records,): mean square of the residual, but not below the least one."""
         power = np.sum(np.abs(self.rest) ** 2, axis=0) / self.n_free
         return np.maximum(power, max(self.window.least_variance, 1e-300))
 
     def information(self) -> tuple[Floats, Floats]:
-        """What each record says of the parameters: scores (n_records, n) and information (n_records, n, n).
+        """Scores (n_records, n) and information (n_records, n, n) of the parameters by each record.
 
-        The n parameters are all frequencies, then all decay rates; each record is weighed by what is left of it.
+        The n parameters are all frequencies, then all decay rates; each record is weighted by its residual.
         """
-        both = np.concatenate([self.residues, self.residues])
+        doubled = np.concatenate([self.residues, self.residues])
         power = self.variance
         inner = self.jacobian.conj().T @ self.jacobian
-        pairs = np.einsum("ar,br->rab", both.conj(), both)
+        pairs = np.einsum("ar,br->rab", doubled.conj(), doubled)
         information = 2.0 * np.real(inner * pairs) / power[:, None, None]
-        scores = 2.0 * np.real(both.conj().T * (self.jacobian.conj().T @ self.rest).T) / power[:, None]
+        scores = 2.0 * np.real(doubled.conj().T * (self.jacobian.conj().T @ self.rest).T) / power[:, None]
         return scores, information
 
     @cached_property
     def cost(self) -> float:
-        """-2 ln of the likelihood, but for a constant: the noise of each record is at its best."""
+        """-2 ln of the likelihood, up to a constant, with the most likely noise of each record."""
         squares, variance = np.sum(np.abs(self.rest) ** 2, axis=0), self.variance
         spread = -2.0 * self.rest.shape[1] * float(np.sum(np.log(self.window.weights)))
         return float(2.0 * np.sum(len(self.rest) * np.log(variance) + squares / variance)) + 2.0 * spread
 
-    def without(self, mode: int) -> Fitted:
-        """The best fit without one of its modes, the others free to move a little."""
-        return refined(self.window, np.delete(self.poles, mode, axis=0), _FEW_STEPS)
+    def without(self, mode: int) -> WindowFit:
+        """The fit without one of its modes, the others refined in a few steps."""
+        return refine_poles(self.window, np.delete(self.poles, mode, axis=0), _FEW_STEPS)
 
-    def with_share(self, shares: tuple[float, ...]) -> Fitted:
-        """The fit with the share that no simple mode describes which makes the window likeliest."""
-        tried = [refined(replace(self.window, unlike=share), self.poles, _FEW_STEPS) for share in shares]
-        best = min(tried, key=lambda one: one.cost)
-        return refined(best.window, best.poles)
+    def with_share(self, shares: tuple[float, ...]) -> WindowFit:
+        """The fit with the likeliest of some shares of a line that no simple mode describes."""
+        fits = [refine_poles(replace(self.window, unlike=share), self.poles, _FEW_STEPS) for share in shares]
+        best = min(fits, key=lambda fit: fit.cost)
+        return refine_poles(best.window, best.poles)
 
 
-def shapes(frequency: Floats, poles: Floats) -> Complex:
+def resonance_terms(frequency: Floats, poles: Floats) -> Complex:
     """1 / (i (f - f_m) + d_m) of each mode: (n_lines, n_modes) array."""
     return np.asarray(1.0 / (1j * (frequency[:, None] - poles[:, 0]) + poles[:, 1]))
 
 
-def fitted(window: Window, poles: Floats) -> Fitted:
-    """What modes with given frequencies and decay rates leave of a window."""
+def fit_at_poles(window: Window, poles: Floats) -> WindowFit:
+    """The fit of the residues of modes whose frequencies and decay rates are given."""
     basis, weights = window.basis(poles), window.weights[:, None]
     n = len(poles)
     change = np.concatenate([1j * basis[:, :n] ** 2, -(basis[:, :n] ** 2)], axis=1) * weights
     basis = basis * weights
     scale = np.linalg.norm(basis, axis=0)
-    both: tuple[Complex, Complex] = np.linalg.qr(basis / scale)
-    orthogonal, triangle = both
+    factors: tuple[Complex, Complex] = np.linalg.qr(basis / scale)
+    orthogonal, triangle = factors
     values = window.values * weights
     inner = orthogonal.conj().T @ values
     residues = (solve_triangular(triangle, inner) / scale[:, None])[:n]
     jacobian = change - orthogonal @ (orthogonal.conj().T @ change)
-    return Fitted(window, poles, residues, values - orthogonal @ inner, jacobian, orthogonal)
+    return WindowFit(window, poles, residues, values - orthogonal @ inner, jacobian, orthogonal)
 
 
-def refined(window: Window, poles: Floats, most_steps: int = _MOST_STEPS) -> Fitted:
+def refine_poles(window: Window, poles: Floats, most_steps: int = _MOST_STEPS) -> WindowFit:
     """The most likely modes near given ones, (n_modes, 2: Hz), by damped Gauss-Newton steps."""
-    here = fitted(window, poles)
+    fit = fit_at_poles(window, poles)
     if not len(poles):
-        return here
+        return fit
     damping = _FIRST_DAMPING
     for _ in range(most_steps):
-        scores, information = here.information()
+        scores, information = fit.information()
         score, matrix = scores.sum(axis=0), information.sum(axis=0)
         scale = np.diagonal(matrix)
         step = np.linalg.solve(matrix + np.diag(damping * scale + 1e-300), score)
-        there = fitted(window, _moved(window, here.poles, step))
-        if there.cost < here.cost:
-            is_settled = here.cost - there.cost < _SETTLED * abs(there.cost) + 1e-4
-            here, damping = there, max(damping * _SHRUNK, 1e-9)
+        trial = fit_at_poles(window, _move_poles(window, fit.poles, step))
+        if trial.cost < fit.cost:
+            is_settled = fit.cost - trial.cost < _COST_TOLERANCE * abs(trial.cost) + 1e-4
+            fit, damping = trial, max(damping * _DAMPING_CUT, 1e-9)
             if is_settled:
                 break
         else:
-            damping *= _GROWN
+            damping *= _DAMPING_RISE
             if damping > 1e6:
                 break
-    return here
+    return fit
 
 
-def _moved(window: Window, poles: Floats, step: Floats) -> Floats:
-    """Modes after a step: none moves further than its own width or a few lines, none grows with time."""
+def _move_poles(window: Window, poles: Floats, step: Floats) -> Floats:
+    """Poles after a step: none moves further than its own width or a line, none grows with time."""
     n = len(poles)
     reach = np.maximum(poles[:, 1], window.spacing)
     frequency = poles[:, 0] + np.clip(step[:n], -reach, reach)
@@ -187,30 +189,30 @@ def _moved(window: Window, poles: Floats, step: Floats) -> Floats:
     return np.stack([frequency, np.maximum(decay, _LEAST_DECAY * window.spacing)], axis=1)
 
 
-def search(window: Window, least_gain: float) -> list[Floats]:
+def search_modes(window: Window, least_gain: float) -> list[Floats]:
     """Modes of a window, (n_modes, 2: Hz), one more at each step while -2 ln likelihood falls by `least_gain`."""
-    fit = refined(window, np.zeros((0, 2)))
-    candidates = _candidates(window)
-    tried = shapes(window.frequency, candidates) * window.weights[:, None]
-    own = np.sum(np.abs(tried) ** 2, axis=0)
-    adjoint = np.ascontiguousarray(tried.conj().T)
+    fit = refine_poles(window, np.zeros((0, 2)))
+    candidates = _candidate_poles(window)
+    terms = resonance_terms(window.frequency, candidates) * window.weights[:, None]
+    power = np.sum(np.abs(terms) ** 2, axis=0)
+    adjoint = np.ascontiguousarray(terms.conj().T)
     path: list[Floats] = []
     while len(path) < MOST_MODES and fit.n_free >= 2 * len(path) + 8:
-        free = own - np.sum(np.abs(adjoint @ fit.orthogonal) ** 2, axis=1)
+        free_power = power - np.sum(np.abs(adjoint @ fit.orthogonal) ** 2, axis=1)
         gains = np.sum(np.abs(adjoint @ (fit.rest / np.sqrt(fit.variance))) ** 2, axis=1)
-        best = int(np.argmax(gains / np.maximum(free, _LEAST_OWN * own)))
-        better = refined(window, np.concatenate([fit.poles, candidates[best][None]]), _SEARCH_STEPS)
-        if fit.cost - better.cost < least_gain:
+        best = int(np.argmax(gains / np.maximum(free_power, _LEAST_ORTHOGONAL * power)))
+        trial = refine_poles(window, np.concatenate([fit.poles, candidates[best][None]]), _SEARCH_STEPS)
+        if fit.cost - trial.cost < least_gain:
             break
-        fit = better
+        fit = trial
         path.append(fit.poles)
     return path
 
 
-def _candidates(window: Window) -> Floats:
-    """Frequencies and decay rates that are tried: (n, 2) array, Hz."""
+def _candidate_poles(window: Window) -> Floats:
+    """Frequencies and decay rates that a search tries: (n, 2) array, Hz."""
     low, high = window.frequency[0], window.frequency[-1]
-    reach = _BEYOND * (high - low)
-    frequency = np.arange(max(low - reach, window.spacing), high + reach, _STEP * window.spacing)
+    reach = _OUTSIDE_SHARE * (high - low)
+    frequency = np.arange(max(low - reach, window.spacing), high + reach, _FREQUENCY_STEP * window.spacing)
     decay = np.maximum(np.outer(frequency, _DAMPINGS), 0.1 * window.spacing)
     return np.stack([np.repeat(frequency, len(_DAMPINGS)), decay.ravel()], axis=1)

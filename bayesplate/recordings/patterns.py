@@ -1,4 +1,4 @@
-"""What residues between known places say of labels: their signs and sizes against those of the shapes of modes."""
+"""Evidence of residues between known places for labels: their signs and sizes against those of computed mode shapes."""
 
 from __future__ import annotations
 
@@ -8,43 +8,43 @@ from bayesplate.arrays import Floats
 from bayesplate.recordings.plausibility import weighted_median
 
 SHAPE_ERROR = 0.05
-"""By how much a computed residue may be off, over the largest that the shape gives: modes mix, places are read off."""
+"""Error of a computed residue over the largest that the shape gives: modes mix, and places are read off by hand."""
 _GAIN_SD = 0.3
-"""Of the logarithm of the gain from one mode to the next."""
-_LEAST = -8.0
-"""ln of the evidence against a label, at most: places may be written down wrongly."""
+"""Standard deviation of the logarithm of the gain from one mode to the next."""
+_LEAST_EVIDENCE = -8.0
+"""Limit of ln of the evidence for or against a label: places may be written down wrongly."""
 _N_GAINS = 41
 
 
 def residue_evidence(
     measured: Floats, measured_sd: Floats, predicted: Floats, largest: Floats, likely: Floats
 ) -> tuple[Floats, float]:
-    """ln of how much the residues speak for each label of each peak, (n_peaks, n_modes), and for the same polarity.
+    """ln of the evidence of the residues for each label of each peak, (n_peaks, n_modes), and for the same polarity.
 
     Measured, (n_peaks, n_places), are residues of the mobility in the units of the recordings; predicted, (n_modes,
-    n_places) in 1/kg, those of the computed modes, and `largest` what each shape gives between any two places. From
-    `likely`, (n_peaks, n_modes) probabilities by the frequencies, comes the common gain. The evidence is zero on the
-    average over the modes that a peak may be. Between two places only, sizes count and signs do not: the odds of the
-    polarity are then 1.
+    n_places) in 1/kg, those of the computed modes, and `largest` the largest that each shape gives between any two
+    places. The common gain comes from `likely`, (n_peaks, n_modes) probabilities by the frequencies. The evidence is
+    zero on the average over the modes that a peak may be. With a single pair of places, sizes count and signs do not:
+    the odds of the polarity are then 1.
     """
     if measured.shape[1] == 1:
-        each = _log_likelihood(np.abs(measured), measured_sd, np.abs(predicted), largest, likely)
-        return _relative(each, likely), 0.0
+        log_likelihood = _log_likelihood(np.abs(measured), measured_sd, np.abs(predicted), largest, likely)
+        return _relative_evidence(log_likelihood, likely), 0.0
     same, opposite = (_log_likelihood(sign * measured, measured_sd, predicted, largest, likely) for sign in (1.0, -1.0))
-    log_polarity = float(np.sum(_summed(same, likely) - _summed(opposite, likely)))
-    return _relative(same if log_polarity >= 0.0 else opposite, likely), log_polarity
+    log_polarity = float(np.sum(_sum_over_modes(same, likely) - _sum_over_modes(opposite, likely)))
+    return _relative_evidence(same if log_polarity >= 0.0 else opposite, likely), log_polarity
 
 
 def sign_odds(signs: Floats, predicted: Floats, largest: Floats, likely: Floats) -> float:
     """ln of the odds that force and response have the same polarity, from the signs between two places.
 
-    The signs are +1 or -1, 0 if not known: (n_peaks,); the others as of `residue_evidence`.
+    The signs are +1 or -1, 0 if not known: (n_peaks,); the other parameters are those of `residue_evidence`.
     """
     from scipy.special import ndtr
 
     positive = np.clip(ndtr(predicted / (SHAPE_ERROR * largest)), 0.02, 0.98)
-    seen = likely.sum(axis=1)
-    plus = likely @ positive + 0.5 * (1.0 - seen)
+    mode_share = likely.sum(axis=1)
+    plus = likely @ positive + 0.5 * (1.0 - mode_share)
     same, opposite = np.where(signs > 0, plus, 1.0 - plus), np.where(signs > 0, 1.0 - plus, plus)
     return float(np.sum(np.where(signs == 0, 0.0, np.log(same / opposite))))
 
@@ -52,7 +52,7 @@ def sign_odds(signs: Floats, predicted: Floats, largest: Floats, likely: Floats)
 def _log_likelihood(
     measured: Floats, measured_sd: Floats, predicted: Floats, largest: Floats, likely: Floats
 ) -> Floats:
-    """ln of the density of each peak's residues under each mode, the gain open: (n_peaks, n_modes) array."""
+    """ln of the density of each peak's residues under each mode, over all gains: (n_peaks, n_modes) array."""
     from scipy.special import logsumexp
 
     sizes, shapes = np.linalg.norm(measured, axis=1), np.linalg.norm(predicted, axis=1)
@@ -61,19 +61,25 @@ def _log_likelihood(
     centre = weighted_median(ratio.ravel(), weights.ravel() + 1e-9)
     z = np.linspace(-2.5, 2.5, _N_GAINS)
     gains = np.exp(centre + _GAIN_SD * z)
-    off = measured[:, None, None, :] - gains[:, None] * predicted[None, :, None, :]
+    misfit = measured[:, None, None, :] - gains[:, None] * predicted[None, :, None, :]
     sd = np.hypot(measured_sd[:, None, None, :], SHAPE_ERROR * gains[:, None] * largest[None, :, None, None])
-    each = np.sum(-0.5 * (off / sd) ** 2 - np.log(sd), axis=3) - 0.5 * z**2
-    return np.asarray(logsumexp(each, axis=2))
+    log_density = np.sum(-0.5 * (misfit / sd) ** 2 - np.log(sd), axis=3) - 0.5 * z**2
+    return np.asarray(logsumexp(log_density, axis=2))
 
 
-def _summed(each: Floats, likely: Floats) -> Floats:
+def _sum_over_modes(log_likelihood: Floats, likely: Floats) -> Floats:
     from scipy.special import logsumexp
 
-    return np.asarray(logsumexp(np.maximum(each, each.max(axis=1, keepdims=True) + _LEAST), axis=1, b=likely + 1e-6))
+    return np.asarray(
+        logsumexp(
+            np.maximum(log_likelihood, log_likelihood.max(axis=1, keepdims=True) + _LEAST_EVIDENCE),
+            axis=1,
+            b=likely + 1e-6,
+        )
+    )
 
 
-def _relative(each: Floats, likely: Floats) -> Floats:
-    """Log likelihoods less the average of the modes that a peak may be."""
-    mean = _summed(each, likely) - np.log(np.sum(likely + 1e-6, axis=1))
-    return np.clip(each - mean[:, None], _LEAST, -_LEAST)
+def _relative_evidence(log_likelihood: Floats, likely: Floats) -> Floats:
+    """Log likelihoods less their average over the modes that a peak may be."""
+    mean = _sum_over_modes(log_likelihood, likely) - np.log(np.sum(likely + 1e-6, axis=1))
+    return np.clip(log_likelihood - mean[:, None], _LEAST_EVIDENCE, -_LEAST_EVIDENCE)

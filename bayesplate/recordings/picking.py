@@ -1,4 +1,4 @@
-"""From spectra of decays to picked modes: frequency, damping and residues, each with what is not known of it."""
+"""From spectra of decays to picked modes: frequency, damping and residues, each with its uncertainty."""
 
 from __future__ import annotations
 
@@ -9,144 +9,144 @@ import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.errors import Fault, InputError
-from bayesplate.recordings.across import modes_across
-from bayesplate.recordings.agreement import agreeing
+from bayesplate.recordings.across import average_modes
+from bayesplate.recordings.agreement import agreeing_records
 from bayesplate.recordings.contract import PickedRow
-from bayesplate.recordings.modes_found import Mode, Path, find_modes, fit_modes, joined
-from bayesplate.recordings.plausibility import Peak, Verdict, judged, part_words
+from bayesplate.recordings.modes_found import Mode, StabilityPath, find_modes, fit_modes, merge_modes
+from bayesplate.recordings.plausibility import JudgedMode, ModeVerdict, judge_modes, part_words
 from bayesplate.recordings.spectra import Spectra
-from bayesplate.recordings.strength import Answer
+from bayesplate.recordings.strength import ModeMobility
 
 LOWEST, HIGHEST = 20.0, 1000.0
-"""Hz between which modes are looked for unless others are given."""
-_BEYOND = 100.0
-"""Hz below the lowest and above the highest in which modes are looked for too: they reach into the band."""
+"""Default band in Hz in which modes are searched."""
+_MARGIN = 100.0
+"""Hz below and above the band in which modes are searched too: their tails reach into the band."""
 _FEWEST_LINES = 5
-_SAME = 3.0
-"""Decay rates within which a mode is found again in a fit without the parts."""
+_MATCH_REACH = 3.0
+"""Decay rates within which a mode is taken for the same in a fit without the parts of its peak."""
 
 
 @dataclass(frozen=True, eq=False)
-class Picked:
-    # in the order of frequency, without signs and labels, those that are likely no mode included
+class PickedModes:
+    # in the order of frequency, without signs and labels, including peaks that are likely no mode
     peaks: tuple[PickedRow, ...]
-    answers: tuple[Answer, ...]
+    answers: tuple[ModeMobility, ...]
     spectra: Spectra
-    paths: tuple[Path, ...]  # of the search, for the diagram of stability
+    paths: tuple[StabilityPath, ...]  # of the search, for the diagram of stability
     lowest: float
     highest: float
-    remarks: tuple[str, ...] = ()  # how recordings differ that do not show quite the same modes
+    remarks: tuple[str, ...] = ()  # on recordings whose modes differ
 
     @property
     def likely(self) -> tuple[PickedRow, ...]:
         return tuple(peak for peak in self.peaks if peak.is_likely)
 
     @property
-    def likely_answers(self) -> tuple[Answer, ...]:
-        return tuple(one for one, peak in zip(self.answers, self.peaks, strict=True) if peak.is_likely)
+    def likely_answers(self) -> tuple[ModeMobility, ...]:
+        return tuple(mobility for mobility, peak in zip(self.answers, self.peaks, strict=True) if peak.is_likely)
 
-    def sign(self, answer: Answer, flips: bool | None) -> str:
-        """Sign of a residue; empty without a force, else as of `Answer.sign`."""
+    def sign(self, answer: ModeMobility, flips: bool | None) -> str:
+        """Sign of a residue; empty without a force, else as of `ModeMobility.sign`."""
         return "" if self.spectra.force is None else answer.sign(flips)
 
 
-def pick_modes(spectra: Spectra, lowest: float = LOWEST, highest: float = HIGHEST) -> Picked:
+def pick_modes(spectra: Spectra, lowest: float = LOWEST, highest: float = HIGHEST) -> PickedModes:
     """Modes between two frequencies in Hz.
 
-    Refused where the spectra have next to nothing between the two, as frequency responses that end below, and where two
+    Refused where the spectra have hardly a line between the two, as frequency responses that end below, and where most
     recordings have no modes in common.
     """
     n_lines = int(((spectra.frequency >= lowest) & (spectra.frequency <= highest)).sum())
     if n_lines < _FEWEST_LINES:
         place, wanted = f"{spectra.names[0]} between {lowest:g} and {highest:g} Hz", f"{_FEWEST_LINES} lines or more"
         raise InputError(Fault(place, wanted, str(n_lines), "--lowest and --highest look elsewhere"))
-    sets = agreeing(spectra, lowest, highest)
-    searched = [_searched(spectra.only(records), lowest, highest) for records in sets]
-    paths = tuple(path for _, own in searched for path in own)
+    sets = agreeing_records(spectra, lowest, highest)
+    searched = [_search_records(spectra.only(records), lowest, highest) for records in sets]
+    paths = tuple(path for _, set_paths in searched for path in set_paths)
     peaks, remarks = searched[0][0], tuple[str, ...]()
     if len(sets) > 1:
-        shown = [[one for one in own if one.verdict.part_of < 0 or one.is_likely] for own, _ in searched]
-        across = modes_across(spectra, sets, shown)
-        spectra, remarks = across.spectra, across.remarks
-        both = zip(judged(spectra, across.modes), across.spurious, strict=True)
-        peaks = [replace(one, verdict=_at_least(one.verdict, spurious)) for one, spurious in both]
+        peak_sets = [[peak for peak in group if peak.verdict.part_of < 0 or peak.is_likely] for group, _ in searched]
+        averaged = average_modes(spectra, sets, peak_sets)
+        spectra, remarks = averaged.spectra, averaged.remarks
+        pairs = zip(judge_modes(spectra, averaged.modes), averaged.spurious, strict=True)
+        peaks = [replace(peak, verdict=_raise_doubt(peak.verdict, spurious)) for peak, spurious in pairs]
     peaks = sorted(peaks, key=lambda peak: peak.mode.frequency)
     strongest = max((peak.answer.strength for peak in peaks if peak.is_likely), default=1.0)
-    rows = tuple(_row(peak, strongest) for peak in peaks)
-    return Picked(rows, tuple(peak.answer for peak in peaks), spectra, paths, lowest, highest, remarks)
+    rows = tuple(_picked_row(peak, strongest) for peak in peaks)
+    return PickedModes(rows, tuple(peak.answer for peak in peaks), spectra, paths, lowest, highest, remarks)
 
 
-def whole_peaks(verdicts: Sequence[Verdict]) -> dict[int, int]:
-    """Numbers of those modes that are rather parts than modes, each with the number of that which it is a part of.
+def parts_of_peaks(verdicts: Sequence[ModeVerdict]) -> dict[int, int]:
+    """Numbers of the modes that are likely parts of a peak, each with the number of the mode whose peak that is.
 
-    What is a part of a part is not among them: beside the whole peak it may be a mode.
+    A part of a part is not among them: beside the whole peak it may be a mode.
     """
-    part_of = {m: one.part_of for m, one in enumerate(verdicts) if one.spurious > 0.5}
-    return {m: of for m, of in part_of.items() if of >= 0 and part_of.get(of, -1) < 0}
+    part_of = {m: verdict.part_of for m, verdict in enumerate(verdicts) if verdict.spurious > 0.5}
+    return {m: peak for m, peak in part_of.items() if peak >= 0 and part_of.get(peak, -1) < 0}
 
 
-def _searched(spectra: Spectra, lowest: float, highest: float) -> tuple[list[Peak], list[Path]]:
+def _search_records(spectra: Spectra, lowest: float, highest: float) -> tuple[list[JudgedMode], list[StabilityPath]]:
     """Peaks of records that show the same modes, parts of peaks included, and the paths of the search."""
-    below, above = max(lowest - _BEYOND, min(lowest, LOWEST)), min(highest + _BEYOND, float(spectra.frequency[-1]))
+    below, above = max(lowest - _MARGIN, min(lowest, LOWEST)), min(highest + _MARGIN, float(spectra.frequency[-1]))
     by_width, paths = find_modes(spectra, below, above)
-    modes = fit_modes(spectra, joined(by_width, spectra.spacing), by_width, lowest, highest)
-    kept, parts = _without_parts(spectra, modes, by_width, (lowest, highest))
-    return [*kept, *parts], paths
+    modes = fit_modes(spectra, merge_modes(by_width, spectra.spacing), by_width, lowest, highest)
+    peaks, parts = _fit_without_parts(spectra, modes, by_width, (lowest, highest))
+    return [*peaks, *parts], paths
 
 
-def _without_parts(
+def _fit_without_parts(
     spectra: Spectra, modes: Sequence[Mode], by_width: list[Floats], band: tuple[float, float]
-) -> tuple[list[Peak], list[Peak]]:
-    """Modes fitted again without those that are rather parts of the peaks of others than modes; and those parts.
+) -> tuple[list[JudgedMode], list[JudgedMode]]:
+    """Modes fitted again without those that are likely parts of the peaks of others; and those parts.
 
-    Parts are left out once and not again: where a peak is not simple in earnest, its modes come out right only beside
-    something that takes up the rest.
+    Parts are left out once only: where a peak is really not simple, its modes come out right only if another mode takes
+    up the residual.
     """
     from scipy.optimize import linear_sum_assignment
 
-    before = judged(spectra, modes)
-    leaving = whole_peaks([one.verdict for one in before])
-    kept = {m: one for m, one in enumerate(before) if m not in leaving}
-    beside = [m for m in kept if any(_overlap(modes[m], modes[k]) for k in leaving)]
-    if beside:
-        left = list(kept)
-        start = np.array([modes[m].pole for m in left])
-        again = judged(spectra, fit_modes(spectra, start, by_width, *band))
-        apart = np.abs(start[:, :1] - [one.mode.frequency for one in again]) / start[:, 1:]
-        for i, new in zip(*linear_sum_assignment(np.minimum(apart, _SAME)), strict=True):
-            if left[i] in beside and apart[i, new] < _SAME:
-                parts = [before[k] for k, of in leaving.items() if of == left[i]]
-                kept[left[i]] = _whole(again[new], before[left[i]], parts)
-    words = {k: part_words(kept[of].pole[0]) for k, of in leaving.items()}
-    return [*kept.values()], [replace(before[k], verdict=before[k].verdict._replace(kind=words[k])) for k in leaving]
+    judged = judge_modes(spectra, modes)
+    part_of = parts_of_peaks([peak.verdict for peak in judged])
+    peaks = {m: peak for m, peak in enumerate(judged) if m not in part_of}
+    neighbours = [m for m in peaks if any(_overlap(modes[m], modes[k]) for k in part_of)]
+    if neighbours:
+        kept_modes = list(peaks)
+        start = np.array([modes[m].pole for m in kept_modes])
+        refitted = judge_modes(spectra, fit_modes(spectra, start, by_width, *band))
+        distances = np.abs(start[:, :1] - [peak.mode.frequency for peak in refitted]) / start[:, 1:]
+        for i, j in zip(*linear_sum_assignment(np.minimum(distances, _MATCH_REACH)), strict=True):
+            if kept_modes[i] in neighbours and distances[i, j] < _MATCH_REACH:
+                parts = [judged[k] for k, whole in part_of.items() if whole == kept_modes[i]]
+                peaks[kept_modes[i]] = _peak_without_parts(refitted[j], judged[kept_modes[i]], parts)
+    words = {k: part_words(peaks[whole].pole[0]) for k, whole in part_of.items()}
+    return [*peaks.values()], [replace(judged[k], verdict=judged[k].verdict._replace(kind=words[k])) for k in part_of]
 
 
-def _overlap(one: Mode, other: Mode) -> bool:
+def _overlap(mode: Mode, other: Mode) -> bool:
     """Whether two modes lie within their widths of each other."""
-    return abs(one.frequency - other.frequency) < one.decay + other.decay
+    return abs(mode.frequency - other.frequency) < mode.decay + other.decay
 
 
-def _whole(now: Peak, before: Peak, parts: Sequence[Peak]) -> Peak:
-    """A peak after parts of it were left out, with what it was before: that of the mode and the parts nearest to it."""
+def _peak_without_parts(refitted: JudgedMode, fitted: JudgedMode, parts: Sequence[JudgedMode]) -> JudgedMode:
+    """A peak refitted without its parts; `other` becomes the mode or part of the first fit that lies nearest to it."""
     if not parts:
-        return now
-    every = (one.mode for one in (before, *parts))
-    other = min(every, key=lambda one: abs(one.frequency - now.mode.frequency))
-    return replace(now, other=other, doubt=max(one.verdict.spurious for one in parts))
+        return refitted
+    modes = (peak.mode for peak in (fitted, *parts))
+    nearest = min(modes, key=lambda mode: abs(mode.frequency - refitted.mode.frequency))
+    return replace(refitted, other=nearest, doubt=max(part.verdict.spurious for part in parts))
 
 
-def _at_least(verdict: Verdict, spurious: float) -> Verdict:
-    """A verdict of no less doubt."""
+def _raise_doubt(verdict: ModeVerdict, spurious: float) -> ModeVerdict:
+    """A verdict with at least this probability of a spurious mode."""
     kind = verdict.kind or "faint" * (spurious > 0.5)
     return verdict._replace(spurious=max(verdict.spurious, spurious), kind=kind)
 
 
-def _row(peak: Peak, strongest: float) -> PickedRow:
-    """A mode averaged over two fits: with a part of its peak as a mode, and without."""
+def _picked_row(peak: JudgedMode, strongest: float) -> PickedRow:
+    """The row of a mode averaged over two fits: with a part of its peak as another mode, and without."""
     mode = peak.mode
-    frequency, decay = (float(one) for one in peak.pole)
+    frequency, decay = (float(value) for value in peak.pole)
     window = np.hypot(mode.window, peak.split)
-    sd, decay_sd = (float(one) for one in np.sqrt(mode.noise**2 + mode.scatter**2 + window**2))
+    sd, decay_sd = (float(value) for value in np.sqrt(mode.noise**2 + mode.scatter**2 + window**2))
     return PickedRow(
         hz=frequency,
         sd_hz=sd,

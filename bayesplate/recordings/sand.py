@@ -1,8 +1,8 @@
-"""Sand on a ringing board: a picture of the lines on which it gathers, scored against the shapes of modes.
+"""Sand on a ringing board: a picture of the nodal lines on which it gathers, scored against the shapes of modes.
 
-The picture is cropped to the board by hand, so that it may be turned by a few degrees, seen from the side, lit unevenly
-and strewn in part. It is compared as it is, and straightened in many ways; what counts is how well its best
-straightened form agrees with where a shape stands still.
+The picture is cropped to the board by hand, so that it may be turned by a few degrees, seen from the side, unevenly lit
+and strewn in part. It is straightened in many ways; the score is the agreement of its best form with the nodal lines of
+a shape.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ GRID = (96, 48)
 """Points along x and across it at which picture and shapes are compared."""
 LARGEST_PICTURE = 50_000_000
 MOST_PIXELS = 60_000_000
-_STILL = 0.12
-"""Amplitude over the largest, below which sand lies still."""
-_BLUR, _GROUND = 1.3, 9.0
+_STILL_AMPLITUDE = 0.12
+"""Amplitude over the largest below which sand lies still."""
+_BLUR, _LIGHT_SCALE = 1.3, 9.0
 """Points over which lines are blurred, and over which the light on a picture varies."""
 _TURNS = np.radians(np.arange(-7.5, 7.6, 1.5))
 _KEYSTONES = (-0.12, 0.0, 0.12)
 _SCALES = (0.95, 1.0)
 _N_CELLS = 70.0
-"""Independent parts of a picture."""
-_NEVER = 0.01
-"""Probability that a picture shows none of the modes, or is not what its name says."""
+"""Independent cells of a picture."""
+_FOREIGN_PROBABILITY = 0.01
+"""Probability that a picture shows none of the modes, or another one than its name says."""
 
 
 def read_picture(path: str | os.PathLike[str]) -> Floats:
@@ -62,78 +62,78 @@ def read_picture(path: str | os.PathLike[str]) -> Floats:
     return values
 
 
-def straightened(picture: Floats) -> Floats:
-    """The forms in which a picture is compared, (n_rows, n_columns) as it is seen: (n_forms, n_points) array."""
+def straighten_picture(picture: Floats) -> Floats:
+    """The straightened forms of a picture, (n_rows, n_columns) as it is seen: (n_forms, n_points) array."""
     from_below = picture[::-1].T  # rows of a picture run downward
-    return np.stack([_normal(_flat(one)) for one in _turned(from_below)])
+    return np.stack([_normalise(_flatten_light(turned)) for turned in _turn_picture(from_below)])
 
 
 def sand_evidence(forms: Floats, shapes: Floats) -> Floats:
-    """ln of how much a picture speaks for each shape, zero for the average of all: (n_modes,) array.
+    """ln of the evidence of a picture for each shape, zero for the average of all: (n_modes,) array.
 
-    The forms of `straightened` show the board from above, x from left to right and y from bottom to top; the shapes,
-    (n_modes, n_x, n_y), are deflections at evenly spaced points of the whole board, edges included.
+    The forms of `straighten_picture` show the board from above, x from left to right and y from bottom to top; the
+    shapes, (n_modes, n_x, n_y), are deflections at evenly spaced points of the whole board, edges included.
     """
-    scores = agreement(forms, shapes)
+    scores = line_agreement(forms, shapes)
     log_likelihood = -0.5 * _N_CELLS * np.log(1.0 - np.clip(scores, 0.0, 0.999) ** 2)
     top = log_likelihood.max()
     relative = log_likelihood - top - np.log(np.mean(np.exp(log_likelihood - top)))
-    return np.asarray(np.logaddexp(relative + np.log(1.0 - _NEVER), np.log(_NEVER)))
+    return np.asarray(np.logaddexp(relative + np.log(1.0 - _FOREIGN_PROBABILITY), np.log(_FOREIGN_PROBABILITY)))
 
 
-def agreement(forms: Floats, shapes: Floats) -> Floats:
-    """Correlation of a picture in its best form with the still lines of each shape: (n_modes,) array."""
-    lines = np.stack([_normal(_flat(_still(shape))) for shape in shapes])
+def line_agreement(forms: Floats, shapes: Floats) -> Floats:
+    """Correlation of the best form of a picture with the nodal lines of each shape: (n_modes,) array."""
+    lines = np.stack([_normalise(_flatten_light(_stillness(shape))) for shape in shapes])
     return np.asarray(np.abs(forms @ lines.T).max(axis=0))  # sand may be lighter or darker than the board
 
 
-def _still(shape: Floats) -> Floats:
-    """Stillness of a shape, 0 to 1, at the points of the grid: sand lies where it is 1."""
+def _stillness(shape: Floats) -> Floats:
+    """Stillness of a shape, 0 to 1, at the points of the grid: sand gathers where it is 1."""
     level = np.abs(shape) / np.abs(shape).max()
-    return _sampled(np.exp(-((level / _STILL) ** 2)), *_points())
+    return _sample_grid(np.exp(-((level / _STILL_AMPLITUDE) ** 2)), *_grid_points())
 
 
-def _points() -> tuple[Floats, Floats]:
-    """Places of the grid as fractions of the sides: two (n_x, n_y) arrays."""
+def _grid_points() -> tuple[Floats, Floats]:
+    """Points of the grid as fractions of the sides: two (n_x, n_y) arrays."""
     x, y = (np.arange(n) + 0.5 for n in GRID)
     return tuple(np.meshgrid(x / GRID[0], y / GRID[1], indexing="ij"))  # type: ignore[return-value]
 
 
-def _sampled(values: Floats, x: Floats, y: Floats) -> Floats:
-    """Values on a grid over the sides, edges included, at fractions of the sides."""
+def _sample_grid(values: Floats, x: Floats, y: Floats) -> Floats:
+    """Values on a grid over the board, edges included, interpolated at fractions of the sides."""
     from scipy.ndimage import map_coordinates
 
     n_x, n_y = values.shape
     return np.asarray(map_coordinates(values, [x * (n_x - 1), y * (n_y - 1)], order=1, mode="nearest"))
 
 
-def _turned(picture: Floats) -> list[Floats]:
-    """The picture turned, seen from the side and scaled in all ways that are tried."""
+def _turn_picture(picture: Floats) -> list[Floats]:
+    """The picture in all turns, keystones and scales that are tried."""
     from scipy.ndimage import gaussian_filter
 
     width, height = picture.shape
     smooth = gaussian_filter(picture, (0.3 * width / GRID[0], 0.3 * height / GRID[1]))
-    x, y = _points()
+    x, y = _grid_points()
     u, v = (x - 0.5) * width, (y - 0.5) * height
-    found = []
-    for turn, along, across, scale in product(_TURNS, _KEYSTONES, _KEYSTONES, _SCALES):
-        depth = 1.0 + along * (x - 0.5) + across * (y - 0.5)
-        there = scale * (np.cos(turn) * u - np.sin(turn) * v) / depth / width + 0.5
-        upward = scale * (np.sin(turn) * u + np.cos(turn) * v) / depth / height + 0.5
-        found.append(_sampled(smooth, there, upward))
-    return found
+    pictures = []
+    for turn, keystone_x, keystone_y, scale in product(_TURNS, _KEYSTONES, _KEYSTONES, _SCALES):
+        depth = 1.0 + keystone_x * (x - 0.5) + keystone_y * (y - 0.5)
+        at_x = scale * (np.cos(turn) * u - np.sin(turn) * v) / depth / width + 0.5
+        at_y = scale * (np.sin(turn) * u + np.cos(turn) * v) / depth / height + 0.5
+        pictures.append(_sample_grid(smooth, at_x, at_y))
+    return pictures
 
 
-def _flat(values: Floats) -> Floats:
-    """Lines without the light that falls on them, no line brighter than the others."""
+def _flatten_light(values: Floats) -> Floats:
+    """The lines of a picture without uneven light, all of about the same contrast."""
     from scipy.ndimage import gaussian_filter
 
-    fine = gaussian_filter(values, _BLUR)
-    off = fine - gaussian_filter(values, _GROUND)
-    return np.asarray(off / np.sqrt(gaussian_filter(off**2, _GROUND) + 1e-2 * np.mean(off**2) + 1e-12))
+    blurred = gaussian_filter(values, _BLUR)
+    lines = blurred - gaussian_filter(values, _LIGHT_SCALE)
+    return np.asarray(lines / np.sqrt(gaussian_filter(lines**2, _LIGHT_SCALE) + 1e-2 * np.mean(lines**2) + 1e-12))
 
 
-def _normal(values: Floats) -> Floats:
-    """All values in a row, of mean zero and length one."""
+def _normalise(values: Floats) -> Floats:
+    """All values as one vector of mean zero and length one."""
     row = values.ravel() - values.mean()
     return np.asarray(row / max(float(np.linalg.norm(row)), 1e-12))

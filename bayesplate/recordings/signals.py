@@ -1,4 +1,4 @@
-"""What a file holds: a recording of a response, with or without the force, or a frequency response already made."""
+"""The signals of a file: a recording of a response, with or without the force, or a ready frequency response."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ class FrequencyResponse:
     remarks: tuple[str, ...] = ()
 
 
-Read = Recording | FrequencyResponse
+Signal = Recording | FrequencyResponse
 
 
-def in_blocks(signal: Floats, length: int) -> Floats:
-    """Consecutive blocks of a signal, (n_blocks, length), without what is left at its end."""
+def split_blocks(signal: Floats, length: int) -> Floats:
+    """Consecutive blocks of a signal, (n_blocks, length), without the incomplete block at its end."""
     return signal[: signal.size // length * length].reshape(-1, length)

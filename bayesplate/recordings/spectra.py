@@ -1,4 +1,4 @@
-"""Spectra of free decays, line by line on one grid of frequencies, and what was between hammer and sensor."""
+"""Spectra of free decays or frequency responses on one grid of frequencies, with the places of hammer and sensor."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from bayesplate.arrays import Complex, Floats, Indices
 from bayesplate.recordings.hits import LONGEST_DURATION, Hit
 from bayesplate.recordings.signals import FrequencyResponse, Motion, Place, Recording
 
-Rows = Indices
-Between = tuple[Place | None, Place | None]
+RecordIndices = Indices
+PlacePair = tuple[Place | None, Place | None]
 """Places of hammer and sensor."""
 
-_ABOVE = 1.25
-"""Frequency up to which spectra are kept, over the highest at which modes are looked for."""
+_BAND_MARGIN = 1.25
+"""Frequency up to which spectra are kept, over the highest at which modes are searched."""
 _BEFORE_PULSE = 0.001
-_MEDIAN = np.sqrt(6.0 * np.log(2.0))
-"""Median of the second difference of complex white noise over its root mean square."""
+_MEDIAN_OVER_RMS = np.sqrt(6.0 * np.log(2.0))
+"""Median of the size of the second difference of complex white noise, over the root mean square of the noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,12 +27,12 @@ class Spectra:
     """Spectra of decays, or frequency responses, on one grid."""
 
     frequency: Floats  # (n_lines,), Hz
-    values: Complex  # (n_lines, n_records): from where the board rings by itself, without a taper
+    values: Complex  # (n_lines, n_records): of the free decays, without a taper
     force: Complex | None  # (n_lines, n_records): of each hit from the same origin of time; 1 for frequency responses
     names: tuple[str, ...]
-    files: Rows  # (n_records,): which records are hits of one file
-    places: Rows  # (n_records,): which were taken between the same two places
-    between: tuple[Between, ...]  # of each of `places`
+    files: RecordIndices  # (n_records,): number of the file of each record
+    places: RecordIndices  # (n_records,): number of the pair of places of each record
+    between: tuple[PlacePair, ...]  # the pairs of places
     motion: Motion
     duration: float  # s, of each decay
 
@@ -42,43 +42,50 @@ class Spectra:
 
     @property
     def noise(self) -> Floats:
-        """Level of each record's noise, robustly from how much neighbouring lines differ: (n_records,) array."""
+        """Level of each record's noise, from the median difference of neighbouring lines: (n_records,) array."""
         second = self.values[2:] - 2.0 * self.values[1:-1] + self.values[:-2]
-        level = np.median(np.abs(second), axis=0) / _MEDIAN
+        level = np.median(np.abs(second), axis=0) / _MEDIAN_OVER_RMS
         top = np.abs(self.values).max(axis=0)
         return np.asarray(np.maximum(level, 1e-9 * top + 1e-300))
 
-    def only(self, records: Rows) -> Spectra:
-        kept = np.unique(self.places[records])
+    def only(self, records: RecordIndices) -> Spectra:
+        kept_places = np.unique(self.places[records])
         return replace(
             self,
             values=self.values[:, records],
             force=None if self.force is None else self.force[:, records],
             names=tuple(self.names[r] for r in records),
             files=self.files[records],
-            places=np.searchsorted(kept, self.places[records]),
-            between=tuple(self.between[k] for k in kept),
+            places=np.searchsorted(kept_places, self.places[records]),
+            between=tuple(self.between[k] for k in kept_places),
         )
 
 
 def decay_spectra(heard: Sequence[tuple[Recording, Sequence[Hit]]], highest: float) -> Spectra:
-    """Spectra of what follows every hit of recordings of one rate, all of one length, for modes up to some Hz."""
+    """Spectra of the decays after all hits of recordings of one rate, cut to one length, for modes up to some Hz."""
     from scipy.fft import prev_fast_len, rfft
 
     first = heard[0][0]
-    every = [(recording, number, hit) for recording, hits in heard for number, hit in enumerate(hits, start=1)]
-    shortest = min(hit.stop - hit.start for _, _, hit in every)
+    numbered_hits = [(recording, number, hit) for recording, hits in heard for number, hit in enumerate(hits, start=1)]
+    shortest = min(hit.stop - hit.start for _, _, hit in numbered_hits)
     n_samples = prev_fast_len(min(shortest, round(LONGEST_DURATION * first.rate)), real=True)
-    n_lines = min(int(_ABOVE * highest * n_samples / first.rate) + 1, n_samples // 2)
+    n_lines = min(int(_BAND_MARGIN * highest * n_samples / first.rate) + 1, n_samples // 2)
     frequency = np.arange(n_lines) * first.rate / n_samples
-    columns = [rfft(one.response[hit.start : hit.start + n_samples])[:n_lines] / one.rate for one, _, hit in every]
-    forces = [_force_spectrum(one.force, one.rate, hit, frequency) for one, _, hit in every if one.force is not None]
-    places, between = _grouped([one for one, _, _ in every])
+    columns = [
+        rfft(recording.response[hit.start : hit.start + n_samples])[:n_lines] / recording.rate
+        for recording, _, hit in numbered_hits
+    ]
+    forces = [
+        _force_spectrum(recording.force, recording.rate, hit, frequency)
+        for recording, _, hit in numbered_hits
+        if recording.force is not None
+    ]
+    places, between = _group_by_places([recording for recording, _, _ in numbered_hits])
     return Spectra(
         frequency=frequency,
         values=np.stack(columns, axis=1),
         force=np.stack(forces, axis=1) if forces else None,
-        names=tuple(f"{one.name} hit {number}" for one, number, _ in every),
+        names=tuple(f"{recording.name} hit {number}" for recording, number, _ in numbered_hits),
         files=np.repeat(np.arange(len(heard)), [len(hits) for _, hits in heard]),
         places=places,
         between=between,
@@ -88,18 +95,18 @@ def decay_spectra(heard: Sequence[tuple[Recording, Sequence[Hit]]], highest: flo
 
 
 def response_spectra(responses: Sequence[FrequencyResponse], highest: float, padding: int = 1) -> Spectra:
-    """Frequency responses on one grid up to somewhat above some Hz; of padded ones the lines of their records."""
+    """Frequency responses on one grid for modes up to some Hz; of padded ones only the lines of the record are kept."""
     first = responses[0]
     spacing = float(first.frequency[1] - first.frequency[0])
     lines = np.rint(first.frequency / spacing).astype(np.intp)
-    kept = (first.frequency <= _ABOVE * highest) & (lines % padding == 0)
-    values = np.stack([one.values[kept] for one in responses], axis=1).astype(complex)
-    places, between = _grouped(responses)
+    kept_lines = (first.frequency <= _BAND_MARGIN * highest) & (lines % padding == 0)
+    values = np.stack([response.values[kept_lines] for response in responses], axis=1).astype(complex)
+    places, between = _group_by_places(responses)
     return Spectra(
-        frequency=first.frequency[kept],
+        frequency=first.frequency[kept_lines],
         values=values,
         force=np.ones_like(values),
-        names=tuple(one.name for one in responses),
+        names=tuple(response.name for response in responses),
         files=np.arange(len(responses)),
         places=places,
         between=between,
@@ -109,17 +116,17 @@ def response_spectra(responses: Sequence[FrequencyResponse], highest: float, pad
 
 
 def _force_spectrum(force: Floats, rate: float, hit: Hit, frequency: Floats) -> Complex:
-    """Spectrum of one pulse, its time counted from where the decay begins; outside the pulse the force is noise."""
+    """Spectrum of one pulse, with time counted from the start of the decay; outside the pulse the force is noise."""
     first = max(hit.onset - round(_BEFORE_PULSE * rate), 0)
     pulse = force[first : hit.start] - np.median(force)
-    at = (np.arange(first, hit.start) - hit.start) / rate
+    times = (np.arange(first, hit.start) - hit.start) / rate
     # few samples and many lines: a product is faster than a transform
-    return np.asarray(np.exp(-2j * np.pi * np.outer(frequency, at)) @ pulse / rate)
+    return np.asarray(np.exp(-2j * np.pi * np.outer(frequency, times)) @ pulse / rate)
 
 
-def _grouped(records: Sequence[Recording | FrequencyResponse]) -> tuple[Rows, tuple[Between, ...]]:
-    """Which records share their places; a file of which one place is not known is a pair of places of its own."""
-    between = [(one.hammer, one.sensor) for one in records]
-    keys = [one.name if None in pair else pair for pair, one in zip(between, records, strict=True)]
+def _group_by_places(records: Sequence[Recording | FrequencyResponse]) -> tuple[RecordIndices, tuple[PlacePair, ...]]:
+    """Number of the pair of places of each record, and the pairs; a file with an unknown place is a pair of its own."""
+    pairs = [(record.hammer, record.sensor) for record in records]
+    keys = [record.name if None in pair else pair for pair, record in zip(pairs, records, strict=True)]
     order = list(dict.fromkeys(keys))
-    return np.array([order.index(key) for key in keys], dtype=np.intp), tuple(between[keys.index(k)] for k in order)
+    return np.array([order.index(key) for key in keys], dtype=np.intp), tuple(pairs[keys.index(k)] for k in order)

@@ -1,8 +1,8 @@
 """Exponential sine sweeps to impulse responses: the response is divided by the sweep, frequency by frequency.
 
 An exponential sweep x(t) = sin(K (exp(t / L) - 1)) with L = T / ln(f2 / f1) and K = 2 pi f1 L passes each octave in
-the same time, so that what the loudspeaker adds in harmonics comes out before the impulse response and is cut away.
-Where another sweep was played, its frequencies come out one after the other: that is no impulse, and is refused.
+the same time, so that harmonics of the loudspeaker come before the impulse response and are cut away. Where another
+sweep was played, its frequencies come one after the other: that is no impulse, and is refused.
 
 References
 ----------
@@ -21,30 +21,30 @@ from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.hits import LEAST_DURATION, LONGEST_DURATION, Hit
 from bayesplate.recordings.signals import Recording
 
-_LONGEST = 600.0
-"""s."""
-_BEFORE = 0.01
-"""s before the impulse response that are kept."""
-_AFTER = 0.002
-"""s after it from which on the board rings by itself."""
-_SETS_IN = 0.3
-"""Share of its height that it reaches first where it sets in: several modes may be highest together only later."""
-_ABOUT, _APART, _MOST_BEFORE = 0.1, 0.02, 0.05
-"""s before and after it sets in, s that are left out before that, and power there over that after it, at most; both
-less the noise."""
-_LOOK, _LOUD, _CLEAR = 1.0, 1e-3, 30.0
-"""s before and after it sets in, in which frequencies are looked at, and power of those that count: over the loudest
-one, and over what is usual at the same frequency."""
-_OFF, _MOST_OFF = 0.06, 0.16
-"""s by which a frequency may come at another time than the others, and the share of them that may be off by more."""
-_OF_MEDIAN = 0.455
+_LONGEST_SWEEP = 600.0
+"""Longest duration of a sweep, s."""
+_BEFORE_IMPULSE = 0.01
+"""s before the onset of the impulse response that are kept."""
+_AFTER_IMPULSE = 0.002
+"""s after the onset from which on the board rings freely."""
+_ONSET_SHARE = 0.3
+"""Share of the height of an impulse response that it reaches first at its onset: several modes may peak later."""
+_ONSET_SPAN, _ONSET_GAP, _MOST_BEFORE = 0.1, 0.02, 0.05
+"""s before and after the onset that are compared, s just before the onset that are left out, and the largest power
+before it over that after it; both less the noise."""
+_LOOK_SPAN, _LOUD_SHARE, _CLEAR_RATIO = 1.0, 1e-3, 30.0
+"""s before and after the onset in which frequencies are examined, and least power of a clear frequency: over the
+loudest one, and over the median at the same frequency."""
+_LATE_TIME, _MOST_LATE = 0.06, 0.16
+"""s by which a frequency may differ in time from the others, and the share of frequencies that may differ by more."""
+_MEDIAN_SQUARE = 0.455
 """Median of the square of a normal variable over its mean."""
-_FLOOR = 1e-4
+_POWER_FLOOR = 1e-4
 """Share of a sweep's greatest power below which a frequency was not excited."""
-_OUTSIDE = 5e-3
-"""Share of a sweep's power below the frequencies that it passes, and above them: it begins and ends suddenly."""
-_WHOLE, _NOTHING = 1.5, 2.0
-"""Frequency over the highest that is asked for up to which an impulse response is kept, and from which on nothing."""
+_OUTSIDE_SHARE = 5e-3
+"""Share of a sweep's power below its first frequency, and above its last: it begins and ends suddenly."""
+_PASS_RATIO, _STOP_RATIO = 1.5, 2.0
+"""Frequencies over the highest of the modes: end of the pass band of an impulse response, start of its stop band."""
 
 
 class Sweep(NamedTuple):
@@ -68,84 +68,86 @@ def read_sweep(text: str) -> Sweep:
         first, last, duration = (float(part) for part in text.split(","))
     except ValueError:
         raise InputError(Fault("sweep", "F1,F2,SECONDS or a file", got, "45,8000,8")) from None
-    if not (0.0 < first < last < np.inf and LEAST_DURATION < duration <= _LONGEST):
-        wanted = f"two rising frequencies in Hz and a time in s, up to {_LONGEST:g}"
+    if not (0.0 < first < last < np.inf and LEAST_DURATION < duration <= _LONGEST_SWEEP):
+        wanted = f"two rising frequencies in Hz and a time in s, up to {_LONGEST_SWEEP:g}"
         raise InputError(Fault("sweep", wanted, got, "45,8000,8"))
     return Sweep(first, last, duration)
 
 
-def band_of(played: Floats, rate: float) -> tuple[float, float]:
+def sweep_band(played: Floats, rate: float) -> tuple[float, float]:
     """Frequencies in Hz between which a sweep excites a board: outside there is noise alone."""
     from scipy.fft import rfft
 
     power = np.cumsum(np.abs(rfft(played)) ** 2)
-    first, last = np.searchsorted(power, power[-1] * np.array([_OUTSIDE, 1.0 - _OUTSIDE])) * rate / played.size
+    first, last = (
+        np.searchsorted(power, power[-1] * np.array([_OUTSIDE_SHARE, 1.0 - _OUTSIDE_SHARE])) * rate / played.size
+    )
     return float(first), float(last)
 
 
 def impulse_response(recording: Recording, played: Floats, highest: float) -> tuple[Recording, Hit]:
     """The impulse response in a recording of a sweep, as if the board had been hit once, for modes up to some Hz.
 
-    The sweep is given as samples at the rate of the recording. It is refused where what comes out is no impulse
-    response.
+    `played` holds the samples of the sweep at the rate of the recording. A recording that gives no impulse response is
+    refused.
     """
     rate = recording.rate
-    whole = _divided(recording.response, played, highest / rate)
-    onset = _sets_in(np.abs(whole), round(_ABOUT * rate))
-    if not _is_impulse(whole, onset, rate):
+    impulse = _divide_by_sweep(recording.response, played, highest / rate)
+    onset = _onset_sample(np.abs(impulse), round(_ONSET_SPAN * rate))
+    if not _is_impulse(impulse, onset, rate):
         got = "no impulse when it is turned back: its frequencies come one after the other, or are lost in noise"
         remedy = "--sweep with what was played: its frequencies and seconds, exponential"
         raise InputError(Fault(recording.name, "the response to this sweep", got, remedy))
-    first = max(onset - round(_BEFORE * rate), 0)
-    response = whole[first : first + round((LONGEST_DURATION + _BEFORE) * rate)]
+    first = max(onset - round(_BEFORE_IMPULSE * rate), 0)
+    response = impulse[first : first + round((LONGEST_DURATION + _BEFORE_IMPULSE) * rate)]
     onset -= first
-    return replace(recording, response=response), Hit(onset, onset + round(_AFTER * rate), response.size)
+    return replace(recording, response=response), Hit(onset, onset + round(_AFTER_IMPULSE * rate), response.size)
 
 
-def _sets_in(size: Floats, about: int) -> int:
-    """Sample at which an impulse response sets in, within some samples before its height."""
-    highest = int(np.argmax(size))
-    first = max(highest - about, 0)
-    return first + int(np.argmax(size[first : highest + 1] >= _SETS_IN * size[highest]))
+def _onset_sample(level: Floats, span: int) -> int:
+    """Sample of the onset of an impulse response, within a span of samples before its highest one."""
+    highest = int(np.argmax(level))
+    first = max(highest - span, 0)
+    return first + int(np.argmax(level[first : highest + 1] >= _ONSET_SHARE * level[highest]))
 
 
-def _is_impulse(whole: Floats, onset: int, rate: float) -> bool:
+def _is_impulse(impulse: Floats, onset: int, rate: float) -> bool:
     """Whether hardly anything comes before the onset, and few of the frequencies come late."""
-    about, apart, look = (round(seconds * rate) for seconds in (_ABOUT, _APART, _LOOK))
-    near = whole[max(onset - look, 0) :][: 2 * look]
-    noise = float(np.median(near**2)) / _OF_MEDIAN
-    before, after = whole[max(onset - apart - about, 0) : max(onset - apart, 0)], whole[onset : onset + about]
+    span, gap, look = (round(seconds * rate) for seconds in (_ONSET_SPAN, _ONSET_GAP, _LOOK_SPAN))
+    near = impulse[max(onset - look, 0) :][: 2 * look]
+    noise = float(np.median(near**2)) / _MEDIAN_SQUARE
+    before, after = impulse[max(onset - gap - span, 0) : max(onset - gap, 0)], impulse[onset : onset + span]
     before_power, after_power = (float(np.sum(part**2 - noise)) for part in (before, after))
-    return before_power <= _MOST_BEFORE * max(after_power, 0.0) and not _come_late(near, rate)
+    return before_power <= _MOST_BEFORE * max(after_power, 0.0) and not _frequencies_come_late(near, rate)
 
 
-def _come_late(near: Floats, rate: float) -> bool:
-    """Whether many of the frequencies that stand out come at another time than the others, or none stands out."""
+def _frequencies_come_late(near: Floats, rate: float) -> bool:
+    """Whether many of the clear frequencies come at another time than the others, or there is no clear one."""
     from scipy.signal import stft
 
-    n = round(_ABOUT * rate)
+    n = round(_ONSET_SPAN * rate)
     _, times, lines = stft(near, rate, nperseg=n, noverlap=n - n // 10, boundary=None, padded=False)
     power = np.abs(lines) ** 2
     loudest = power.max(axis=1)
-    counts = (loudest > _LOUD * loudest.max()) & (loudest > _CLEAR * np.median(power, axis=1))
-    when = times[power.argmax(axis=1)][counts]
-    return not when.size or bool(np.mean(np.abs(when - np.median(when)) > _OFF) > _MOST_OFF)
+    is_clear = (loudest > _LOUD_SHARE * loudest.max()) & (loudest > _CLEAR_RATIO * np.median(power, axis=1))
+    peak_times = times[power.argmax(axis=1)][is_clear]
+    return not peak_times.size or bool(np.mean(np.abs(peak_times - np.median(peak_times)) > _LATE_TIME) > _MOST_LATE)
 
 
-def _divided(response: Floats, played: Floats, highest: float) -> Floats:
+def _divide_by_sweep(response: Floats, played: Floats, highest: float) -> Floats:
     """The response over the sweep, frequency by frequency, where the sweep has any power.
 
-    What lies far above the highest frequency, in periods a sample, is left out: a sweep excites it least, and its noise
-    would hide where the rest sets in.
+    Frequencies far above `highest`, in periods a sample, are left out: a sweep excites them least, and their noise
+    would hide the onset.
     """
     from scipy.fft import irfft, next_fast_len, rfft
 
     n = next_fast_len(response.size + played.size, real=True)
     x = rfft(played, n)
     power = np.abs(x) ** 2
-    above = np.clip((np.arange(x.size) / (n * highest) - _WHOLE) / (_NOTHING - _WHOLE), 0.0, 1.0)
-    kept = np.cos(0.5 * np.pi * above) ** 2
-    quotient = kept * rfft(response, n) * x.conj() / np.maximum(power, _FLOOR * power.max())
-    delay = played.size  # a sweep that was heard before it was played would come out negative
-    turned = quotient * np.exp(-2j * np.pi * np.arange(x.size) * delay / n)
-    return np.asarray(irfft(turned, n))
+    above = np.clip((np.arange(x.size) / (n * highest) - _PASS_RATIO) / (_STOP_RATIO - _PASS_RATIO), 0.0, 1.0)
+    gain = np.cos(0.5 * np.pi * above) ** 2
+    quotient = gain * rfft(response, n) * x.conj() / np.maximum(power, _POWER_FLOOR * power.max())
+    delay = played.size  # times before the sweep was played would be negative
+    delayed = quotient * np.exp(-2j * np.pi * np.arange(x.size) * delay / n)
+    return np.asarray(irfft(delayed, n))

@@ -1,4 +1,4 @@
-"""The figure of the board: its outline to scale, how each edge is held, the grain, hammer and sensors."""
+"""The figure of the board: outline to scale, edges, grain, hammer and sensors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,18 @@ from bayesplate.board.board import Board, Values, vibrating_lengths
 from bayesplate.board.setup import Setup
 from bayesplate.board.words import EDGES
 from bayesplate.frequencies.system import System, system_of
-from bayesplate.report.style import DARK, GREY, LIGHT, SMALL, VERMILLION, WIDTH, WORDS, Picture, placed, short
+from bayesplate.report.style import (
+    DARK,
+    FIGURE_WIDTH,
+    GREY,
+    LIGHT,
+    SMALL_SIZE,
+    TEXT_SIZE,
+    VERMILLION,
+    Picture,
+    place_panel,
+    shorten,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,11 +37,11 @@ _HEADING = 0.14
 _LEGEND = 0.3
 _N_GRAIN = 13
 _N_POINTS = 201
-_BENT = 0.12
+_BEND_HEIGHT = 0.12
 """Height at which the largest rise is drawn, as a share of the shorter side."""
-_LINES = {"clamped": ("-", 1.6), "supported": ((0, (4, 3)), 1.6), "free": ("-", 0.9)}
+_EDGE_LINES = {"clamped": ("-", 1.6), "supported": ((0, (4, 3)), 1.6), "free": ("-", 0.9)}
 _MARKERS = {"accelerometer": "s", "exciter": "D", "shaker": "D", "weight": "p", "hammer": "X"}
-_MARK: Any = {"ls": "none", "ms": 7, "mec": "black", "mew": 0.8, "clip_on": False, "zorder": 6}
+_MARKER_STYLE: Any = {"ls": "none", "ms": 7, "mec": "black", "mew": 0.8, "clip_on": False, "zorder": 6}
 
 
 def board_picture(board: Board) -> Picture:
@@ -38,62 +49,66 @@ def board_picture(board: Board) -> Picture:
     from matplotlib.figure import Figure
 
     values = board.nominal()
-    outlines = [_outline(system_of(board, setup), values) for setup in board.setups]
-    length, width = float(values["length_x"]), max(one.width for one in outlines)
+    outlines = [_drawn_outline(system_of(board, setup), values) for setup in board.setups]
+    length, width = float(values["length_x"]), max(outline.width for outline in outlines)
     scale = min(_WIDEST / length, _TALLEST / width)
     above = _ABOVE + (_HEADING if len(board.setups) > 1 else 0.0)
-    row = above + width * scale + _BELOW
+    row_height = above + width * scale + _BELOW
     has_items = any(setup.hammer or any(item.places for item in setup.attached) for setup in board.setups)
     has_legend = has_items or _is_warped(board)
-    height = row * len(board.setups) + (_LEGEND * (2 if has_items and _is_warped(board) else 1) if has_legend else 0.0)
-    figure = Figure(figsize=(WIDTH, height))
+    height = row_height * len(board.setups) + (
+        _LEGEND * (2 if has_items and _is_warped(board) else 1) if has_legend else 0.0
+    )
+    figure = Figure(figsize=(FIGURE_WIDTH, height))
     handles: dict[str, Any] = {}
     for i, (setup, outline) in enumerate(zip(board.setups, outlines, strict=True)):
         size = (length * scale, width * scale)
-        left = _LEFT + (WIDTH - _LEFT - 0.55 - size[0]) / 2
-        bottom = height - i * row - above - size[1]
-        panel = placed(figure, left, bottom, *size)
+        left = _LEFT + (FIGURE_WIDTH - _LEFT - 0.55 - size[0]) / 2
+        bottom = height - i * row_height - above - size[1]
+        panel = place_panel(figure, left, bottom, *size)
         panel.set(xlim=(0, length), ylim=(0, width))
         panel.set_axis_off()
         if not board.isotropic:
             _draw_grain(panel, outline)
-        _draw_board(panel, setup, outline, values, scale, _along(board))
+        _draw_board(panel, setup, outline, values, scale, _length_direction(board))
         if len(board.setups) > 1:
             heading = (length / 2, width + 0.3 / scale)
-            panel.text(*heading, short(setup.name, 44), ha="center", fontsize=WORDS, weight="bold", parse_math=False)
+            panel.text(
+                *heading, shorten(setup.name, 44), ha="center", fontsize=TEXT_SIZE, weight="bold", parse_math=False
+            )
         handles |= _draw_items(panel, setup, outline) | _draw_warp(panel, board, length, outline.width)
     if handles:
         figure.legend(
-            handles=list(handles.values()), loc="lower center", ncols=3, frameon=False, fontsize=SMALL,
+            handles=list(handles.values()), loc="lower center", ncols=3, frameon=False, fontsize=SMALL_SIZE,
             handletextpad=0.4,
         )  # fmt: skip
-    said = {
-        _SEEN: True,
-        _GRAIN: not board.isotropic,
-        _EDGES: True,
-        _OUTLINE: not all(one.is_rectangle for one in outlines),
-        _WARP: _is_warped(board),
+    sentences = {
+        _VIEW_NOTE: True,
+        _GRAIN_NOTE: not board.isotropic,
+        _EDGES_NOTE: True,
+        _OUTLINE_NOTE: not all(outline.is_rectangle for outline in outlines),
+        _WARP_NOTE: _is_warped(board),
     }
-    caption = " ".join(text for text, holds in said.items() if holds)
-    return Picture("board", "The board, drawn to scale", _alt(board, values, outlines), caption, figure)
+    caption = " ".join(text for text, applies in sentences.items() if applies)
+    return Picture("board", "The board, drawn to scale", _alt_text(board, values, outlines), caption, figure)
 
 
-_SEEN = "Seen from above, drawn to scale."
-_GRAIN = "The fine lines run along the grain."
-_EDGES = "Hatched: held by a clamp; dashed: resting on a support; thin: free."
-_OUTLINE = (
+_VIEW_NOTE = "Seen from above, drawn to scale."
+_GRAIN_NOTE = "The fine lines run along the grain."
+_EDGES_NOTE = "Hatched: held by a clamp; dashed: resting on a support; thin: free."
+_OUTLINE_NOTE = (
     "The outline is what the readings of the width make probable. Which edge recedes they do not say: where both are "
     "free, both are drawn to recede alike."
 )
-_WARP = (
+_WARP_NOTE = (
     "Dashed: how far the board is from flat where a straightedge lies along it and across it, drawn larger than it is; "
     "a filled corner lifts off the table."
 )
 
 
 @dataclass(frozen=True, eq=False)
-class _Outline:
-    """Ends of a whole board along y, m, at points along it, clamped parts included."""
+class _DrawnOutline:
+    """The outline of a whole board, clamped parts included: its ends along y at points x, m."""
 
     x: Floats
     low: Floats
@@ -105,32 +120,32 @@ class _Outline:
         return float(self.high.max())
 
     def at(self, x: Floats) -> tuple[Floats, Floats]:
-        """Its ends along y at points along it, m; beyond its length as at its ends."""
+        """Ends along y at points x, m; beyond the length of the board as at its ends."""
         return np.interp(x, self.x, self.low), np.interp(x, self.x, self.high)
 
     def across(self) -> str:
-        narrowest, widest = (f"{end((self.high - self.low) * 1e3):.4g}" for end in (np.min, np.max))
+        narrowest, widest = (f"{extreme((self.high - self.low) * 1e3):.4g}" for extreme in (np.min, np.max))
         return f"{widest} mm across" if self.is_rectangle else f"{narrowest} to {widest} mm across"
 
 
-def _outline(system: System, values: Values) -> _Outline:
-    """The outline of a board as the model of a setup has it."""
+def _drawn_outline(system: System, values: Values) -> _DrawnOutline:
+    """The outline of a board in the model of a setup."""
     x = np.linspace(0.0, float(values["length_x"]), _N_POINTS)
     adjusted = system.adjusted(values)
     length, width = (float(side) for side in vibrating_lengths(adjusted, system.setup))
     start = float(values[system.setup.input_name("x0")]) if "x0" in system.setup.clamped else 0.0
     limits = system.limits((x - start) / length)
     low, high = limits or (np.zeros_like(x), np.ones_like(x))
-    return _Outline(x, low * width, float(adjusted["length_y"]) - (1.0 - high) * width, limits is None)
+    return _DrawnOutline(x, low * width, float(adjusted["length_y"]) - (1.0 - high) * width, limits is None)
 
 
-def _draw_grain(panel: Axes, outline: _Outline) -> None:
+def _draw_grain(panel: Axes, outline: _DrawnOutline) -> None:
     for y in np.linspace(0, outline.width, _N_GRAIN + 2)[1:-1]:
         within = (outline.low <= y) & (y <= outline.high)
         panel.plot(outline.x, np.where(within, y, np.nan), color=LIGHT, lw=0.7, zorder=1)
 
 
-def _draw_board(panel: Axes, setup: Setup, outline: _Outline, values: Values, scale: float, along: str) -> None:
+def _draw_board(panel: Axes, setup: Setup, outline: _DrawnOutline, values: Values, scale: float, along: str) -> None:
     length, width = float(values["length_x"]), outline.width
     covered = {edge: float(values[setup.input_name(edge)]) for edge in setup.clamped}
     low_x, high_x = covered.get("x0", 0.0), length - covered.get("x1", 0.0)
@@ -152,23 +167,23 @@ def _draw_edge(
     word: str,
     covered: float,
     free: tuple[float, float, float, float],
-    outline: _Outline,
+    outline: _DrawnOutline,
     scale: float,
 ) -> None:
-    """The line where the vibrating part ends, hatching where a clamp holds it, and the word."""
+    """An edge: the line where the vibrating part ends, hatching if it is clamped, and the word for its support."""
     from matplotlib.patches import Polygon
 
     length, width = float(outline.x[-1]), outline.width
     low_x, high_x, low_y, high_y = free
-    at = {"x0": low_x, "x1": high_x, "y0": low_y, "y1": high_y}[edge]
-    along = np.array([at, at]) if edge[0] == "x" else np.unique(np.clip(outline.x, low_x, high_x))
+    position = {"x0": low_x, "x1": high_x, "y0": low_y, "y1": high_y}[edge]
+    along = np.array([position, position]) if edge[0] == "x" else np.unique(np.clip(outline.x, low_x, high_x))
     low, high = outline.at(along)
     low, high = low + low_y, high - (width - high_y)
     line = (along, np.array([low[0], high[0]]) if edge[0] == "x" else low if edge == "y0" else high)
-    style, thickness = _LINES[word]
+    style, thickness = _EDGE_LINES[word]
     panel.plot(*line, ls=style, lw=thickness, color="black", clip_on=False, zorder=4, label=f"edge {edge} {word}")
     band = max(covered, _HATCH / scale)
-    start = at - band if edge[1] == "0" else at
+    start = position - band if edge[1] == "0" else position
     if word == "clamped":
         if edge[0] == "x":
             across = start + band * np.linspace(0.0, 1.0, _N_POINTS)
@@ -179,33 +194,33 @@ def _draw_edge(
         panel.add_patch(
             Polygon(corners, hatch="/////", facecolor="none", edgecolor=GREY, lw=0.0, clip_on=False, zorder=3)
         )
-    beyond = 0.05 / scale + (0.0 if covered or word != "clamped" else band)
-    told = f"{word}, {covered * 1e3:.3g} mm" if covered else word
+    offset = 0.05 / scale + (0.0 if covered or word != "clamped" else band)
+    label = f"{word}, {covered * 1e3:.3g} mm" if covered else word
     places = {
-        "x0": (-beyond, width / 2, 90, "right", "center"),
-        "x1": (length + beyond, width / 2, 90, "left", "center"),
-        "y0": (length / 2, -beyond, 0, "center", "top"),
-        "y1": (length / 2, width + beyond, 0, "center", "bottom"),
+        "x0": (-offset, width / 2, 90, "right", "center"),
+        "x1": (length + offset, width / 2, 90, "left", "center"),
+        "y0": (length / 2, -offset, 0, "center", "top"),
+        "y1": (length / 2, width + offset, 0, "center", "bottom"),
     }
     x, y, rotation, ha, va = places[edge]
-    panel.text(x, y, told, rotation=rotation, ha=ha, va=va, fontsize=SMALL, color=DARK, rotation_mode="default")
+    panel.text(x, y, label, rotation=rotation, ha=ha, va=va, fontsize=SMALL_SIZE, color=DARK, rotation_mode="default")
 
 
 def _dimension(panel: Axes, start: tuple[float, float], end: tuple[float, float], text: str, *, below: bool) -> None:
-    """A double arrow and its length."""
+    """A double arrow and its length in words."""
     arrow: Any = {"arrowstyle": "<|-|>", "lw": 0.7, "color": DARK, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 7}
     panel.annotate("", start, end, arrowprops=arrow, annotation_clip=False)
     middle = ((start[0] + end[0]) / 2, (start[1] + end[1]) / 2)
     offset, rotation = ((0, -4), 0) if below else ((-4, 0), 90)
     ha, va = ("center", "top") if below else ("right", "center")
     panel.annotate(
-        text, middle, offset, textcoords="offset points", ha=ha, va=va, rotation=rotation, fontsize=WORDS,
+        text, middle, offset, textcoords="offset points", ha=ha, va=va, rotation=rotation, fontsize=TEXT_SIZE,
         annotation_clip=False,
     )  # fmt: skip
 
 
-def _draw_items(panel: Axes, setup: Setup, outline: _Outline) -> dict[str, Any]:
-    """Hammer and attached items at their places from the corner of x0 and y0; a handle for the legend by name."""
+def _draw_items(panel: Axes, setup: Setup, outline: _DrawnOutline) -> dict[str, Any]:
+    """Hammer and attached items at their places from the corner of x0 and y0; legend handles by name."""
     corner = outline.low[0]
     places: dict[str, list[tuple[float, float]]] = {}
     for item in setup.attached:
@@ -213,11 +228,11 @@ def _draw_items(panel: Axes, setup: Setup, outline: _Outline) -> dict[str, Any]:
     if setup.hammer is not None:
         places["hammer"] = [setup.hammer]
     handles: dict[str, Any] = {}
-    for kind, at in places.items():
-        if at:
-            x, y = np.transpose(at)
+    for kind, positions in places.items():
+        if positions:
+            x, y = np.transpose(positions)
             face = "white" if kind == "hammer" else VERMILLION
-            handles[kind] = panel.plot(x, y + corner, marker=_MARKERS[kind], label=kind, mfc=face, **_MARK)[0]
+            handles[kind] = panel.plot(x, y + corner, marker=_MARKERS[kind], label=kind, mfc=face, **_MARKER_STYLE)[0]
     return handles
 
 
@@ -226,39 +241,39 @@ def _is_warped(board: Board) -> bool:
 
 
 def _draw_warp(panel: Axes, board: Board, length: float, width: float) -> dict[str, Any]:
-    """The rises that were read, as bent lines through the middle and a lifted corner; handles for the legend."""
+    """The measured warp, as bent lines through the middle and a lifted corner; legend handles by name."""
     rises = {name: rise.mean for name, rise in board.warp.items() if rise.mean}
     bends = {name: rise for name, rise in rises.items() if name != "twist"}
     handles: dict[str, Any] = {}
     if bends:
         largest = max(abs(rise) for rise in bends.values())
-        times = float(f"{_BENT * min(length, width) / largest:.1g}")
+        magnification = float(f"{_BEND_HEIGHT * min(length, width) / largest:.1g}")
         s = np.linspace(0.0, 1.0, _N_POINTS)
-        arch = times * 4.0 * s * (1.0 - s)
+        arch = magnification * 4.0 * s * (1.0 - s)
         lines = {"cup": (length / 2 + arch * bends.get("cup", 0.0), width * s)}
         lines["bow"] = (length * s, width / 2 + arch * bends.get("bow", 0.0))
         for name, style in (("cup", (0, (4, 2))), ("bow", (0, (1, 1.5)))):
             if name in bends:
-                told = f"{name} {bends[name] * 1e3:.3g} mm"
-                handles[name] = panel.plot(*lines[name], color=VERMILLION, lw=1.3, ls=style, label=told, zorder=5)[0]
+                label = f"{name} {bends[name] * 1e3:.3g} mm"
+                handles[name] = panel.plot(*lines[name], color=VERMILLION, lw=1.3, ls=style, label=label, zorder=5)[0]
     if "twist" in rises:
-        told = f"twist {rises['twist'] * 1e3:.3g} mm"
-        marker = {**_MARK, "ms": 8, "marker": "^", "mfc": VERMILLION}
-        handles["twist"] = panel.plot([length], [width], label=told, **marker)[0]
+        label = f"twist {rises['twist'] * 1e3:.3g} mm"
+        marker = {**_MARKER_STYLE, "ms": 8, "marker": "^", "mfc": VERMILLION}
+        handles["twist"] = panel.plot([length], [width], label=label, **marker)[0]
     return handles
 
 
-def _along(board: Board) -> str:
+def _length_direction(board: Board) -> str:
     return "along x" if board.isotropic else "along the grain"
 
 
-def _alt(board: Board, values: Values, outlines: Sequence[_Outline]) -> str:
-    size = f"{float(values['length_x']) * 1e3:.4g} mm {_along(board)}, {outlines[0].across()}"
-    held = []
+def _alt_text(board: Board, values: Values, outlines: Sequence[_DrawnOutline]) -> str:
+    size = f"{float(values['length_x']) * 1e3:.4g} mm {_length_direction(board)}, {outlines[0].across()}"
+    setup_texts = []
     for setup in board.setups:
         words = ", ".join(f"{edge} {word}" for edge, word in setup.edges.items())
         free = " by ".join(f"{float(side) * 1e3:.4g}" for side in vibrating_lengths(values, setup))
-        held.append(f"setup {setup.name}: {words}; the part that vibrates is {free} mm")
-    kind = "rectangular board" if all(one.is_rectangle for one in outlines) else "board whose width varies"
+        setup_texts.append(f"setup {setup.name}: {words}; the part that vibrates is {free} mm")
+    kind = "rectangular board" if all(outline.is_rectangle for outline in outlines) else "board whose width varies"
     rises = ", ".join(f"{name} {rise.mean * 1e3:.3g} mm" for name, rise in board.warp.items() if rise.mean)
-    return ". ".join([f"A {kind}, {size}", *held, *([f"Not flat: {rises}"] if rises else [])]) + "."
+    return ". ".join([f"A {kind}, {size}", *setup_texts, *([f"Not flat: {rises}"] if rises else [])]) + "."

@@ -1,15 +1,15 @@
-"""What a page says of a fit: its sentences and tables, as plain text; the template only lays them out."""
+"""Sentences and tables of the page of a fit, as plain text; the template only lays them out."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
 from bayesplate.board.board import Board
-from bayesplate.board.parameter import Parameter, unit_of_people
+from bayesplate.board.parameter import Parameter, display_unit
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.quantity import Quantity
 from bayesplate.effects import EFFECTS
-from bayesplate.effects.words import effect_name, joined
+from bayesplate.effects.words import effect_name, join_words
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
@@ -17,11 +17,11 @@ from bayesplate.report.posterior import input_words
 from bayesplate.results.budget import budget, row_words
 from bayesplate.results.contract import Spread
 from bayesplate.results.fit_tables import modes_table, peaks_table
-from bayesplate.results.summary import NONE_JUDGED, TOO_FEW_LEFT, Summary
-from bayesplate.results.tables import Cell, Row, Table, by_constant
+from bayesplate.results.summary import ALL_MODES_CARRYING, TOO_FEW_MODES, Summary
+from bayesplate.results.tables import Cell, Row, Table, table_by_constant
 from bayesplate.results.words import (
-    CONSTANTS,
     GPA,
+    MODULUS_WORDS,
     Value,
     constant_name,
     decimals,
@@ -31,7 +31,7 @@ from bayesplate.results.words import (
     two_digits,
 )
 
-_MAKERS = (
+_MAKERS_QUANTITIES = (
     ("wave_speed", "wave speed c", 1.0, "m/s"),
     ("radiation_ratio", "radiation ratio c/ρ", 1.0, "m⁴/(kg s)"),
     ("specific_stiffness", "specific stiffness E/ρ", 1e-6, "10⁶ m²/s²"),
@@ -50,23 +50,27 @@ def summary_sentences(summary: Summary) -> list[str]:
             f"From {n} mode{'s' * (n != 1)}: {E_x} GPa in all directions, so that the shear modulus is {G_xy} GPa."
         ]
     left_out = error.leave_one_out_rms_cents
-    missed = f"The fit misses the frequencies by {_cents(error.in_sample_rms_cents)}"
+    error_text = f"The fit misses the frequencies by {_cents_and_percent(error.in_sample_rms_cents)}"
     if left_out is None:
         too_few = "there are too few modes to test it on one that it has not seen"
-        sentences.append(f"{missed}; {too_few if summary.why_no_left_out == TOO_FEW_LEFT else NONE_JUDGED}.")
+        sentences.append(
+            f"{error_text}; {too_few if summary.why_no_left_out == TOO_FEW_MODES else ALL_MODES_CARRYING}."
+        )
     else:
-        sentences.append(f"{missed}; a mode that it has not seen, by {_cents(left_out)}.")
+        sentences.append(f"{error_text}; a mode that it has not seen, by {_cents_and_percent(left_out)}.")
     if summary.model.isotropic:
         entry = summary.elastic.E_x
         return [*sentences, f"The modulus is known to ± {two_digits(entry.sd / entry.mean, 100)} %."]
     share, weakest = max((entry.sd / entry.mean, name) for name, entry in summary.elastic.items())
-    told = two_digits(share, 100)
-    alike = all(str(two_digits(entry.sd / entry.mean, 100)) == str(told) for _, entry in summary.elastic.items())
-    which = "All three are known equally well" if alike else f"Least well known is {constant_name(weakest)}"
-    return [*sentences, f"{which}: ± {told} %."]
+    precision = two_digits(share, 100)
+    are_equal = all(
+        str(two_digits(entry.sd / entry.mean, 100)) == str(precision) for _, entry in summary.elastic.items()
+    )
+    subject = "All three are known equally well" if are_equal else f"Least well known is {constant_name(weakest)}"
+    return [*sentences, f"{subject}: ± {precision} %."]
 
 
-def _cents(value: float) -> str:
+def _cents_and_percent(value: float) -> str:
     return f"{two_digits(value)} cents ({two_digits(2 ** (value / 1200) - 1, 100)} %)"
 
 
@@ -74,7 +78,7 @@ def makers_table(summary: Summary) -> Table:
     derived = summary.derived
     rows: list[Row] = [
         (words, *(plus_minus(derived[f"{name}_{axis}"], factor) for axis in "xy"), unit)
-        for name, words, factor, unit in _MAKERS
+        for name, words, factor, unit in _MAKERS_QUANTITIES
     ]
     return Table("What makers compare", ("", "along", "across", "unit"), tuple(rows))
 
@@ -88,74 +92,78 @@ def ratios_table(summary: Summary) -> Table:
 
 
 def effects_table(board: Board, summary: Summary) -> Table | None:
-    """Parameters of the declared effects, a component of a field with its look; None if none is declared."""
-    shapes = {(one.effect, one.key): one for one in board.parameters if one.is_component}
+    """Parameters of the declared effects, components of a field with their shape; None if none is declared."""
+    shapes = {(component.effect, component.key): component for component in board.parameters if component.is_component}
     rows = [
-        (*_named(effect, where, parameter, shapes.get((effect, parameter))), *_measured(entry))
-        for where, effects in summary.effects.items()
+        (*_effect_cells(effect, owner, parameter, shapes.get((effect, parameter))), *_spread_cells(entry))
+        for owner, effects in summary.effects.items()
         for effect, parameters in effects.items()
         for parameter, entry in parameters.items()
     ]
     return Table("Effects in the model", ("effect", "parameter", "mean ± sd", "unit"), tuple(rows)) if rows else None
 
 
-def _named(effect: str, where: str, parameter: str, shape: Parameter | None) -> tuple[str, str]:
-    """An effect and where it acts, and what its parameter is called."""
+def _effect_cells(effect: str, owner: str, parameter: str, shape: Parameter | None) -> tuple[str, str]:
+    """Name of an effect with its board or setup, and name of its parameter."""
     name = effect_name(effect)
     if shape is None:
-        return f"{name}, {where}", parameter
-    return f"{name}, {where}: {shape.look}", shape.words.removesuffix(f" of {name}")
+        return f"{name}, {owner}", parameter
+    return f"{name}, {owner}: {shape.look}", shape.words.removesuffix(f" of {name}")
 
 
-def _measured(entry: Spread) -> tuple[Cell, Cell]:
-    """Mean ± sd and the unit, in the unit that people use."""
-    factor, unit = unit_of_people(entry.unit)
+def _spread_cells(entry: Spread) -> tuple[Cell, Cell]:
+    """Mean ± sd, and the unit for display."""
+    factor, unit = display_unit(entry.unit)
     return plus_minus(entry, factor), unit or None
 
 
 def effect_sentences(summary: Summary, told: Sequence[str] = ()) -> list[str]:
-    """What each effect of the model is, but for sentences that the page has told."""
-    every = ((effect_name(name), EFFECTS[name].sentence) for name in summary.model.effects)
-    return [f"{name}: {sentence}" for name, sentence in every if sentence not in told]
+    """A sentence on each effect of the model, except those in `told`, which the page has already."""
+    effects = ((effect_name(name), EFFECTS[name].sentence) for name in summary.model.effects)
+    return [f"{name}: {sentence}" for name, sentence in effects if sentence not in told]
 
 
 def budget_table(inference: Inference, draws: Draws, summary: Summary) -> Table:
     board = inference.problem.board
     shares = budget(draws, board)
-    alone = dict(zip(CONSTANTS, inference.problem.identifiability.errors_of_rigidities, strict=True))
-    named = {one.name: input_words(one, board)[0] for one in board.uncertain}
+    noise_sd = dict(zip(MODULUS_WORDS, inference.problem.identifiability.errors_of_rigidities, strict=True))
+    input_names = {parameter.name: input_words(parameter, board)[0] for parameter in board.uncertain}
 
     def inputs(name: str) -> str | None:
         largest = sorted(shares[name].items(), key=lambda item: -item[1])[:2]
-        told = (
-            f"{named.get(key) or row_words(key, board)} {percent(share)}" for key, share in largest if share >= 0.05
+        texts = (
+            f"{input_names.get(key) or row_words(key, board)} {percent(share)}"
+            for key, share in largest
+            if share >= 0.05
         )
-        return ", ".join(told) or None
+        return ", ".join(texts) or None
 
     columns: dict[str, Callable[[str], Cell]] = {
         "sd": lambda name: f"{two_digits(summary.elastic[name].sd / summary.elastic[name].mean, 100)} %",
-        "from the expected noise alone": lambda name: f"{two_digits(alone[name], 100)} %",
+        "from the expected noise alone": lambda name: f"{two_digits(noise_sd[name], 100)} %",
     }
-    if any(map(inputs, CONSTANTS)):
+    if any(map(inputs, MODULUS_WORDS)):
         columns["share of the variance from inputs"] = inputs
-    return by_constant("Where the uncertainty comes from", columns, isotropic=summary.model.isotropic)
+    return table_by_constant("Where the uncertainty comes from", columns, isotropic=summary.model.isotropic)
 
 
 def inputs_table(board: Board, summary: Summary) -> Table:
     rows = []
-    for one in filter(lambda one: one.is_listed, board.parameters):
-        words, factor, unit = input_words(one, board)
+    for parameter in filter(lambda parameter: parameter.is_listed, board.parameters):
+        words, factor, unit = input_words(parameter, board)
         entry = (
-            summary.effects[one.owner.title][one.effect][one.key] if one.is_of_effect else summary.inputs.get(one.name)
+            summary.effects[parameter.owner.title][parameter.effect][parameter.key]
+            if parameter.is_of_effect
+            else summary.inputs.get(parameter.name)
         )
-        after = None if entry is None or one.prior.is_exact else plus_minus(entry, factor)
-        rows.append((f"{words}, {unit}" if unit else words, _stated(one.prior, factor), after))
-    shown = 3 if any(after is not None for *_, after in rows) else 2
+        after_fit = None if entry is None or parameter.prior.is_exact else plus_minus(entry, factor)
+        rows.append((f"{words}, {unit}" if unit else words, _quantity_text(parameter.prior, factor), after_fit))
+    n_columns = 3 if any(after_fit is not None for *_, after_fit in rows) else 2
     columns = ("quantity", "as stated", "after the fit")
-    return Table("Inputs", columns[:shown], tuple(row[:shown] for row in rows))
+    return Table("Inputs", columns[:n_columns], tuple(row[:n_columns] for row in rows))
 
 
-def _stated(quantity: Quantity, factor: float) -> str:
+def _quantity_text(quantity: Quantity, factor: float) -> str:
     if quantity.is_exact:
         return f"{quantity.mean * factor:.6g} (taken as exact)"
     n = len(quantity.readings)
@@ -177,11 +185,11 @@ def setups_table(board: Board) -> Table:
 
 
 def priors_table(prior: PriorCard) -> Table:
-    rows = tuple((name, _prior(stated.quantity), stated.source) for name, stated in prior.stated_constants.items())
+    rows = tuple((name, _prior_text(stated.quantity), stated.source) for name, stated in prior.stated_constants.items())
     return Table(f"Prior card {prior.name}", ("constant", "density", "source"), rows)
 
 
-def _prior(quantity: Quantity) -> str:
+def _prior_text(quantity: Quantity) -> str:
     unit, factor = ("GPa", GPA) if quantity.median > 1e4 else ("N m", 1.0)
     if quantity.kind == "log-normal":
         return f"log-normal, median {quantity.median * factor:.4g} {unit}, factor {quantity.factor:.3g}"
@@ -198,12 +206,12 @@ def laws_table(summary: Summary) -> Table:
         words: lambda name, means=means: number(means[name], decimals(summary.elastic[name].sd * GPA), factor=GPA)
         for words, means in (("linear law", summary.linear_means), ("exact law", summary.exact_means))
     }
-    return by_constant("Means under both frequency laws, GPa", columns, isotropic=summary.model.isotropic)
+    return table_by_constant("Means under both frequency laws, GPa", columns, isotropic=summary.model.isotropic)
 
 
 def model_rows(summary: Summary) -> list[tuple[str, str]]:
     model, error = summary.model, summary.error
-    effects = joined([effect_name(name) for name in model.effects]) or "none"
+    effects = join_words([effect_name(name) for name in model.effects]) or "none"
     noise = "Student's distribution (robust)" if model.robust else "normal distribution"
     return [
         ("plate theory", model.theory),
@@ -217,14 +225,18 @@ def model_rows(summary: Summary) -> list[tuple[str, str]]:
 
 
 def sampler_rows(summary: Summary) -> list[tuple[str, str | Value]]:
-    one, limits = summary.sampler, Gate()
+    sampler, gate = summary.sampler, Gate()
     return [
-        ("ensembles, walkers, steps", f"{one.ensembles}, {one.walkers}, {one.steps}"),
-        (f"largest R-hat (at most {limits.rhat_max:g})", number(one.rhat_max, 4)),
-        (f"smallest effective size (at least {limits.ess_min:g})", number(one.ess_min, 0)),
-        ("largest autocorrelation time, steps", number(one.tau_max, 1)),
-        ("accepted proposals", percent(one.acceptance)),
-        *([] if one.pareto_k is None else [("Pareto k-hat of the weights to the exact law", number(one.pareto_k, 2))]),
+        ("ensembles, walkers, steps", f"{sampler.ensembles}, {sampler.walkers}, {sampler.steps}"),
+        (f"largest R-hat (at most {gate.rhat_max:g})", number(sampler.rhat_max, 4)),
+        (f"smallest effective size (at least {gate.ess_min:g})", number(sampler.ess_min, 0)),
+        ("largest autocorrelation time, steps", number(sampler.tau_max, 1)),
+        ("accepted proposals", percent(sampler.acceptance)),
+        *(
+            []
+            if sampler.pareto_k is None
+            else [("Pareto k-hat of the weights to the exact law", number(sampler.pareto_k, 2))]
+        ),
     ]
 
 

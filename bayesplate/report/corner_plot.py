@@ -1,4 +1,4 @@
-"""The corner plot, by the package corner: every pair of quantities against each other, on the page and for scripts."""
+"""The corner plot, by the package corner: every pair of quantities, for the page and for scripts."""
 
 from __future__ import annotations
 
@@ -15,8 +15,19 @@ from bayesplate.libraries import load_arviz
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.report.posterior import input_words
-from bayesplate.report.saving import drawing, save_figure
-from bayesplate.report.style import BLACK, ORANGE, POSTERIOR, SMALL, WIDTH, Picture, in_figure, is_symbol, limits, short
+from bayesplate.report.saving import matplotlib_defaults, save_figure
+from bayesplate.report.style import (
+    BLACK,
+    FIGURE_WIDTH,
+    ORANGE,
+    POSTERIOR_COLOUR,
+    SMALL_SIZE,
+    Picture,
+    axis_range,
+    is_symbol,
+    mathtext,
+    shorten,
+)
 from bayesplate.results.budget import input_shares
 from bayesplate.results.words import GPA
 
@@ -24,16 +35,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-MOST = 6
-"""Columns of the report: more cannot be read on a phone."""
+MOST_COLUMNS = 6
+"""Columns of the corner plot of a report; more cannot be read on a phone."""
 
-_HELD = (0.5, 0.9)
+_CONTOUR_LEVELS = (0.5, 0.9)
 _LEFT, _BOTTOM, _TOP, _RIGHT, _GAP = 0.72, 0.72, 0.08, 0.12, 0.07
-_INNER = np.array([[0.92, 0.08], [0.08, 0.92]])
-"""Where a panel has ticks, in its ends: no label runs into one of the next panel."""
-_STRONG = 0.5
+_TICK_RANGE = np.array([[0.92, 0.08], [0.08, 0.92]])
+"""Range of the ticks of a panel, from its ends: tick labels of adjacent panels do not overlap."""
+_STRONG_CORRELATION = 0.5
 _CHARACTERS_AN_INCH = 17
-_BRIEF = {
+_BRIEF_NAMES = {
     "length along the grain": "length",
     "length across the grain": "width",
     " profile": "",
@@ -45,19 +56,19 @@ _BRIEF = {
 def corner_figure(
     columns: Mapping[str, Floats], marked: Mapping[str, float | None] | None = None, labels: Sequence[str] | None = None
 ) -> Figure:
-    """Every pair of columns of draws against each other; the lines hold half and nine tenths of the draws.
+    """Every pair of columns of draws against each other; the contours hold half and nine tenths of the draws.
 
-    Columns are named by what stands at their axis, unless there are labels; values of `marked`, by the same names, get
-    a line.
+    The names of the columns are their axis labels, unless `labels` are given; values of `marked`, by the same names,
+    get a line.
     """
-    load_arviz()  # which corner imports, and which has to be kept quiet
+    load_arviz()  # before corner imports it, to suppress its warnings
     import corner
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
     marks = [(marked or {}).get(name) for name in columns]
-    ends = [
-        limits(values, () if mark is None else [mark]) for values, mark in zip(columns.values(), marks, strict=True)
+    ranges = [
+        axis_range(values, () if mark is None else [mark]) for values, mark in zip(columns.values(), marks, strict=True)
     ]
     side = panel_side(len(columns))
     width = _LEFT + len(columns) * (side + _GAP) - _GAP + _RIGHT
@@ -68,13 +79,13 @@ def corner_figure(
             np.column_stack([np.ravel(values) for values in columns.values()]),
             fig=figure,
             labels=list(labels or columns),
-            label_kwargs={"fontsize": SMALL - 1},
+            label_kwargs={"fontsize": SMALL_SIZE - 1},
             labelpad=0.42 / side - 0.3,  # of corner's own 0.3 sides
-            range=ends,
+            range=ranges,
             bins=40,
             smooth=1.6,
-            levels=_HELD,
-            color=POSTERIOR,
+            levels=_CONTOUR_LEVELS,
+            color=POSTERIOR_COLOUR,
             fill_contours=True,
             no_fill_contours=True,
             plot_datapoints=False,
@@ -92,9 +103,9 @@ def corner_figure(
     )  # fmt: skip
     for panel in figure.axes:
         panel.spines[["top", "right"]].set_visible(False)
-        panel.tick_params(labelsize=SMALL - 1.5, labelrotation=45, length=3)
+        panel.tick_params(labelsize=SMALL_SIZE - 1.5, labelrotation=45, length=3)
         for axis in (panel.xaxis, panel.yaxis):
-            low, high = np.sort(axis.get_view_interval()) @ _INNER
+            low, high = np.sort(axis.get_view_interval()) @ _TICK_RANGE
             ticks = axis.get_major_locator().tick_values(low, high)
             axis.set_ticks([tick for tick in ticks if low <= tick <= high])
     if len(marks) == 1 and marks[0] is not None:  # which corner marks in pairs only
@@ -102,7 +113,7 @@ def corner_figure(
     return figure
 
 
-@drawing()
+@matplotlib_defaults()
 def write_corner_plot(
     path: Path, columns: Mapping[str, Floats], marked: Mapping[str, float | None] | None = None
 ) -> None:
@@ -111,8 +122,8 @@ def write_corner_plot(
 
 def corner_picture(problem: PosedProblem, draws: Draws) -> Picture:
     """The constants, the noise and the inputs that matter most against each other."""
-    columns = chosen(problem, draws)
-    alt = f"Draws in pairs of {', '.join(name.partition(',')[0] for name in columns)}. {_correlated(columns)}"
+    columns = corner_columns(problem, draws)
+    alt = f"Draws in pairs of {', '.join(name.partition(',')[0] for name in columns)}. {_correlation_sentence(columns)}"
     caption = (
         "Each square shows two quantities at once; the lines hold half and nine tenths of the probability. A slanted "
         "shape means that an error in one would be made up for by the other."
@@ -122,56 +133,56 @@ def corner_picture(problem: PosedProblem, draws: Draws) -> Picture:
 
 
 def panel_side(n_columns: int) -> float:
-    """Side of a panel in inches: the figure is as wide as the others of the report, wider beyond its columns."""
-    n = min(n_columns, MOST)
-    return (WIDTH - _LEFT - _RIGHT - (n - 1) * _GAP) / n
+    """Side of a panel in inches: up to `MOST_COLUMNS` the figure has the width of the others of a report."""
+    n = min(n_columns, MOST_COLUMNS)
+    return (FIGURE_WIDTH - _LEFT - _RIGHT - (n - 1) * _GAP) / n
 
 
 def axis_labels(names: Sequence[str]) -> list[str]:
-    """What stands at the axes of columns, in two lines where there is no room for one."""
+    """Axis labels of columns, in two lines where there is no room for one."""
     return [axis_label(name, panel_side(len(names))) for name in names]
 
 
 def axis_label(name: str, side: float) -> str:
-    """A name and its unit, in lines no longer than the side of a panel in inches, as matplotlib sets them.
+    """A name and its unit, in lines no longer than the side of a panel in inches.
 
-    A symbol of ours becomes mathematics; nothing else does.
+    A symbol of the package is set as mathtext, nothing else is.
     """
-    for words, brief in _BRIEF.items():
+    for words, brief in _BRIEF_NAMES.items():
         name = name.replace(words, brief)
     longest = int(_CHARACTERS_AN_INCH * side)
     first, comma, below = name.rpartition(", ") if ", " in name else name.partition(" of ")
     if len(name) > longest:
-        name = f"{short(first, longest)}{',' if comma else ''}\n{short(below, longest)}".strip()
-    return in_figure(name) if is_symbol(first) else name.replace("$", r"\$")
+        name = f"{shorten(first, longest)}{',' if comma else ''}\n{shorten(below, longest)}".strip()
+    return mathtext(name) if is_symbol(first) else name.replace("$", r"\$")
 
 
-def chosen(problem: PosedProblem, draws: Draws) -> dict[str, Floats]:
+def corner_columns(problem: PosedProblem, draws: Draws) -> dict[str, Floats]:
     """Moduli in GPa, the noise of each setup in %, and the inputs with the largest share in the moduli's variance."""
     columns = {f"{name}, GPa": values * GPA for name, values in draws.moduli.items()}
     setups = problem.board.setups
-    for i, setup in enumerate(setups[: MOST - len(columns) - 1]):
+    for i, setup in enumerate(setups[: MOST_COLUMNS - len(columns) - 1]):
         columns["noise, %" if len(setups) == 1 else f"noise {setup.name}, %"] = 100.0 * draws.noise[..., i]
     shares = input_shares(draws)
-    largest = {name: max(by_input[name] for by_input in shares.values()) for name in draws.inputs}
-    listed = [one.name for one in problem.board.uncertain if one.is_listed]
-    for name in sorted(listed, key=lambda one: -largest[one])[: MOST - len(columns)]:
+    largest_share = {name: max(by_input[name] for by_input in shares.values()) for name in draws.inputs}
+    inputs = [parameter.name for parameter in problem.board.uncertain if parameter.is_listed]
+    for name in sorted(inputs, key=lambda name: -largest_share[name])[: MOST_COLUMNS - len(columns)]:
         words, factor = words_and_factor(name, problem.board)
         columns[words] = draws.inputs[name] * factor
     return columns
 
 
 def words_and_factor(name: str, board: Board) -> tuple[str, float]:
-    """What stands at the axis of a modulus, a rigidity or an input, and the factor from SI to its unit."""
+    """Axis label of a modulus, a rigidity or an input, and the factor from SI to its unit."""
     if name not in board.inputs:
         return (f"{name}, GPa", GPA) if name in MODULI else (f"{name}, N m", 1.0)
     words, factor, unit = input_words(board.parameter(name), board)
     return f"{words}, {unit}" if unit else words, factor
 
 
-def _correlated(columns: Mapping[str, Floats]) -> str:
+def _correlation_sentence(columns: Mapping[str, Floats]) -> str:
     names = [name.partition(",")[0] for name in columns]
     matrix = np.corrcoef([values.ravel() for values in columns.values()])
-    strong = [(i, j) for i in range(len(names)) for j in range(i) if abs(matrix[i, j]) > _STRONG]
-    told = "; ".join(f"{names[j]} with {names[i]} ({matrix[i, j]:+.2f})" for i, j in strong)
-    return f"Correlated: {told}." if strong else "No pair hangs together strongly."
+    strong_pairs = [(i, j) for i in range(len(names)) for j in range(i) if abs(matrix[i, j]) > _STRONG_CORRELATION]
+    details = "; ".join(f"{names[j]} with {names[i]} ({matrix[i, j]:+.2f})" for i, j in strong_pairs)
+    return f"Correlated: {details}." if strong_pairs else "No pair hangs together strongly."

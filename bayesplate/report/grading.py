@@ -1,4 +1,4 @@
-"""grading.html: many boards sorted by their constants, makers' figures, a specification, and pairs that match."""
+"""grading.html: boards sorted by their constants, makers' figures, limits of a specification, matching pairs."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import numpy as np
 from bayesplate.arrays import Floats
 from bayesplate.board.material import MODULI
 from bayesplate.grading.boards import BatchSummary
-from bayesplate.grading.figures import FIGURES, limit_told
-from bayesplate.grading.matching import LEAST_PROBABILITY, NINETY, TARGET, Grading
-from bayesplate.grading.tables import MOST_LISTED, best_first, doubts_sentence, grading_tables, marked
+from bayesplate.grading.figures import FIGURES, limit_text
+from bayesplate.grading.matching import HALF_WIDTH_90, LEAST_MATCH_PROBABILITY, TARGET_THICKNESS, Grading
+from bayesplate.grading.tables import MOST_LISTED, doubts_sentence, grading_tables, marked_name, rank_boards
 from bayesplate.report.constants import modulus_title
-from bayesplate.report.page import from_template, save_page
-from bayesplate.report.saving import drawing
+from bayesplate.report.page import render_page, save_page
+from bayesplate.report.saving import matplotlib_defaults
 from bayesplate.report.style import (
     BLUE,
     DARK,
@@ -25,22 +25,22 @@ from bayesplate.report.style import (
     LIGHT,
     ORANGE,
     SKY,
-    SMALL,
+    SMALL_SIZE,
     VERMILLION,
     Picture,
-    drawable,
-    heading,
-    in_figure,
-    in_rows,
-    key,
-    legend_below,
-    moved_apart,
+    draw_heading,
+    draw_legend,
+    draw_whisker,
+    drawable_text,
+    legend_entry,
+    mathtext,
     name_rows,
-    short,
-    stacked,
-    whisker,
+    panel_with_rows,
+    separate_places,
+    shorten,
+    stacked_panels,
 )
-from bayesplate.results.folder import PAGE
+from bayesplate.results.folder import PAGE_FILE
 from bayesplate.results.tables import Table
 from bayesplate.results.words import percent
 
@@ -48,20 +48,20 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-MOST_NAMED = 30
-"""Boards up to which each has a row with its name; more are drawn in the order of their size, without names."""
-_ROW, _CROWD, _LONGEST = 0.2, 1.6, 24
+MOST_NAMED_ROWS = 30
+"""Most boards that are drawn in named rows; more are drawn by rank, without names."""
+_ROW, _CROWD_HEIGHT, _LONGEST = 0.2, 1.6, 24
 _LEFT, _LEFT_OF_LETTER, _LEFT_OF_CROWD = 1.75, 0.1, 0.75
-"""Inches at the left of a panel: at most for names of boards, for each letter of a name, and for an axis of numbers."""
+"""Inches at the left of a panel: at most for names, for each letter of a name, and for an axis of ranks."""
 _MOST_PAIRS, _MOST_LABELLED, _MOST_BARS = 15, 12, 60
-_ASIDE, _ABOVE, _LINE = 8.0, 3.0, SMALL + 2.0
-"""Points from a point to its name, beside and above its bar, and from one name to the next."""
+_NAME_OFFSET, _NAME_RISE, _NAME_LINE = 8.0, 3.0, SMALL_SIZE + 2.0
+"""Typographic points: offset of a name beside and above its data point, and distance of two names."""
 _MOST_VECTORS = 1000
-"""Boards up to which a figure draws each as lines; more would make a page of many megabytes."""
+"""Most boards that are drawn as vectors; more would make a page of many megabytes."""
 _STYLES = {"E_x": (BLUE, "o"), "E_y": (ORANGE, "D"), "G_xy": (GREEN, "s")}
 
 
-def every_grading_picture(graded: Grading) -> dict[str, list[Picture]]:
+def grading_pictures(graded: Grading) -> dict[str, list[Picture]]:
     if not graded.names:
         return {"constants": [], "makers": [], "limits": [], "pairs": []}
     return {
@@ -75,47 +75,47 @@ def every_grading_picture(graded: Grading) -> dict[str, list[Picture]]:
 def sorted_picture(graded: Grading) -> Picture:
     """The boards sorted by each constant, the largest on top, with their 90 % intervals."""
     n = len(graded.names)
-    is_named = n <= MOST_NAMED
-    height = _ROW * n + 0.1 if is_named else _CROWD
-    left = _left(_shown(graded, i) for i in range(n)) if is_named else _LEFT_OF_CROWD
-    figure, panels = stacked([height] * 3, left=left, top=0.3, bottom=0.5, gap=0.75)
-    told = []
+    is_named = n <= MOST_NAMED_ROWS
+    height = _ROW * n + 0.1 if is_named else _CROWD_HEIGHT
+    left = _name_margin(_drawn_name(graded, i) for i in range(n)) if is_named else _LEFT_OF_CROWD
+    figure, panels = stacked_panels([height] * 3, left=left, top=0.3, bottom=0.5, gap=0.75)
+    details = []
     for panel, name in zip(panels, MODULI, strict=True):
-        middle, low, high = graded.spread(FIGURES[name])
-        order = np.argsort(-middle, kind="stable")
+        median, low, high = graded.spread(FIGURES[name])
+        order = np.argsort(-median, kind="stable")
         _limit_band(panel, graded, name)
-        ends = low[order], middle[order], high[order]
+        ends = low[order], median[order], high[order]
         if is_named:
-            name_rows(panel, [_shown(graded, i) for i in order])
-            whisker(panel, np.arange(n), ends, BLUE)
+            name_rows(panel, [_drawn_name(graded, i) for i in order])
+            draw_whisker(panel, np.arange(n), ends, BLUE)
         else:
             _draw_crowd(panel, ends)
         panel.locator_params(axis="x", nbins=6)
-        heading(panel, modulus_title(name))
+        draw_heading(panel, modulus_title(name))
         panel.set(xlabel=f"GPa{'; shaded: the specification' if name in graded.request.limits else ''}")
-        told.append(f"{name} from {middle.min():.3g} to {middle.max():.3g} GPa, half of the boards above "
-                    f"{np.median(middle):.3g}")  # fmt: skip
+        details.append(f"{name} from {median.min():.3g} to {median.max():.3g} GPa, half of the boards above "
+                       f"{np.median(median):.3g}")  # fmt: skip
     caption = "Dot: median. Bar: 90 % interval. Where the bars of two boards overlap, their order is not sure."
     if len(graded.trusted) < n:
         caption += " Boards with a question mark are in doubt." if is_named else " Boards in doubt are among them."
-    return Picture("boards-sorted", "The boards, sorted", f"{n} boards. {'; '.join(told)}.", caption, figure)
+    return Picture("boards-sorted", "The boards, sorted", f"{n} boards. {'; '.join(details)}.", caption, figure)
 
 
 def _draw_crowd(panel: Axes, ends: tuple[Floats, Floats, Floats]) -> None:
-    low, middle, high = ends
-    ranks, as_pixels = np.arange(len(middle)), len(middle) > _MOST_VECTORS
+    low, median, high = ends
+    ranks, as_pixels = np.arange(len(median)), len(median) > _MOST_VECTORS
     panel.hlines(ranks, low, high, color=SKY, lw=0.8, rasterized=as_pixels)
-    panel.plot(middle, ranks, "o", color=BLUE, ms=1.5, mew=0.0, zorder=3, rasterized=as_pixels)
-    panel.set(ylim=(len(middle) - 0.5, -0.5), ylabel="rank")
+    panel.plot(median, ranks, "o", color=BLUE, ms=1.5, mew=0.0, zorder=3, rasterized=as_pixels)
+    panel.set(ylim=(len(median) - 0.5, -0.5), ylabel="rank")
     panel.grid(axis="x", color="0.9", lw=0.6)
 
 
 def speed_picture(graded: Grading) -> Picture:
     """Density against the wave speed along the grain, with lines of equal radiation ratio."""
-    figure, (panel,) = stacked([3.0], left=0.75, bottom=0.6)
+    figure, (panel,) = stacked_panels([3.0], left=0.75, bottom=0.6)
     density, speed = graded.spread(FIGURES["density"]), graded.spread(FIGURES["wave_speed_x"])
     is_crowd = len(graded.names) > _MOST_BARS
-    bars: dict[str, Any] = {} if is_crowd else {"xerr": _ends(density), "yerr": _ends(speed)}
+    bars: dict[str, Any] = {} if is_crowd else {"xerr": _error_bars(density), "yerr": _error_bars(speed)}
     panel.errorbar(
         density[0], speed[0], **bars, fmt="o", color=BLUE, mec="black", mew=0.5, ms=4,
         elinewidth=0.9, ecolor=GREY, zorder=3,
@@ -126,7 +126,7 @@ def speed_picture(graded: Grading) -> Picture:
     panel.set_xlim(middle - 0.65 * width, middle + 0.65 * width)
     _lines_of_equal_ratio(panel, speed[0] / density[0])
     if len(graded.names) <= _MOST_LABELLED:
-        _name_points(panel, density[0], speed[0], [_shown(graded, i) for i in range(len(density[0]))])
+        _name_points(panel, density[0], speed[0], [_drawn_name(graded, i) for i in range(len(density[0]))])
     panel.set(xlabel="density, kg/m³", ylabel="wave speed along the grain, m/s")
     ratio = speed[0] / density[0]
     alt = (
@@ -141,33 +141,35 @@ def speed_picture(graded: Grading) -> Picture:
 
 
 def _name_points(panel: Axes, x: Floats, y: Floats, names: Sequence[str]) -> None:
-    """A name beside each point, on the side with more room, moved apart where names would overlap."""
-    panel.set(xlim=panel.get_xlim(), ylim=panel.get_ylim())  # which do not change any more
+    """A name beside each data point, on the side with more room; names that would overlap are moved apart."""
+    panel.set(xlim=panel.get_xlim(), ylim=panel.get_ylim())  # fixed from here on
     height = panel.get_window_extent().height * 72.0 / panel.figure.dpi
     order = np.argsort(y)
     low, high = panel.get_ylim()
-    wanted = (y[order] - low) / (high - low) + _ABOVE / height
+    places = (y[order] - low) / (high - low) + _NAME_RISE / height
     right = x > 0.5 * (x.min() + x.max())
-    for i, up in zip(order, (moved_apart(wanted, _LINE / height) - wanted) * height + _ABOVE, strict=True):
+    for i, rise in zip(
+        order, (separate_places(places, _NAME_LINE / height) - places) * height + _NAME_RISE, strict=True
+    ):
         panel.annotate(
-            names[i], (x[i], y[i]), (-_ASIDE if right[i] else _ASIDE, up), textcoords="offset points", fontsize=SMALL,
-            ha="right" if right[i] else "left", parse_math=False,
+            names[i], (x[i], y[i]), (-_NAME_OFFSET if right[i] else _NAME_OFFSET, rise), textcoords="offset points",
+            fontsize=SMALL_SIZE, ha="right" if right[i] else "left", parse_math=False,
             arrowprops={"arrowstyle": "-", "color": GREY, "lw": 0.5, "shrinkA": 0.0, "shrinkB": 3.0},
         )  # fmt: skip
 
 
 def limits_picture(graded: Grading) -> Picture:
-    """How probably the boards meet all limits, the most probable first; without those in doubt."""
+    """Probability that each board meets all limits, the most probable first, without boards in doubt."""
     assert graded.meets_all is not None
-    order = best_first(graded)[: len(graded.trusted)]
-    is_named = len(order) <= MOST_NAMED
+    order = rank_boards(graded)[: len(graded.trusted)]
+    is_named = len(order) <= MOST_NAMED_ROWS
     values = 100.0 * graded.meets_all[order]
-    left = _left(_shown(graded, i) for i in order) if is_named else _LEFT_OF_CROWD
-    figure, (panel,) = stacked([_ROW * len(order) + 0.1 if is_named else _CROWD], left=left, bottom=0.5)
+    left = _name_margin(_drawn_name(graded, i) for i in order) if is_named else _LEFT_OF_CROWD
+    figure, (panel,) = stacked_panels([_ROW * len(order) + 0.1 if is_named else _CROWD_HEIGHT], left=left, bottom=0.5)
     if is_named:
         colours = [GREEN if value >= 90.0 else VERMILLION if value < 10.0 else SKY for value in values]
         panel.barh(np.arange(len(order)), values, height=0.65, color=colours, edgecolor="black", lw=0.5)
-        name_rows(panel, [_shown(graded, i) for i in order])
+        name_rows(panel, [_drawn_name(graded, i) for i in order])
     else:
         panel.plot(values, np.arange(1, len(order) + 1), color=BLUE, lw=1.6)
         panel.set(ylim=(len(order), 0), ylabel="boards, the likeliest on top")
@@ -181,49 +183,53 @@ def limits_picture(graded: Grading) -> Picture:
 
 
 def pairs_picture(graded: Grading) -> Picture:
-    """The proposed pairs: by how much the constants of the partner differ, and the tolerance."""
-    shown = graded.pairs[:_MOST_PAIRS]
+    """The proposed pairs: differences of their constants, and the tolerance."""
+    pairs = graded.pairs[:_MOST_PAIRS]
     names = [name for name in MODULI if name in graded.request.match_percent] or list(MODULI)
-    both = [[short(drawable(graded.names[i]), _LONGEST) for i in (pair.first, pair.second)] for pair in shown]
-    left = _left(name for two in both for name in two)
-    figure, panel = in_rows(["\n".join(two) for two in both], row=0.42, left=left, right=0.5, bottom=0.8)
-    for row, pair in enumerate(shown):
-        at = [pair.first, pair.second]
+    pair_names = [
+        [shorten(drawable_text(graded.names[i]), _LONGEST) for i in (pair.first, pair.second)] for pair in pairs
+    ]
+    left = _name_margin(name for board_names in pair_names for name in board_names)
+    figure, panel = panel_with_rows(
+        ["\n".join(board_names) for board_names in pair_names], row=0.42, left=left, right=0.5, bottom=0.8
+    )
+    for row, pair in enumerate(pairs):
+        boards = [pair.first, pair.second]
         for step, name in zip(np.linspace(-0.22, 0.22, len(names)), names, strict=True):
-            mean, sd = graded.log(FIGURES[name], at)
-            apart, spread = float(mean[1] - mean[0]), NINETY * float(np.sqrt((sd**2).sum()))
-            ends = 100.0 * np.expm1(apart + spread * np.array([-1.0, 0.0, 1.0]))
-            whisker(panel, row + step, tuple(ends), *_STYLES[name])
+            mean, sd = graded.log(FIGURES[name], boards)
+            log_ratio, spread = float(mean[1] - mean[0]), HALF_WIDTH_90 * float(np.sqrt((sd**2).sum()))
+            ends = 100.0 * np.expm1(log_ratio + spread * np.array([-1.0, 0.0, 1.0]))
+            draw_whisker(panel, row + step, tuple(ends), *_STYLES[name])
         panel.annotate(str(percent(pair.probability)), (1.02, row), xycoords=("axes fraction", "data"), ha="left",
-                       va="center", fontsize=SMALL, weight="bold", annotation_clip=False)  # fmt: skip
+                       va="center", fontsize=SMALL_SIZE, weight="bold", annotation_clip=False)  # fmt: skip
     for width in sorted({graded.request.match_percent.get(name, 0.0) for name in names}):
         panel.axvspan(-100.0 * width / (100.0 + width), width, color=LIGHT, zorder=0)
     panel.axvline(0, color=DARK, lw=0.8)
     panel.set(xlabel="constants of the partner over the board's, %")
-    legend_below(figure, 3, *(key(in_figure(name), *_STYLES[name]) for name in names))
-    alt = "; ".join(f"{graded.names[p.first]} and {graded.names[p.second]} {percent(p.probability)}" for p in shown)
+    draw_legend(figure, 3, *(legend_entry(mathtext(name), *_STYLES[name]) for name in names))
+    alt = "; ".join(f"{graded.names[p.first]} and {graded.names[p.second]} {percent(p.probability)}" for p in pairs)
     caption = "Grey: within the tolerance. Bars: 90 % intervals. A pair matches where all its bars lie in the grey."
     return Picture("pairs", "Pairs that may match", f"Probabilities: {alt}.", caption, figure)
 
 
-def _left(names: Iterable[str]) -> float:
+def _name_margin(names: Iterable[str]) -> float:
     """Inches that names need at the left of a panel."""
     return min(_LEFT, _LEFT_OF_LETTER * max(4, 2 + max(map(len, names))))
 
 
-def _shown(graded: Grading, place: int) -> str:
-    """The name of a board, as far as it has room, with its mark."""
+def _drawn_name(graded: Grading, place: int) -> str:
+    """The name of a board, shortened, with its mark of doubt."""
     name = graded.names[place]
-    return short(drawable(name), _LONGEST) + marked(graded, place).removeprefix(name)
+    return shorten(drawable_text(name), _LONGEST) + marked_name(graded, place).removeprefix(name)
 
 
-def _ends(spread: tuple[Floats, Floats, Floats]) -> Floats:
-    middle, low, high = spread
-    return np.stack([middle - low, high - middle])
+def _error_bars(spread: tuple[Floats, Floats, Floats]) -> Floats:
+    median, low, high = spread
+    return np.stack([median - low, high - median])
 
 
 def _lines_of_equal_ratio(panel: Axes, ratios: Floats) -> None:
-    """Straight lines through the origin, a few between the least and the greatest ratio."""
+    """Lines of equal radiation ratio, a few between the least and the greatest."""
     left, right = panel.get_xlim()
     low, high = panel.get_ylim()
     step = max(1.0, float(np.ceil((ratios.max() - ratios.min()) / 4.0)))
@@ -232,7 +238,7 @@ def _lines_of_equal_ratio(panel: Axes, ratios: Floats) -> None:
         x = min(right, high / ratio)
         if low < ratio * x <= high * 1.0001 and left < x:
             panel.annotate(f"{ratio:.0f}", (x, ratio * x), (-2, -1), textcoords="offset points", ha="right", va="top",
-                           fontsize=SMALL, color=GREY)  # fmt: skip
+                           fontsize=SMALL_SIZE, color=GREY)  # fmt: skip
     panel.set(xlim=(left, right), ylim=(low, high))
 
 
@@ -240,10 +246,10 @@ def _limit_band(panel: Axes, graded: Grading, name: str) -> None:
     if name in graded.request.limits:
         low, high = graded.request.limits[name]
         factor = FIGURES[name].per_unit
-        middle = graded.spread(FIGURES[name])[0]
+        medians = graded.spread(FIGURES[name])[0]
         panel.axvspan(
-            0.9 * middle.min() if low is None else low / factor,
-            1.1 * middle.max() if high is None else high / factor,
+            0.9 * medians.min() if low is None else low / factor,
+            1.1 * medians.max() if high is None else high / factor,
             color=LIGHT,
             zorder=0,
         )
@@ -253,47 +259,49 @@ GRADING_PAGE = "grading.html"
 _TABLES = ("constants", "makers", "limits", "pairs", "doubts")
 
 
-@drawing()
+@matplotlib_defaults()
 def write_grading_page(folder: Path, graded: Grading, summary: BatchSummary, *, has_pages: bool) -> Path:
-    """Write the page and its figures as PNG and SVG; `has_pages`: each board has a page of its own in boards/NAME."""
+    """Write the page and its figures as PNG and SVG; `has_pages`: each board has its own page in boards/NAME."""
     tables: dict[str, Table | None] = {**dict.fromkeys(_TABLES), **grading_tables(graded)}
-    pages = [(marked(graded, i), f"boards/{graded.names[i]}/{PAGE}") for i in best_first(graded)[:MOST_LISTED]]
+    pages = [
+        (marked_name(graded, i), f"boards/{graded.names[i]}/{PAGE_FILE}") for i in rank_boards(graded)[:MOST_LISTED]
+    ]
     return save_page(
         folder / GRADING_PAGE,
-        every_grading_picture(graded),
-        lambda pictures: from_template(
+        grading_pictures(graded),
+        lambda pictures: render_page(
             "grading.html",
             title=f"{summary.n_fitted} boards, graded",
-            sentences=sentences(graded, summary),
+            sentences=grading_sentences(graded, summary),
             failures=failures_table(summary),
             pictures=pictures,
             tables=tables,
             matching=matching_sentence(graded),
-            has_target=TARGET in graded.request.figures,
+            has_target=TARGET_THICKNESS in graded.request.figures,
             links=pages if has_pages else [],
         ),
     )
 
 
-def sentences(graded: Grading, summary: BatchSummary) -> tuple[str, ...]:
-    told = [f"{summary.n_fitted} of {summary.n_boards} boards were fitted."]
+def grading_sentences(graded: Grading, summary: BatchSummary) -> tuple[str, ...]:
+    sentences = [f"{summary.n_fitted} of {summary.n_boards} boards were fitted."]
     if graded.meets_all is not None and graded.names:
         meets = graded.meets_all[graded.trusted]
-        limits = ", ".join(limit_told(name, limit) for name, limit in graded.request.limits.items())
+        limits = ", ".join(limit_text(name, limit) for name, limit in graded.request.limits.items())
         n_sure, n_maybe = int((meets >= 0.9).sum()), int((meets >= 0.5).sum())
-        told.append(
+        sentences.append(
             f"{limits}: {n_sure} boards meet this with 90 % or more, {n_maybe} with 50 % or more; "
             f"{float(meets.sum()):.1f} are to be expected."
         )
     if graded.pairs:
         best = graded.pairs[0]
         first, second = graded.names[best.first], graded.names[best.second]
-        told.append(
+        sentences.append(
             f"{len(graded.pairs)} pairs are proposed; the likeliest match is {first} with {second}, "
             f"{percent(best.probability)}."
         )
     in_doubt = doubts_sentence(graded)
-    return (*told, f"{in_doubt}.") if in_doubt else tuple(told)
+    return (*sentences, f"{in_doubt}.") if in_doubt else tuple(sentences)
 
 
 def matching_sentence(graded: Grading) -> str:
@@ -301,7 +309,7 @@ def matching_sentence(graded: Grading) -> str:
     return (
         f"Two boards match where they agree in {within}, all at once. The errors of two boards are taken to be "
         f"independent. The likeliest pair is taken first, then the likeliest of the boards that are left; pairs below "
-        f"{percent(LEAST_PROBABILITY)} are not proposed."
+        f"{percent(LEAST_MATCH_PROBABILITY)} are not proposed."
     )
 
 
@@ -309,7 +317,7 @@ def failures_table(summary: BatchSummary) -> Table | None:
     """The boards that were not fitted, with the reason; None where all were."""
     if not summary.failed:
         return None
-    some = summary.failed[:MOST_LISTED]
-    which = "" if len(some) == len(summary.failed) else f", the first {MOST_LISTED} of {len(summary.failed)}"
-    rows = tuple((one.name, one.outcome, one.message) for one in some)
-    return Table(f"Why{which}", ("board", "outcome", "message"), rows)
+    listed = summary.failed[:MOST_LISTED]
+    excerpt = "" if len(listed) == len(summary.failed) else f", the first {MOST_LISTED} of {len(summary.failed)}"
+    rows = tuple((failure.name, failure.outcome, failure.message) for failure in listed)
+    return Table(f"Why{excerpt}", ("board", "outcome", "message"), rows)

@@ -1,4 +1,4 @@
-"""report.html: everything that a fit or a diagnosis found, figures within; two pages on paper, readable on a phone."""
+"""report.html: the results of a fit or a diagnosis with all figures; two pages on paper, readable on a phone."""
 
 from __future__ import annotations
 
@@ -28,65 +28,75 @@ from bayesplate.report.modes import (
     spectrum_pictures,
 )
 from bayesplate.report.posterior import health_picture, priors_picture
-from bayesplate.report.saving import drawing, save_pictures
+from bayesplate.report.saving import matplotlib_defaults, save_pictures
 from bayesplate.report.style import Picture
-from bayesplate.report.verdict import diagnosis_section, page_warnings, quoted, quoted_constants, short_sentences
+from bayesplate.report.verdict import (
+    diagnosis_section,
+    page_warnings,
+    quoted_constants,
+    quoted_summary,
+    short_sentences,
+)
 from bayesplate.results.fit_tables import write_constants
-from bayesplate.results.folder import FIGURES, PAGE
+from bayesplate.results.folder import FIGURES_FOLDER, PAGE_FILE
 from bayesplate.results.references import references
 from bayesplate.results.summary import Summary
-from bayesplate.results.tables import escape, render, visible
+from bayesplate.results.tables import escape, render, strip_control_characters
 
 _PIXELS_AN_INCH = 96
 
 
 class PagePicture(NamedTuple):
-    """A picture as the page holds it: its words, its size in pixels, and its content as a data address."""
+    """A picture on a page: its words, its size in pixels, and its SVG content as a data address."""
 
     words: Picture
     size: tuple[int, ...]
     source: str
 
 
-@drawing()
+@matplotlib_defaults()
 def write_report(
     folder: Path, card: Board, inference: Inference, draws: Draws, summary: Summary, diagnosis: Diagnosis | None = None
 ) -> Path:
     """Write report.html, its figures as PNG and SVG, and the tables for other programs; returns the path of the page.
 
-    What the folder holds of an earlier report is replaced. With a diagnosis, `inference`, `draws` and `summary` are
-    those of the refitted model.
+    Files of an earlier report are replaced. With a diagnosis, `inference`, `draws` and `summary` are those of the
+    refitted model.
     """
     title = inference.problem.board.title or summary.name
     make_folder(folder)
-    write_constants(folder, quoted(summary, diagnosis), title)
+    write_constants(folder, quoted_summary(summary, diagnosis), title)
     if diagnosis is not None:
         write_diagnosis_tables(folder, diagnosis, title)
-    groups = pictures(inference, draws, summary, diagnosis)
-    return save_page(folder / PAGE, groups, lambda shown: fit_page(card, inference, draws, summary, shown, diagnosis))
+    groups = fit_pictures(inference, draws, summary, diagnosis)
+    return save_page(
+        folder / PAGE_FILE,
+        groups,
+        lambda page_pictures: fit_page(card, inference, draws, summary, page_pictures, diagnosis),
+    )
 
 
 def save_page(
     path: Path, groups: Mapping[str, Sequence[Picture]], text: Callable[[Mapping[str, Sequence[PagePicture]]], str]
 ) -> Path:
-    """Write a page and, into the folder beside it, its figures as PNG and SVG, by the place where they stand.
+    """Write a page, and its figures as PNG and SVG into the folder beside it; `groups` holds them by place on the page.
 
-    The page shows the SVG figures, and is there before the PNG files are.
+    The page embeds the SVG figures, and is written before the PNG files.
     """
-    make_folder(path.parent / FIGURES)
-    every = [one for found in groups.values() for one in found]
-    vector = save_pictures(every, path.parent / FIGURES, "svg")
-    write_text(path, text({place: [_shown(one, vector[one.name]) for one in found] for place, found in groups.items()}))
-    save_pictures(every, path.parent / FIGURES, "png")
+    make_folder(path.parent / FIGURES_FOLDER)
+    pictures = [picture for group in groups.values() for picture in group]
+    svgs = save_pictures(pictures, path.parent / FIGURES_FOLDER, "svg")
+    write_text(path, text({place: [_page_picture(p, svgs[p.name]) for p in group] for place, group in groups.items()}))
+    save_pictures(pictures, path.parent / FIGURES_FOLDER, "png")
     return path
 
 
-def pictures(
+def fit_pictures(
     inference: Inference, draws: Draws, summary: Summary, diagnosis: Diagnosis | None = None
 ) -> dict[str, list[Picture]]:
     problem = inference.problem
     board = problem.board
-    first, more = _of_diagnosis(diagnosis)
+    first, more = _diagnosis_pictures(diagnosis)
     return {
         "diagnosis_first": first,
         "diagnosis_more": more,
@@ -105,20 +115,20 @@ def pictures(
     }
 
 
-def _of_diagnosis(diagnosis: Diagnosis | None) -> tuple[list[Picture], list[Picture]]:
+def _diagnosis_pictures(diagnosis: Diagnosis | None) -> tuple[list[Picture], list[Picture]]:
     if diagnosis is None:
         return [], []
     before_after = before_after_picture(diagnosis)
-    more = [null_picture(diagnosis), signatures_picture(diagnosis)]
-    return [before_after] if before_after else [], [one for one in more if one]
+    appendix = [null_picture(diagnosis), signatures_picture(diagnosis)]
+    return [before_after] if before_after else [], [picture for picture in appendix if picture]
 
 
-def _shown(picture: Picture, svg: bytes) -> PagePicture:
-    """A picture as a page holds it, from the content of its SVG file."""
+def _page_picture(picture: Picture, svg: bytes) -> PagePicture:
+    """A picture for a page, from the content of its SVG file."""
     from markupsafe import Markup
 
     size = tuple(round(_PIXELS_AN_INCH * side) for side in picture.figure.get_size_inches())
-    # nothing in it to escape
+    # base64 needs no escape
     return PagePicture(picture, size, Markup(f"data:image/svg+xml;base64,{b64encode(svg).decode('ascii')}"))
 
 
@@ -132,7 +142,7 @@ def fit_page(
 ) -> str:
     problem = inference.problem
     board, prior = problem.board, problem.prior
-    return from_template(
+    return render_page(
         "report.html",
         title=board.title or board.name,
         name=board.name,
@@ -141,7 +151,7 @@ def fit_page(
         weak=summary.identifiability,
         effects=content.effect_sentences(summary, () if diagnosis is None else diagnosis.sentences),
         diagnosis=None if diagnosis is None else diagnosis_section(diagnosis),
-        pictures=dict.fromkeys(PLACES, ()) | dict(shown),
+        pictures=dict.fromkeys(PICTURE_PLACES, ()) | dict(shown),
         tables={
             "constants": quoted_constants(summary, diagnosis),
             "effects": content.effects_table(board, summary),
@@ -162,27 +172,27 @@ def fit_page(
     )
 
 
-PLACES = ("diagnosis_first", "diagnosis_more", "constants", "board", "modes", "errors", "folded")
-"""Where pictures stand on the page."""
+PICTURE_PLACES = ("diagnosis_first", "diagnosis_more", "constants", "board", "modes", "errors", "folded")
+"""Places of pictures on the page."""
 
 
-def from_template(template: str, /, **values: Any) -> str:
-    """A page, every value cleaned of what steers the way text runs, then escaped.
+def render_page(template: str, /, **values: Any) -> str:
+    """A page from a template; every value is stripped of control characters, then escaped.
 
-    A browser may show its own pictures in its own style, and do nothing else whatever.
+    Its content security policy allows its embedded pictures and its style sheet, and nothing else.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
-    def cleaned(value: Any) -> Any:
-        return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+    def clean(value: Any) -> Any:
+        return strip_control_characters(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
     loader = PackageLoader("bayesplate.report", "templates")
-    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, finalize=cleaned)
+    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, finalize=clean)
     environment.filters["symbols"] = lambda text: Markup(escape(str(text), "html"))
-    environment.globals["table"] = lambda shown, kind="": Markup(render(shown, "html", kind=kind))
+    environment.globals["table"] = lambda table, kind="": Markup(render(table, "html", kind=kind))
     css = files("bayesplate.report").joinpath("templates/report.css").read_text(encoding="utf-8")
     digest = b64encode(sha256(css.encode("utf-8")).digest()).decode("ascii")
     policy = f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'"
-    # our own file; the policy lets in nothing else
+    # the style sheet is a file of the package, the only one that the policy allows
     return environment.get_template(template).render(policy=policy, css=Markup(css), **values)

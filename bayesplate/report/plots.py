@@ -1,4 +1,4 @@
-"""The figures of a result, each drawn when it is asked for, as matplotlib has them."""
+"""The figures of a result as matplotlib figures, each drawn on request."""
 
 from __future__ import annotations
 
@@ -52,33 +52,33 @@ class FitPlots(Plots):
     summary: Summary
 
     def constants(self) -> Figure:
-        """Posterior of each modulus, least squares and percentile band beside it."""
+        """Posterior of each modulus, with least squares and the percentile band."""
         return constants_figure(self.summary, self.draws.moduli)
 
     def modes(self, setup: str | None = None) -> Figure:
         """Chladni figures of the fitted modes of a setup, the first unless named, measured and predicted."""
-        names = [one.name for one in self.inference.problem.board.setups]
-        return modes_pictures(self.inference, self.draws, self.summary)[_place("setup", setup, names)].figure
+        names = [setup.name for setup in self.inference.problem.board.setups]
+        return modes_pictures(self.inference, self.draws, self.summary)[_name_index("setup", setup, names)].figure
 
     def corner(self, names: Sequence[str] = MODULI) -> Figure:
-        """Every pair of quantities, by the package corner; least squares marked where there is one.
+        """Every pair of quantities, by the package corner; least-squares estimates are marked.
 
         The names, each once, are of moduli, rigidities and uncertain inputs; moduli are drawn in GPa, inputs in the
         units of cards.
         """
-        known = {**self.draws.moduli, **self.draws.rigidities, **self.draws.inputs}
+        quantities = {**self.draws.moduli, **self.draws.rigidities, **self.draws.inputs}
         if isinstance(names, str) or not len(names) or len(set(names)) < len(names):
-            wanted = f"a list of one or more of {', '.join(known)}, each once"
+            wanted = f"a list of one or more of {', '.join(quantities)}, each once"
             raise InputError(Fault("names", wanted, repr(names) if isinstance(names, str) else f"{list(names)}"))
         for name in names:
-            _place("name", name, list(known))
-        shown = {name: words_and_factor(name, self.inference.problem.board) for name in names}
+            _name_index("name", name, list(quantities))
+        axes = {name: words_and_factor(name, self.inference.problem.board) for name in names}
         estimate = self.summary.weighted_least_squares
-        at = {name: estimate[name] if name in estimate.NAMES else None for name in names}
+        marked = {name: estimate[name] if name in estimate.NAMES else None for name in names}
         return corner_figure(
-            {name: known[name] * factor for name, (_, factor) in shown.items()},
-            {name: None if (v := at[name]) is None else v * factor for name, (_, factor) in shown.items()},
-            axis_labels([words for words, _ in shown.values()]),
+            {name: quantities[name] * factor for name, (_, factor) in axes.items()},
+            {name: None if (v := marked[name]) is None else v * factor for name, (_, factor) in axes.items()},
+            axis_labels([words for words, _ in axes.values()]),
         )
 
     def pairs(self) -> Figure:
@@ -86,15 +86,15 @@ class FitPlots(Plots):
         return corner_picture(self.inference.problem, self.draws).figure
 
     def priors(self) -> Figure:
-        """Prior and posterior of every quantity that was not known."""
+        """Prior and posterior of every sampled quantity."""
         return priors_picture(self.inference.problem, self.draws).figure
 
     def residuals(self) -> Figure:
-        """How far each mode is missed, cents."""
+        """Residual and left-out error of each mode, cents."""
         return residuals_picture(self.summary).figure
 
     def predictive(self) -> Figure:
-        """What the fitted model would expect the next measurement to read."""
+        """Posterior predictive distribution of the next reading of each mode."""
         return predictive_picture(self.summary, self.draws.predictive).figure
 
     def shares(self) -> Figure:
@@ -103,12 +103,12 @@ class FitPlots(Plots):
 
     def percentiles(self) -> Figure:
         """The percentile method's estimates beside the posterior."""
-        drawn = next(iter(percentiles_pictures(self.inference, self.draws)), None)
+        picture = next(iter(percentiles_pictures(self.inference, self.draws)), None)
         wanted, got = "a board of a few modes more than three", "too few, too many, or no estimate"
-        return _figure(drawn, "plot.percentiles", wanted, got)
+        return _figure_of_picture(picture, "plot.percentiles", wanted, got)
 
     def sampler(self) -> Figure:
-        """The way of each ensemble."""
+        """Mean of each ensemble, step by step."""
         return health_picture(self.inference).figure
 
     def board(self) -> Figure:
@@ -123,19 +123,21 @@ class DiagnosePlots(FitPlots):
     diagnosis: Diagnosis
 
     def signatures(self) -> Figure:
-        """What each candidate effect would do to the modes."""
-        drawn = signatures_picture(self.diagnosis)
-        return _figure(drawn, "plot.signatures", "a diagnosis with candidates", "one without")
+        """Shift of the modes by each candidate effect."""
+        picture = signatures_picture(self.diagnosis)
+        return _figure_of_picture(picture, "plot.signatures", "a diagnosis with candidates", "one without")
 
     def null_control(self) -> Figure:
-        """Where the board stands among simulated boards that lack nothing."""
-        drawn = null_picture(self.diagnosis)
-        return _figure(drawn, "plot.null_control", "readings by which something can be judged", "too few")
+        """The board's statistics among those of boards simulated without any further effect."""
+        picture = null_picture(self.diagnosis)
+        return _figure_of_picture(picture, "plot.null_control", "readings by which something can be judged", "too few")
 
     def before_after(self) -> Figure:
-        """The error before and after, and what the effect does to the constants."""
-        drawn = before_after_picture(self.diagnosis)
-        return _figure(drawn, "plot.before_after", "a diagnosis that adds an effect", self.diagnosis.verdict)
+        """Error before and after the refit, and the shift of the constants."""
+        picture = before_after_picture(self.diagnosis)
+        return _figure_of_picture(
+            picture, "plot.before_after", "a diagnosis that adds an effect", self.diagnosis.verdict
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -146,12 +148,12 @@ class PlanPlots(Plots):
     benches: Sequence[Bench]
 
     def gains(self) -> Figure:
-        """What each proposal is expected to give."""
+        """Expected gain of each proposal."""
         return gains_picture(self.plan).figure
 
     def bench(self, setup: str | None = None) -> Figure:
-        """The sheet for the bench of a setup, the first unless named."""
-        return bench_sheet(self.benches[_place("setup", setup, [one.entry.setup for one in self.benches])])
+        """The bench sheet of a setup, the first unless named."""
+        return bench_sheet(self.benches[_name_index("setup", setup, [bench.entry.setup for bench in self.benches])])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -162,12 +164,12 @@ class ModesPlots(Plots):
 
     def modes(self, setup: str | None = None) -> Figure:
         """The sheet of a setup, the first unless named."""
-        return chladni_sheet(self.sheets[_place("setup", setup, [one.setup for one in self.sheets])])
+        return chladni_sheet(self.sheets[_name_index("setup", setup, [sheet.setup for sheet in self.sheets])])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CheckPlots(Plots):
-    """What can be drawn before anything is sampled."""
+    """The figures of a check, which need no sampling."""
 
     problem: PosedProblem
     report: CheckReport
@@ -183,28 +185,28 @@ class CheckPlots(Plots):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ComparePlots(Plots):
-    """The posteriors of a comparison by theory of the plate."""
+    """The figures of a comparison: posteriors by plate theory."""
 
     draws: Mapping[str, Draws]
 
     def corner(self, theory: str = "thin") -> Figure:
         """Every pair of moduli under one theory, by the package corner."""
-        _place("theory", theory, list(self.draws))
+        _name_index("theory", theory, list(self.draws))
         columns = {f"{name}, GPa": values * GPA for name, values in self.draws[theory].moduli.items()}
         return corner_figure(columns, labels=axis_labels(list(columns)))
 
 
-def _figure(picture: Picture | None, place: str, wanted: str, got: str) -> Figure:
+def _figure_of_picture(picture: Picture | None, place: str, wanted: str, got: str) -> Figure:
     """The figure of a picture; refused where there is none."""
     if picture is None:
         raise InputError(Fault(place, wanted, got))
     return picture.figure
 
 
-def _place(what: str, name: str | None, names: Sequence[str]) -> int:
-    """Index of a name among those that there are; the first if none is given."""
+def _name_index(kind: str, name: str | None, names: Sequence[str]) -> int:
+    """Index of a name among `names`, 0 for None; InputError for another name."""
     if name is not None and name not in names:
-        raise InputError(Fault(what, f"one of {', '.join(names)}", repr(name)))
+        raise InputError(Fault(kind, f"one of {', '.join(names)}", repr(name)))
     return 0 if name is None else list(names).index(name)
 
 
@@ -216,20 +218,20 @@ class CampaignPlots(Plots):
     diagnosis: CampaignDiagnosis | None = None
 
     def shared(self, name: str | None = None) -> Figure:
-        """A shared number, the first unless named: each board alone, the others, all boards."""
+        """A shared number, the first unless named: from each board alone, from the others, from all boards."""
         names = list(self.summary.shared)
-        return shared_picture(self.summary, names[_place("shared number", name, names)]).figure
+        return shared_picture(self.summary, names[_name_index("shared number", name, names)]).figure
 
     def boards(self) -> Figure:
         """The constants of all boards."""
         return boards_picture(self.summary).figure
 
     def common(self) -> Figure:
-        """What is left over on all boards alike."""
+        """Residuals that all boards have in common."""
         return common_picture(self.summary.common_residual).figure
 
     def left_out(self) -> Figure:
-        """How much better the others predict each board that is left out."""
+        """Gain in log score of each left-out board, predicted from the others."""
         if self.diagnosis is None or not self.diagnosis.left_out_boards:
             wanted, remedy = "a diagnosis that left boards out", "bayesplate.diagnose leaves them out"
             raise InputError(Fault("left_out", wanted, "a fit, or nothing shared", remedy))

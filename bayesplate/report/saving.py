@@ -1,4 +1,4 @@
-"""Figures to files: complete or absent, and the same bytes whatever style the user has set for figures of his own."""
+"""Figures as files: complete or absent, and the same bytes whatever matplotlib style the user has set."""
 
 from __future__ import annotations
 
@@ -16,49 +16,49 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DOTS_PER_INCH = 200
-Ending = Literal["png", "svg"]
-_PACKING = 3
-"""Of PNG, 0 to 9: beyond this it takes long and saves little."""
+FileEnding = Literal["png", "svg"]
+_PNG_COMPRESSION = 3
+"""Compression level of PNG, 0 to 9; higher levels take long and save little."""
 
 
-_drawing = RLock()
+_DRAWING_LOCK = RLock()
 
 
 @contextmanager
-def drawing() -> Iterator[None]:
-    """Figures made and written here look as matplotlib comes; to be put above a function, or a context.
+def matplotlib_defaults() -> Iterator[None]:
+    """Draw and write figures with matplotlib's default settings; a decorator or a context.
 
-    matplotlib reads its settings from the working folder and the home of the user, and a notebook changes them. They
-    are those of a whole process, so that threads draw one after another.
+    matplotlib reads settings from the working folder and the user's home, and a notebook changes them. They belong to
+    the whole process, so threads draw one after another.
     """
     from matplotlib import rc_context, rcdefaults, rcParams
 
-    with _drawing, rc_context():
+    with _DRAWING_LOCK, rc_context():
         rcdefaults()
         rcParams["svg.hashsalt"] = "bayesplate"  # names inside an SVG follow from its content
         yield
 
 
-@drawing()
+@matplotlib_defaults()
 def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure by the ending of its path, PNG or SVG, without a time stamp."""
-    write_bytes(path, _bytes_of(figure, path.suffix.removeprefix("."), {}))
+    write_bytes(path, _figure_bytes(figure, path.suffix.removeprefix("."), {}))
 
 
-def save_pictures(pictures: Iterable[Picture], folder: Path, ending: Ending) -> dict[str, bytes]:
-    """Write pictures, made while `drawing`, with title and alternative text inside; returns their content by name."""
-    written = {}
+def save_pictures(pictures: Iterable[Picture], folder: Path, ending: FileEnding) -> dict[str, bytes]:
+    """Write pictures with title and alternative text; returns their content by name. Needs `matplotlib_defaults`."""
+    contents = {}
     for picture in pictures:
-        told = {"Title": picture.title, "Description": picture.alt}
-        written[picture.name] = _bytes_of(picture.figure, ending, told)
-        write_bytes(folder / f"{picture.name}.{ending}", written[picture.name])
-    return written
+        texts = {"Title": picture.title, "Description": picture.alt}
+        contents[picture.name] = _figure_bytes(picture.figure, ending, texts)
+        write_bytes(folder / f"{picture.name}.{ending}", contents[picture.name])
+    return contents
 
 
-def _bytes_of(figure: Figure, ending: str, told: Mapping[str, str]) -> bytes:
+def _figure_bytes(figure: Figure, ending: str, texts: Mapping[str, str]) -> bytes:
     """A figure as PNG or SVG without a time stamp."""
-    metadata: dict[str, str | None] = {**told, **({"Date": None} if ending == "svg" else {})}
-    packing: Any = {"pil_kwargs": {"compress_level": _PACKING}} if ending == "png" else {}
+    metadata: dict[str, str | None] = {**texts, **({"Date": None} if ending == "svg" else {})}
+    packing: Any = {"pil_kwargs": {"compress_level": _PNG_COMPRESSION}} if ending == "png" else {}
     stream = BytesIO()
     figure.savefig(stream, format=ending, dpi=DOTS_PER_INCH, metadata=metadata, **packing)
     return stream.getvalue()

@@ -1,4 +1,4 @@
-"""The part of a page that tells of a diagnosis: verdict, errors before and after, candidates, what to measure next."""
+"""The diagnosis section of a page: verdict, errors before and after, candidates, next measurement."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from bayesplate.diagnosis.tables import (
     candidates_table,
     claim_table,
     errors_table,
+    quoted_constants_words,
     shift_table,
     sizes_table,
-    what_is_quoted,
 )
 from bayesplate.diagnosis.words import (
-    IN_PART,
+    IN_PART_HEADING,
     VERDICTS,
     headline_sentence,
     known_sentences,
-    remarks,
-    shown_model,
+    reason_and_notes,
+    shown_model_sentence,
     verdict_sentences,
     warnings,
 )
@@ -40,7 +40,7 @@ _SHIFT = "Shift, sd: how far a constant moves, counted in the standard deviation
 
 
 def diagnosis_section(diagnosis: Diagnosis) -> SimpleNamespace:
-    """Everything that the page shows of a diagnosis besides its pictures."""
+    """The diagnosis section of the page, without its pictures."""
     tables = (
         answers_table(diagnosis),
         errors_table(diagnosis),
@@ -49,26 +49,26 @@ def diagnosis_section(diagnosis: Diagnosis) -> SimpleNamespace:
         sizes_table(diagnosis),
     )
     return SimpleNamespace(
-        heading=IN_PART if diagnosis.named_in_part else VERDICTS[diagnosis.verdict].heading,
-        # each word that a verdict may be, what it means, and whether it is the one given
-        verdicts=tuple((word, one.heading, word == diagnosis.verdict) for word, one in VERDICTS.items()),
+        heading=IN_PART_HEADING if diagnosis.named_in_part else VERDICTS[diagnosis.verdict].heading,
+        # every possible verdict, its meaning, and whether it was given
+        verdicts=tuple((word, verdict.heading, word == diagnosis.verdict) for word, verdict in VERDICTS.items()),
         sentences=tuple(verdict_sentences(diagnosis)),
         known=" ".join(known_sentences(diagnosis)),
         tables=tuple(table for table in tables if table is not None),
         explained=(_LOG_SCORE, *((_SHIFT,) if diagnosis.is_refitted else ())),
-        model=shown_model(diagnosis),
-        notes=tuple(remarks(diagnosis)),
+        model=shown_model_sentence(diagnosis),
+        notes=tuple(reason_and_notes(diagnosis)),
         known_effects=known_table(diagnosis.known),
         candidates=candidates_table(diagnosis),
         recommendation=diagnosis.recommendation,
     )
 
 
-def quoted(summary: Summary, diagnosis: Diagnosis | None) -> Summary:
-    """A summary with the constants that are to be quoted, and the errors of the fit that they stand for.
+def quoted_summary(summary: Summary, diagnosis: Diagnosis | None) -> Summary:
+    """A summary with the constants to quote and the errors that belong to them.
 
-    After a diagnosis the constants are the averaged ones, and the errors those of the first fit unless one model was
-    named, be it in part.
+    After a diagnosis the constants are averaged over the hypotheses, and the errors are those of the first fit unless
+    the verdict names a model, be it in part.
     """
     if diagnosis is None:
         return summary
@@ -88,17 +88,17 @@ def quoted(summary: Summary, diagnosis: Diagnosis | None) -> Summary:
 
 
 def quoted_constants(summary: Summary, diagnosis: Diagnosis | None) -> Table:
-    what = "" if diagnosis is None else f", {what_is_quoted(diagnosis)}"
-    return compared_constants(quoted(summary, diagnosis), f"Elastic constants{what}, GPa")
+    subject = "" if diagnosis is None else f", {quoted_constants_words(diagnosis)}"
+    return compared_constants(quoted_summary(summary, diagnosis), f"Elastic constants{subject}, GPa")
 
 
 def short_sentences(summary: Summary, diagnosis: Diagnosis | None) -> list[str]:
-    """The first lines of a page: the constants to quote, what they are, and how far the frequencies are missed."""
-    first, *others = summary_sentences(quoted(summary, diagnosis))
-    what = "" if diagnosis is None else headline_sentence(diagnosis)
-    return [first, *([what] if what else []), *others]
+    """The first lines of a page: the constants to quote, their meaning, and the errors of the frequencies."""
+    first, *others = summary_sentences(quoted_summary(summary, diagnosis))
+    headline = "" if diagnosis is None else headline_sentence(diagnosis)
+    return [first, *([headline] if headline else []), *others]
 
 
 def page_warnings(summary: Summary, diagnosis: Diagnosis | None) -> list[str]:
-    """What stands beneath them: doubts of the diagnosis, then those of the fit."""
+    """The warnings of a page: those of the diagnosis, then those of the fit."""
     return list(dict.fromkeys([*(warnings(diagnosis) if diagnosis is not None else []), *summary.warnings]))

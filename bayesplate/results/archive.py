@@ -1,4 +1,4 @@
-"""The draws of a fit as ArviZ has them: one tree, in memory and as posterior.nc, for ArviZ 0.23 and 1.x alike."""
+"""The draws of a fit as one ArviZ tree, in memory and as posterior.nc, for ArviZ 0.23 and 1.x alike."""
 
 from __future__ import annotations
 
@@ -23,28 +23,32 @@ from bayesplate.results.summary import Summary
 
 Variables = Mapping[str, tuple[Sequence[str], NDArray[Any]]]
 GROUPS = ("posterior", "log_prior", "log_likelihood", "posterior_predictive", "sample_stats", "observed_data")
-"""In the order of the file; a group of which nothing is known is empty."""
-DRAWN = ("chain", "draw")
-"""Dimensions of every draw; chain = ensemble."""
+"""Groups of the archive in the order of the file; a group without variables is empty."""
+DRAW_DIMENSIONS = ("chain", "draw")
+"""Dimensions of every variable that is drawn; chain = ensemble."""
 
 
-def tree_of(groups: Mapping[str, Variables], labels: Mapping[str, Sequence[str]], attributes: Mapping[str, str]) -> Any:
-    """A tree of groups (`GROUPS`) of variables, and labels of each dimension besides chain and draw: xarray.DataTree.
+def build_tree(
+    groups: Mapping[str, Variables], labels: Mapping[str, Sequence[str]], attributes: Mapping[str, str]
+) -> Any:
+    """A tree of groups (`GROUPS`) of variables, with labels of each dimension besides chain and draw: xarray.DataTree.
 
-    Nothing is in it that was not given, so that the same draws give the same file.
+    It holds nothing else, no date for instance, so that the same draws give the same file.
     """
     xarray: Any = import_module("xarray")
     datasets = {"/": xarray.Dataset(attrs=dict(sorted(attributes.items())))}
     for group in GROUPS:
         dataset = xarray.Dataset(dict(groups.get(group, {})))
-        axes: dict[Any, Any] = {name: np.arange(size) for name, size in dataset.sizes.items() if name in DRAWN}
-        named = {name: list(each) for name, each in labels.items() if name in dataset.sizes}
-        datasets[group] = dataset.assign_coords(axes | named)
+        axes: dict[Any, Any] = {
+            name: np.arange(size) for name, size in dataset.sizes.items() if name in DRAW_DIMENSIONS
+        }
+        coordinates = {name: list(entries) for name, entries in labels.items() if name in dataset.sizes}
+        datasets[group] = dataset.assign_coords(axes | coordinates)
     return xarray.DataTree.from_dict(datasets)
 
 
 def to_arviz(tree: Any) -> Any:
-    """A tree as the ArviZ that is installed works with it: InferenceData in 0.23, itself in 1.x; no file is written."""
+    """A tree for the installed ArviZ: as InferenceData in 0.23, as it is in 1.x; no file is written."""
     arviz = load_arviz()
     if "InferenceData" in vars(arviz):  # 1.3 answers to the name with a warning, and has a tree behind it
         return arviz.InferenceData.from_datatree(tree)
@@ -53,16 +57,18 @@ def to_arviz(tree: Any) -> Any:
 
 def write_tree(path: Path, tree: Any) -> None:
     """Write a tree as netCDF, completely or not at all."""
-    # Not by HDF5 itself, which ends the process at its end where a disk was full.
+    # not by HDF5 itself, which aborts the process at exit if the disk was full
     write_bytes(Path(path), bytes(tree.to_netcdf(None, engine="h5netcdf")))
 
 
-def attributes_of(inference: Inference, summary: Summary, card_text: str) -> dict[str, str]:
-    """What the archive of a fit says of its origin; the header and the sampler's entries are those of its summary."""
+def archive_attributes(inference: Inference, summary: Summary, card_text: str) -> dict[str, str]:
+    """Origin of a fit as attributes of its archive; the model and the sampler's entries are those of its summary."""
     return {
         "card": card_text,
         "prior": inference.problem.prior.name,
-        "priors": json.dumps({name: _stated(one) for name, one in inference.problem.prior.stated_constants.items()}),
+        "priors": json.dumps(
+            {name: _prior_content(prior) for name, prior in inference.problem.prior.stated_constants.items()}
+        ),
         "model": json.dumps(as_json(summary.model)),
         "sampler": json.dumps(as_json(summary.sampler)),
         "versions": json.dumps(as_json(summary.versions)),
@@ -72,7 +78,7 @@ def attributes_of(inference: Inference, summary: Summary, card_text: str) -> dic
 
 
 def posterior_tree(inference: Inference, draws: Draws, attributes: Mapping[str, str]) -> Any:
-    """The draws of a fit under the names of the archive: xarray.DataTree.
+    """The draws of a fit by the names of the archive: xarray.DataTree.
 
     Its group log_prior holds one variable per factor of the prior: constants, noise, and inputs if any is uncertain.
     """
@@ -80,17 +86,19 @@ def posterior_tree(inference: Inference, draws: Draws, attributes: Mapping[str, 
     board = problem.board
     factors = problem.posterior.log_prior_factors(draws.flat)
     all_sure = not any(problem.posterior.peaks)
-    likelihood, of_what = ("frequency", "reading") if all_sure else ("readings_and_peaks", "factor")
-    drawn = {**draws.rigidities, **draws.moduli, **draws.inputs}
-    return tree_of(
+    likelihood, dimension = ("frequency", "reading") if all_sure else ("readings_and_peaks", "factor")
+    variables = {**draws.rigidities, **draws.moduli, **draws.inputs}
+    return build_tree(
         {
             "posterior": {
-                **{name: (DRAWN, values) for name, values in drawn.items()},
-                "noise": ((*DRAWN, "setup"), draws.noise),
+                **{name: (DRAW_DIMENSIONS, values) for name, values in variables.items()},
+                "noise": ((*DRAW_DIMENSIONS, "setup"), draws.noise),
             },
-            "log_prior": {name: (DRAWN, values.reshape(draws.log_posterior.shape)) for name, values in factors.items()},
-            "log_likelihood": {likelihood: ((*DRAWN, of_what), draws.log_likelihood)},
-            "posterior_predictive": {"frequency": ((*DRAWN, "reading"), draws.predictive)},
+            "log_prior": {
+                name: (DRAW_DIMENSIONS, values.reshape(draws.log_posterior.shape)) for name, values in factors.items()
+            },
+            "log_likelihood": {likelihood: ((*DRAW_DIMENSIONS, dimension), draws.log_likelihood)},
+            "posterior_predictive": {"frequency": ((*DRAW_DIMENSIONS, "reading"), draws.predictive)},
             "sample_stats": sample_stats(draws.log_posterior, inference.convergence),
             "observed_data": {"frequency": (("reading",), np.concatenate([setup.measured for setup in board.setups]))},
         },
@@ -107,11 +115,11 @@ def posterior_tree(inference: Inference, draws: Draws, attributes: Mapping[str, 
 def sample_stats(log_posterior: Floats, convergence: Convergence) -> Variables:
     """The log posterior of each draw, and the sampler's health by parameter."""
     health = {name: (("parameter",), getattr(convergence, name)) for name in ("tau", "rhat", "ess")}
-    return {"lp": (DRAWN, log_posterior), **health}
+    return {"lp": (DRAW_DIMENSIONS, log_posterior), **health}
 
 
-def _stated(prior: StatedPrior) -> dict[str, Any]:
-    """What a prior is defined by, and its source."""
+def _prior_content(prior: StatedPrior) -> dict[str, Any]:
+    """The numbers that define a prior, and its source."""
     quantity = prior.quantity
     numbers = ("lower", "upper") if quantity.kind == "log-uniform" else ("median", "factor")
     return {"kind": quantity.kind, **{name: getattr(quantity, name) for name in numbers}, "source": prior.source}

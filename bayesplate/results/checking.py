@@ -1,4 +1,4 @@
-"""The report of `check` as types: what would be fitted, and what the readings can identify."""
+"""The report of `check` as types: the model to be fitted, and what the readings can identify."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from bayesplate.results.contract import NOT_IN_JSON, Constants, Elastic
 
 @dataclass(frozen=True)
 class CheckedSetup:
-    """How the board is held, and how much was read; the noise is the median of its prior, per cent."""
+    """The edges of a setup and its number of readings; the noise is the median of its prior, per cent."""
 
     name: str
     edges: Mapping[str, str]
@@ -21,7 +21,7 @@ class CheckedSetup:
 
 @dataclass(frozen=True)
 class CheckedMode:
-    """A reading over the weighted least-squares estimate, and what it tells."""
+    """A reading over the weighted least-squares prediction, its leverage, and its energy shares."""
 
     setup: str
     label: str
@@ -34,20 +34,20 @@ class CheckedMode:
 
 @dataclass(frozen=True)
 class CheckedEffect:
-    """What an effect that is not declared would do at a usual size, SI."""
+    """The signature of an undeclared effect at a usual size, SI."""
 
     effect: str
     size: Mapping[str, float]  # value of each parameter
-    raw_rms_cents: float  # shift of the modes in all
-    visible_rms_cents: float  # what a fit of the constants leaves of it
-    below_detection_limit: bool  # whether that is lost in the noise
-    bias_percent: Elastic[float]  # what ignoring the effect does to each modulus
-    look_alikes: tuple[str, ...]  # effects that no such readings can tell from it
+    raw_rms_cents: float  # shift of the modes
+    visible_rms_cents: float  # shift left after the constants are fitted again
+    below_detection_limit: bool  # whether the visible shift is lost in the noise
+    bias_percent: Elastic[float]  # bias of each modulus if the effect is ignored
+    look_alikes: tuple[str, ...]  # effects that these readings cannot tell from it
 
 
 @dataclass(frozen=True, repr=False)
 class CheckReport:
-    """What a fit of a card would do.
+    """What a fit of a card can identify.
 
     Attributes
     ----------
@@ -62,9 +62,9 @@ class CheckReport:
     condition_number : float
     modes : tuple of CheckedMode
     in_sample_rms_cents : float
-        Of their residuals.
+        Rms of the residuals of the modes.
     signatures : tuple of CheckedEffect
-        Every effect that is not declared and could act.
+        Effects that are not declared and could act.
     invisible : str
         What no frequencies can show.
     identifiability, notes : tuple of str
@@ -90,5 +90,5 @@ class CheckReport:
     n_doubts: int = field(metadata=NOT_IN_JSON)
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{name} ± {percent:.1f} %" for name, percent in self.expected_sd_percent.items())
-        return f"<CheckReport of {self.name}: {len(self.modes)} modes, {told} to expect>"
+        uncertainties = ", ".join(f"{name} ± {percent:.1f} %" for name, percent in self.expected_sd_percent.items())
+        return f"<CheckReport of {self.name}: {len(self.modes)} modes, {uncertainties} to expect>"

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from bayesplate.results.checking import CheckReport
-from bayesplate.results.comparison import Estimated, MethodRow, TheoryRow
+from bayesplate.results.comparison import MethodRow, ModulusEstimate, TheoryRow
 from bayesplate.results.sheets import EnergyShares, ModesReport, SheetReport, SheetRow
-from bayesplate.results.tables import Cell, Row, Table, by_constant
+from bayesplate.results.tables import Cell, Row, Table, table_by_constant
 from bayesplate.results.words import (
-    CONSTANTS,
     GPA,
+    MODULUS_WORDS,
     Value,
-    chances,
     decimals,
     is_isotropic,
     mode_name,
     number,
     percent,
+    probabilities_text,
     two_digits,
 )
 
@@ -33,11 +33,11 @@ METHODS_REMARK = (
 )
 _DEFAULT_DIGITS = 3
 _WHOLE_HZ = 100.0
-_NO_MODE, _LEAST_TOLD = "none", 0.005
+_NO_MODE, _LEAST_ALTERNATIVE = "none", 0.005
 
 
 def check_tables(report: CheckReport) -> tuple[Table, ...]:
-    """What `check` found: the constants with the precision to expect, the modes, and what effects would do."""
+    """The tables of `check`: the constants with the expected precision, the modes, the shifts by undeclared effects."""
 
     def estimate(name: str) -> Value:
         value = report.estimate[name]
@@ -54,7 +54,7 @@ def check_tables(report: CheckReport) -> tuple[Table, ...]:
         for mode in report.modes
     )
     return (
-        by_constant(
+        table_by_constant(
             f"What {report.name} can tell, GPa",
             {
                 "weighted least squares": estimate,
@@ -72,19 +72,19 @@ def check_tables(report: CheckReport) -> tuple[Table, ...]:
 
 
 def _effects_table(report: CheckReport) -> Table:
-    """What effects that are not declared would do: in all, to be seen, and to the constants if ignored.
+    """Undeclared effects: shift of the modes, the part that could be seen, bias of the constants if ignored.
 
     No name of an effect may be cut off on a terminal of 80 columns, so look-alikes stand below each other.
     """
     rows = tuple(
         (
-            one.effect,
-            number(one.raw_rms_cents, 1),
-            f"{one.visible_rms_cents:.1f}" + (" *" if one.below_detection_limit else "  "),
-            "/".join(str(number(bias, 1, signed=True)) for _, bias in one.bias_percent.items()),
-            "\n".join(one.look_alikes) or None,
+            signature.effect,
+            number(signature.raw_rms_cents, 1),
+            f"{signature.visible_rms_cents:.1f}" + (" *" if signature.below_detection_limit else "  "),
+            "/".join(str(number(bias, 1, signed=True)) for _, bias in signature.bias_percent.items()),
+            "\n".join(signature.look_alikes) or None,
         )
-        for one in report.signatures
+        for signature in report.signatures
     )
     return Table(
         "Effects not declared, at a usual size: cents rms (*: lost in noise)",
@@ -94,22 +94,22 @@ def _effects_table(report: CheckReport) -> Table:
 
 
 def methods_table(name: str, theory: TheoryRow) -> Table:
-    """The constants of every method under one theory of the plate, and how far each misses the readings."""
+    """The constants of every method under one plate theory, and the rms error of each."""
     return Table(
         f"{name}, {theory.theory} plate: constants, GPa; error, cents rms",
-        ("method", *CONSTANTS, "error"),
+        ("method", *MODULUS_WORDS, "error"),
         tuple(_method_cells(method, theory) for method in theory.methods),
     )
 
 
 def _method_cells(method: MethodRow, theory: TheoryRow) -> tuple[Cell, ...]:
     subsets = "" if method.n_subsets is None else f" ({method.n_subsets})"
-    cells = (_constant(entry, _digits(name, theory)) for name, entry in method.elastic.items())
+    cells = (_modulus_cell(entry, _modulus_decimals(name, theory)) for name, entry in method.elastic.items())
     return (_METHODS[method.name] + subsets, *cells, number(method.forward_rms_cents, 1))
 
 
 def forward_table(theory: TheoryRow) -> Table:
-    """The forward check: each reading over what the exact law predicts at a method's constants, cents."""
+    """The forward check: each reading over the exact law's prediction at a method's constants, cents."""
     several = len({mode.setup for mode in theory.modes}) > 1
     rows: list[Row] = [
         (
@@ -127,39 +127,43 @@ def forward_table(theory: TheoryRow) -> Table:
     )
 
 
-def _digits(name: str, theory: TheoryRow) -> int:
-    """Decimals of a modulus without a standard deviation: those of the methods that give one."""
-    every = (method.elastic[name].sd for method in theory.methods)
-    return max((decimals(sd * GPA) for sd in every if sd), default=_DEFAULT_DIGITS)
+def _modulus_decimals(name: str, theory: TheoryRow) -> int:
+    """Decimals of a modulus without a standard deviation: as many as the methods that give one have."""
+    sds = (method.elastic[name].sd for method in theory.methods)
+    return max((decimals(sd * GPA) for sd in sds if sd), default=_DEFAULT_DIGITS)
 
 
-def _constant(entry: Estimated, digits: int) -> Value:
+def _modulus_cell(entry: ModulusEstimate, digits: int) -> Value:
     if entry.mean is None or not entry.sd:
         return number(entry.mean, digits, factor=GPA)
     return Value(entry.mean * GPA, entry.sd * GPA)
 
 
 def sheet_tables(report: ModesReport) -> tuple[Table, ...]:
-    """What the peaks may be, where none has a label, and one table per setup."""
+    """The labels proposed for peaks, where no peak has a label, and one table per setup."""
     tables = tuple(_sheet_table(report.name, setup) for setup in report.setups)
     return (_proposed_table(report), *tables) if report.proposed else tables
 
 
 def _proposed_table(report: ModesReport) -> Table:
-    """The labels proposed for bare peaks, how probable each is, and what else it may be."""
+    """The label proposed for each peak, its probability, and the alternatives."""
     rows: list[Row] = []
-    for one in report.proposed:
-        label = one.label or _NO_MODE
-        others = {name: p for name, p in one.probability.items() if name != label and p > _LEAST_TOLD}
-        rows.append((one.measured_hz, label, percent(one.probability[label]), chances(others)))
+    for proposal in report.proposed:
+        label = proposal.label or _NO_MODE
+        alternatives = {name: p for name, p in proposal.probability.items() if name != label and p > _LEAST_ALTERNATIVE}
+        rows.append(
+            (proposal.measured_hz, label, percent(proposal.probability[label]), probabilities_text(alternatives))
+        )
     return Table(f"Labels proposed for the peaks of {report.name}", ("Hz", "mode", "probability", "or"), tuple(rows))
 
 
 def proposal_remarks(report: ModesReport) -> tuple[str, ...]:
-    """What to do with proposed labels: look at the figures, then write them on the card."""
+    """How to use proposed labels: compare the figures, then write the labels on the card."""
     if not report.proposed:
         return ()
-    lines = ", ".join(f'"{one.label}" = {one.measured_hz:g}' for one in report.proposed if one.label)
+    lines = ", ".join(
+        f'"{proposal.label}" = {proposal.measured_hz:g}' for proposal in report.proposed if proposal.label
+    )
     return (
         "no peak has a label, so these are proposals: compare the figures in sand with the sheet, then write "
         f"frequencies_hz = {{ {lines} }}",
@@ -173,8 +177,8 @@ def _sheet_table(name: str, setup: SheetReport) -> Table:
         (
             mode.label,
             number(mode.hz, 1),
-            _reading(mode),
-            " / ".join(str(share) for share in _shares(mode.share_percent, has_effects)),
+            _reading_cell(mode),
+            " / ".join(str(share) for share in _rounded_shares(mode.share_percent, has_effects)),
             *(f"{coefficient:.4g}" for coefficient in (mode.a, mode.b, mode.c)),
         )
         for mode in setup.modes
@@ -190,12 +194,12 @@ def _sheet_table(name: str, setup: SheetReport) -> Table:
     )
 
 
-def _shares(shares: EnergyShares, has_effects: bool) -> list[int]:
-    wanted = (shares.D_x, shares.D_y, shares.D_s, *((shares.effects,) if has_effects else ()))
-    return [round(share) for share in wanted]
+def _rounded_shares(shares: EnergyShares, has_effects: bool) -> list[int]:
+    percentages = (shares.D_x, shares.D_y, shares.D_s, *((shares.effects,) if has_effects else ()))
+    return [round(share) for share in percentages]
 
 
-def _reading(mode: SheetRow) -> Cell:
+def _reading_cell(mode: SheetRow) -> Cell:
     if mode.likely_hz is not None:
         return " to ".join(f"{end:.1f}" if end < _WHOLE_HZ else f"{end:.0f}" for end in mode.likely_hz)
     return mode.measured_hz

@@ -1,4 +1,4 @@
-"""compare.json as types: every method's constants side by side, and what the exact law predicts at each of them."""
+"""compare.json as types: every method's constants side by side, and the exact law's predictions at each."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bayesplate.board.material import MODULI
-from bayesplate.estimates.leave_one_out import CarryingMode, Errors
+from bayesplate.estimates.leave_one_out import CarryingMode, PredictionErrors
 from bayesplate.estimates.paper import PaperSystem
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.methods import Method
 from bayesplate.posterior.posing import PosedProblem
-from bayesplate.results.contract import Elastic, finite, rms
-from bayesplate.results.modes import foretold
+from bayesplate.results.contract import Elastic, finite_or_none, rms
+from bayesplate.results.modes import drop_carrying_modes
 
 FORMAT = 1
 SAME_CENTS = 0.5
-"""Two theories whose errors left out differ by less are not told apart."""
+"""Cents; two theories whose left-out errors differ by less are equally good."""
 
 
 @dataclass(frozen=True)
-class Estimated:
+class ModulusEstimate:
     """A modulus by one method; None where the method gives no such number."""
 
     mean: float | None
@@ -33,8 +33,8 @@ class Estimated:
 
 
 @dataclass(frozen=True)
-class Forward:
-    """What the exact law predicts for one mode at a method's constants, and by how much that exceeds the reading."""
+class ForwardPrediction:
+    """The exact law's prediction of one mode at a method's constants, and its excess over the reading."""
 
     setup: str
     label: str
@@ -44,13 +44,13 @@ class Forward:
 
 @dataclass(frozen=True)
 class MethodRow:
-    """One method: its constants, and how far it misses the readings; None where a number does not exist."""
+    """One method: its constants and its errors; None where a number does not exist."""
 
     name: str
-    elastic: Elastic[Estimated]
+    elastic: Elastic[ModulusEstimate]
     condition_number: float | None
     n_subsets: int | None
-    forward: tuple[Forward, ...]
+    forward: tuple[ForwardPrediction, ...]
     forward_rms_cents: float | None
 
 
@@ -74,8 +74,8 @@ class LeastSquaresErrors:
 
 
 @dataclass(frozen=True)
-class Origin:
-    """Where the coefficients of one setup come from."""
+class CoefficientOrigin:
+    """The source of the coefficients of one setup."""
 
     setup: str
     source: str
@@ -87,12 +87,12 @@ class Origin:
 
 @dataclass(frozen=True)
 class TheoryRow:
-    """What one theory of the plate makes of a board: all methods, and the errors of weighted least squares."""
+    """A board under one plate theory: all methods, and the errors of weighted least squares."""
 
     theory: str
     effects: tuple[str, ...]
     inputs: Mapping[str, float]
-    coefficients: tuple[Origin, ...]
+    coefficients: tuple[CoefficientOrigin, ...]
     methods: tuple[MethodRow, ...]
     modes: tuple[ComparedMode, ...]
     error: LeastSquaresErrors
@@ -100,7 +100,7 @@ class TheoryRow:
 
 @dataclass(frozen=True)
 class BetterTheory:
-    """Which theory predicts the left-out modes better, and that in one sentence; None where neither does."""
+    """The theory that predicts left-out modes better, and a sentence on it; None where neither is better."""
 
     better: str | None
     sentence: str
@@ -121,7 +121,7 @@ class Comparison:
         Thin, then shear-flexible.
     verdict : BetterTheory
     carrying_modes : tuple of CarryingMode
-        Modes that alone carry a constant or a size in one of the theories: they count in the left-out error of none.
+        Modes that alone carry a constant or a size in one of the theories; no left-out error counts them.
     """
 
     format: int
@@ -138,74 +138,84 @@ class Comparison:
         return f"<Comparison of {self.name}: {self.verdict.sentence}>"
 
 
-def theory_row(problem: PosedProblem, system: PaperSystem, methods: Sequence[Method], errors: Errors) -> TheoryRow:
-    """What one theory of the plate makes of a board; errors are of the most likely constants under the exact law."""
+def theory_row(
+    problem: PosedProblem, system: PaperSystem, methods: Sequence[Method], errors: PredictionErrors
+) -> TheoryRow:
+    """A board under one plate theory; the errors are those of the most likely constants under the exact law."""
     board = problem.board
     rows = [(setup.name, str(r.label), r.frequency.mean) for setup in board.setups for r in setup.readings]
     in_sample, left_out = cents(errors.in_sample), cents(errors.left_out)
     return TheoryRow(
         theory=problem.posterior.models[0].system.theory,
         effects=tuple(board.effects),
-        inputs={one.name: float(one.prior.mean) for one in board.parameters if one.is_of_effect},
+        inputs={
+            parameter.name: float(parameter.prior.mean) for parameter in board.parameters if parameter.is_of_effect
+        },
         coefficients=tuple(
-            Origin(
+            CoefficientOrigin(
                 setup.name,
-                one.source,
-                one.theory,
-                one.aspect_ratio,
-                one.sentence,
-                {str(label): r for label, r in one.r_squared.items()},
+                origin.source,
+                origin.theory,
+                origin.aspect_ratio,
+                origin.sentence,
+                {str(label): r for label, r in origin.r_squared.items()},
             )
-            for setup, one in zip(board.setups, system.origins, strict=True)
+            for setup, origin in zip(board.setups, system.origins, strict=True)
         ),
         methods=tuple(_method_row(method, rows) for method in methods),
         modes=tuple(
-            ComparedMode(*row, float(fitted), finite(float(without)))
+            ComparedMode(*row, float(fitted), finite_or_none(float(without)))
             for row, fitted, without in zip(rows, in_sample, left_out, strict=True)
         ),
         error=LeastSquaresErrors(rms(in_sample), rms(left_out)),
     )
 
 
-def judged_alike(rows: Sequence[TheoryRow], carrying: Sequence[CarryingMode]) -> tuple[TheoryRow, ...]:
-    """The theories with left-out errors in which no mode counts that alone carries something in one of them."""
+def recompute_left_out_errors(rows: Sequence[TheoryRow], carrying: Sequence[CarryingMode]) -> tuple[TheoryRow, ...]:
+    """The theories with left-out errors over the same modes: those that carry nothing alone under any theory."""
 
-    def judged(row: TheoryRow) -> TheoryRow:
-        left_out = rms([one.left_out_cents for one in foretold(row.modes, carrying)])
+    def with_left_out_error(row: TheoryRow) -> TheoryRow:
+        left_out = rms([mode.left_out_cents for mode in drop_carrying_modes(row.modes, carrying)])
         return replace(row, error=replace(row.error, leave_one_out_rms_cents=left_out))
 
-    return tuple(map(judged, rows))
+    return tuple(map(with_left_out_error, rows))
 
 
 def better_theory(thin: TheoryRow, sheared: TheoryRow) -> BetterTheory:
-    """Which theory predicts the left-out modes better."""
-    before, after = thin.error.leave_one_out_rms_cents, sheared.error.leave_one_out_rms_cents
-    if before is None or after is None:
+    """Compare the two theories by their errors of left-out modes."""
+    thin_error, sheared_error = thin.error.leave_one_out_rms_cents, sheared.error.leave_one_out_rms_cents
+    if thin_error is None or sheared_error is None:
         return BetterTheory(None, "No mode can be left out and foretold: the two theories cannot be told apart.")
-    if abs(after - before) < SAME_CENTS:
+    if abs(sheared_error - thin_error) < SAME_CENTS:
         better, word = None, "changes nothing"
     else:
-        better, word = ("shear-flexible", "lowers the error") if after < before else ("thin", "raises the error")
-    sentence = f"Transverse shear {word}: {before:.1f} -> {after:.1f} cents for modes left out of the fit"
+        better, word = (
+            ("shear-flexible", "lowers the error") if sheared_error < thin_error else ("thin", "raises the error")
+        )
+    sentence = f"Transverse shear {word}: {thin_error:.1f} -> {sheared_error:.1f} cents for modes left out of the fit"
     in_sample = (thin.error.in_sample_rms_cents, sheared.error.in_sample_rms_cents)
     return BetterTheory(better, f"{sentence}, {in_sample[0]:.1f} -> {in_sample[1]:.1f} for those in it.")
 
 
 def _method_row(method: Method, rows: Sequence[tuple[str, str, float]]) -> MethodRow:
-    missed = cents(method.misses)
+    errors_cents = cents(method.misses)
     elastic = {}
     for name in MODULI:
         sd = method.sd[name] if method.sd else np.nan
         low, high = method.interval[name] if method.interval else (np.nan, np.nan)
-        elastic[name] = Estimated(finite(method.mean[name]), finite(sd), finite(low), finite(high), "Pa")
+        elastic[name] = ModulusEstimate(
+            finite_or_none(method.mean[name]), finite_or_none(sd), finite_or_none(low), finite_or_none(high), "Pa"
+        )
     return MethodRow(
         name=method.name,
         elastic=Elastic(**elastic),
         condition_number=method.condition_number,
         n_subsets=method.n_subsets,
         forward=tuple(
-            Forward(setup, label, finite(hertz * float(np.exp(log_ratio))), finite(float(miss)))
-            for (setup, label, hertz), log_ratio, miss in zip(rows, method.misses, missed, strict=True)
+            ForwardPrediction(
+                setup, label, finite_or_none(hertz * float(np.exp(log_ratio))), finite_or_none(float(error_cents))
+            )
+            for (setup, label, hertz), log_ratio, error_cents in zip(rows, method.misses, errors_cents, strict=True)
         ),
-        forward_rms_cents=rms(missed) if np.isfinite(missed).all() else None,
+        forward_rms_cents=rms(errors_cents) if np.isfinite(errors_cents).all() else None,
     )

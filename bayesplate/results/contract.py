@@ -1,4 +1,4 @@
-"""What results are made of: one value per elastic constant, spread and joint spread of draws, the one way to JSON."""
+"""Parts of results: one value per elastic constant, spread and joint moments of draws, conversion to JSON."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.posterior.draws import Draws
 
-Held = TypeVar("Held")
+ConstantValue = TypeVar("ConstantValue")
 
 NOT_IN_JSON = {"in_json": False}
 """Metadata of a field that `as_json` leaves out."""
@@ -22,16 +22,16 @@ _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
 @dataclass(frozen=True)
-class ByConstant(Mapping[str, Held]):
+class ByConstant(Mapping[str, ConstantValue]):
     """One value per constant, by attribute or by name as in a dict: `elastic.E_x` is `elastic["E_x"]`."""
 
     NAMES: ClassVar[tuple[str, ...]] = ()
 
-    def __getitem__(self, name: str) -> Held:
+    def __getitem__(self, name: str) -> ConstantValue:
         if name not in self.NAMES:
             raise KeyError(name)
-        held: Held = getattr(self, name)
-        return held
+        value: ConstantValue = getattr(self, name)
+        return value
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.NAMES)
@@ -41,41 +41,41 @@ class ByConstant(Mapping[str, Held]):
 
 
 @dataclass(frozen=True)
-class Elastic(ByConstant[Held]):
+class Elastic(ByConstant[ConstantValue]):
     """One value per elastic modulus."""
 
-    E_x: Held
-    E_y: Held
-    G_xy: Held
+    E_x: ConstantValue
+    E_y: ConstantValue
+    G_xy: ConstantValue
     NAMES: ClassVar[tuple[str, ...]] = MODULI
 
 
 @dataclass(frozen=True)
-class Rigidity(ByConstant[Held]):
+class Rigidity(ByConstant[ConstantValue]):
     """One value per rigidity."""
 
-    D_x: Held
-    D_y: Held
-    D_s: Held
+    D_x: ConstantValue
+    D_y: ConstantValue
+    D_s: ConstantValue
     NAMES: ClassVar[tuple[str, ...]] = RIGIDITIES
 
 
 @dataclass(frozen=True)
-class Constants(ByConstant[Held]):
+class Constants(ByConstant[ConstantValue]):
     """One value per modulus (Pa) and per rigidity (N m)."""
 
-    E_x: Held
-    E_y: Held
-    G_xy: Held
-    D_x: Held
-    D_y: Held
-    D_s: Held
+    E_x: ConstantValue
+    E_y: ConstantValue
+    G_xy: ConstantValue
+    D_x: ConstantValue
+    D_y: ConstantValue
+    D_s: ConstantValue
     NAMES: ClassVar[tuple[str, ...]] = MODULI + RIGIDITIES
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Mean, standard deviation and quantiles of draws, in a unit."""
+    """Mean, standard deviation and quantiles of draws, with their unit."""
 
     mean: float
     sd: float
@@ -88,10 +88,10 @@ class Spread:
 
     @classmethod
     def of(cls, values: NDArray[np.float64], unit: str) -> Spread:
-        """Those of draws, in an array of any shape.
+        """The spread of draws, in an array of any shape.
 
-        An exact value is the same in every draw. It has no spread, but the rounding of a mean would give it one, and a
-        number is written with as many digits as its spread has meaning.
+        An exact value is the same in every draw. Its spread is set to zero, which the rounding of the mean would miss:
+        the spread decides with how many digits a number is printed.
         """
         if np.all(values == values.flat[0]):
             exact = float(values.flat[0])
@@ -101,58 +101,60 @@ class Spread:
 
 
 def as_json(value: Any) -> Any:
-    """A result as JSON has it: the fields of a dataclass by name and in their order, tuples as lists."""
+    """A result as JSON content: the fields of a dataclass by name and in their order, tuples as lists."""
     if is_dataclass(value):
-        written = (one.name for one in fields(value) if one.metadata != NOT_IN_JSON)
-        return {name: as_json(getattr(value, name)) for name in written}
+        names = (field.name for field in fields(value) if field.metadata != NOT_IN_JSON)
+        return {name: as_json(getattr(value, name)) for name in names}
     if isinstance(value, Mapping):
-        return {key: as_json(one) for key, one in value.items()}
+        return {key: as_json(entry) for key, entry in value.items()}
     if isinstance(value, tuple | list):
-        return [as_json(one) for one in value]
+        return [as_json(entry) for entry in value]
     return value
 
 
 def json_text(content: Any) -> str:
-    """JSON of a result, as it is written and printed; refuses numbers that JSON does not have."""
+    """JSON of a result, as it is written and printed; refuses infinity and not-a-number."""
     return json.dumps(as_json(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def finite(value: float) -> float | None:
-    """The number, or None where JSON has none: infinity and not-a-number."""
+def finite_or_none(value: float) -> float | None:
+    """The number; None, as JSON needs it, for infinity and not-a-number."""
     return float(value) if np.isfinite(value) else None
 
 
 def rms(values: Sequence[float | None] | NDArray[np.float64]) -> float | None:
-    """Root of the mean square of those that are numbers; None if none is."""
+    """Root mean square of the finite values; None if there are none."""
     numbers = np.array(values, dtype=float)
     numbers = numbers[np.isfinite(numbers)]
     return float(np.sqrt(np.mean(numbers**2))) if numbers.size else None
 
 
-JOINT = (*MODULI, *RIGIDITIES, "density")
-"""Whatever makers compute is a product of powers of these, so that its logarithm is a sum of theirs."""
+JOINT_NAMES = (*MODULI, *RIGIDITIES, "density")
+"""Quantities of `JointMoments`; every maker's figure is a product of their powers, its logarithm linear in theirs."""
 
 
 @dataclass(frozen=True)
-class Joint:
-    """Natural logarithms of constants and density together, in SI units."""
+class JointMoments:
+    """Mean and covariance of the natural logarithms of constants and density, SI units."""
 
     names: tuple[str, ...]  # E_x, E_y, G_xy (Pa), D_x, D_y, D_s (N m), density (kg m^-3)
     log_mean: tuple[float, ...]  # in that order
     log_covariance: tuple[tuple[float, ...], ...]  # row after row
 
     @classmethod
-    def of(cls, draws: Draws) -> Joint:
-        """That of draws."""
+    def of(cls, draws: Draws) -> JointMoments:
+        """The moments of the draws of a fit."""
         return cls.of_values({**draws.moduli, **draws.rigidities, "density": draws.derived["density"].values})
 
     @classmethod
-    def of_values(cls, values: Mapping[str, NDArray[np.float64]]) -> Joint:
-        """That of draws by name, each an array of the same shape, SI."""
-        logs = np.stack([np.log(np.ravel(values[name])) for name in JOINT])
+    def of_values(cls, values: Mapping[str, NDArray[np.float64]]) -> JointMoments:
+        """The moments of draws by name, each an array of the same shape, SI."""
+        logs = np.stack([np.log(np.ravel(values[name])) for name in JOINT_NAMES])
         mean = logs.mean(axis=1)
-        apart = logs - mean[:, None]
-        covariance = (apart[:, None] * apart[None]).sum(axis=2) / (logs.shape[1] - 1)
+        deviations = logs - mean[:, None]
+        covariance = (deviations[:, None] * deviations[None]).sum(axis=2) / (logs.shape[1] - 1)
         return cls(
-            JOINT, tuple(float(one) for one in mean), tuple(tuple(float(one) for one in row) for row in covariance)
+            JOINT_NAMES,
+            tuple(float(entry) for entry in mean),
+            tuple(tuple(float(entry) for entry in row) for row in covariance),
         )

@@ -9,21 +9,21 @@ import numpy as np
 from bayesplate.files import write_text
 from bayesplate.frequencies.laws import cents
 from bayesplate.results.contract import ByConstant, Spread
-from bayesplate.results.folder import CONSTANTS
-from bayesplate.results.modes import LEAST, ModeRow
+from bayesplate.results.folder import CONSTANTS_FILES
+from bayesplate.results.modes import LEAST_MODE_PROBABILITY, ModeRow
 from bayesplate.results.summary import Percentile, PercentileValue, Summary
 from bayesplate.results.tables import Row, Table, constants_table, render
-from bayesplate.results.words import GPA, Value, chances, decimals, mode_name, number, two_digits
+from bayesplate.results.words import GPA, Value, decimals, mode_name, number, probabilities_text, two_digits
 
-_MARKS = {"card": "", "doubtful": " ?", "proposed": " *"}
-_MARKED = {"doubtful": "; ? label in doubt", "proposed": "; * label proposed here"}
-MOST_LISTED = 3
-"""Modes that a table gives for one peak."""
+_LABEL_MARKS = {"card": "", "doubtful": " ?", "proposed": " *"}
+_MARK_WORDS = {"doubtful": "; ? label in doubt", "proposed": "; * label proposed here"}
+MOST_MODES_OF_PEAK = 3
+"""Modes listed for one peak."""
 _NO_PERCENTILE = PercentileValue(None, None)
 
 
 def fitted_constants(summary: Summary) -> Table:
-    """The constants of a fit beside weighted least squares."""
+    """The constants of a fit, with weighted least squares beside them."""
 
     def weighted(name: str) -> Value:
         return number(summary.weighted_least_squares[name], decimals(summary.elastic[name].sd * GPA), factor=GPA)
@@ -40,7 +40,7 @@ def fitted_constants(summary: Summary) -> Table:
 
 
 def compared_constants(summary: Summary, title: str) -> Table:
-    """The constants beside the older methods, as page and LaTeX have them."""
+    """The constants with the older methods beside them, for the page and LaTeX."""
 
     def point(estimate: ByConstant[float | None], name: str) -> Value:
         return number(estimate[name], decimals(summary.elastic[name].sd * GPA), factor=GPA)
@@ -51,43 +51,43 @@ def compared_constants(summary: Summary, title: str) -> Table:
         {
             "paper's least squares": lambda name: point(summary.least_squares, name),
             "weighted least squares": lambda name: point(summary.weighted_least_squares, name),
-            "percentile method": lambda name: _trimmed(summary.percentile, name),
+            "percentile method": lambda name: _percentile_cell(summary.percentile, name),
         },
         isotropic=summary.model.isotropic,
     )
 
 
-def _trimmed(percentile: Percentile | None, name: str) -> Value:
-    """The percentile method's mean and its own spread, GPa."""
+def _percentile_cell(percentile: Percentile | None, name: str) -> Value:
+    """Mean and spread of the percentile method, GPa."""
     if percentile is None or (mean := percentile[name].mean) is None:
         return Value()
     share = percentile[name].sd_percent
     return number(mean, 3, factor=GPA) if share is None else Value(mean * GPA, mean * GPA * share / 100)
 
 
-def every_number(summary: Summary) -> Table:
-    """Moduli in GPa and rigidities in N m for programs: spread, and the older methods' estimates."""
-    spread = ("mean", "sd", "q05", "q25", "q50", "q75", "q95")
+def exported_constants(summary: Summary) -> Table:
+    """The table of constants.csv: spread of moduli (GPa) and rigidities (N m), and the older methods' estimates."""
+    statistics = ("mean", "sd", "q05", "q25", "q50", "q75", "q95")
     rows: list[Row] = []
     groups: tuple[tuple[ByConstant[Spread], str, float], ...] = (
         (summary.elastic, "GPa", GPA),
         (summary.rigidity, "N m", 1.0),
     )
     for group, unit, factor in groups:
-        for name, one in group.items():
+        for name, spread in group.items():
             trimmed = summary.percentile[name] if summary.percentile and group is summary.elastic else _NO_PERCENTILE
             points = (summary.least_squares[name], summary.weighted_least_squares[name], trimmed.mean)
-            numbers = (*(getattr(one, end) for end in spread), *points)
+            numbers = (*(getattr(spread, end) for end in statistics), *points)
             scaled = (None if value is None else value * factor for value in numbers)
             rows.append((name, unit, *scaled, trimmed.sd_percent))
     older = ("least_squares", "weighted_least_squares", "percentile_mean", "percentile_sd_percent")
-    return Table("constants", ("constant", "unit", *spread, *older), tuple(rows))
+    return Table("constants", ("constant", "unit", *statistics, *older), tuple(rows))
 
 
 def write_constants(folder: Path, summary: Summary, title: str) -> tuple[Path, ...]:
-    """Write constants.csv and constants.tex into a folder that is there; the title of the board is any text."""
+    """Write constants.csv and constants.tex into an existing folder; the title of the board may be any text."""
     heading = f"Elastic constants of {title}, GPa; seed {summary.seed}, {len(summary.modes)} modes"
-    return write_tables(folder, CONSTANTS, every_number(summary), compared_constants(summary, heading))
+    return write_tables(folder, CONSTANTS_FILES, exported_constants(summary), compared_constants(summary, heading))
 
 
 def write_tables(folder: Path, names: tuple[str, str], numbers: Table, told: Table) -> tuple[Path, ...]:
@@ -99,19 +99,19 @@ def write_tables(folder: Path, names: tuple[str, str], numbers: Table, told: Tab
 
 
 def modes_table(summary: Summary) -> Table:
-    """Each labelled mode: measured, predicted, the one over the other with its interval, and the error left out.
+    """Each labelled mode: measured and predicted frequency, residual with its interval, and left-out error.
 
-    The rounding interval stands beside the error where it is wider than the noise: there it decides.
+    The half-width of the rounding interval is given where the interval is wider than the noise.
     """
     several = len({mode.setup for mode in summary.modes}) > 1
-    halves = [rounding_that_decides(summary, mode) for mode in summary.modes]
-    is_rounded = any(half is not None for half in halves)
+    half_widths = [deciding_rounding(summary, mode) for mode in summary.modes]
+    is_rounded = any(half_width is not None for half_width in half_widths)
     rows: list[Row] = []
-    for mode, half in zip(summary.modes, halves, strict=True):
-        rounding = (None if half is None else f"± {half:.1f}",) if is_rounded else ()
+    for mode, half_width in zip(summary.modes, half_widths, strict=True):
+        rounding = (None if half_width is None else f"± {half_width:.1f}",) if is_rounded else ()
         rows.append(
             (
-                mode_name(mode.label, mode.setup, several=several) + _MARKS[mode.label_origin],
+                mode_name(mode.label, mode.setup, several=several) + _LABEL_MARKS[mode.label_origin],
                 mode.measured_hz,
                 number(mode.predicted_hz.mean, 1),
                 number(mode.residual_cents, 1, signed=True),
@@ -121,18 +121,18 @@ def modes_table(summary: Summary) -> Table:
             )
         )
     rounded = ("rounding",) if is_rounded else ()
-    marked = "".join(
-        words for origin, words in _MARKED.items() if origin in {mode.label_origin for mode in summary.modes}
+    mark_notes = "".join(
+        words for origin, words in _MARK_WORDS.items() if origin in {mode.label_origin for mode in summary.modes}
     )
     return Table(
-        f"Modes, Hz; errors, cents (17 cents are about 1 %){marked}",
+        f"Modes, Hz; errors, cents (17 cents are about 1 %){mark_notes}",
         ("mode", "measured", "predicted", "error", "90 % interval", *rounded, "left out"),
         tuple(rows),
     )
 
 
-def rounding_that_decides(summary: Summary, mode: ModeRow) -> float | None:
-    """Half the width of a reading's rounding interval, cents, where that is wider than the noise; None elsewhere."""
+def deciding_rounding(summary: Summary, mode: ModeRow) -> float | None:
+    """Half the width of a reading's rounding interval, cents, where the interval is wider than the noise; else None."""
     if mode.rounding_cents is None:
         return None
     width = mode.rounding_cents[1] - mode.rounding_cents[0]
@@ -145,18 +145,20 @@ def noise_cents(summary: Summary, mode: ModeRow) -> float:
 
 
 def peaks_table(summary: Summary) -> Table | None:
-    """Peaks whose label is not sure beside the modes that they may be; None if there are none."""
+    """Peaks whose label is not sure, with the modes that they may be; None without such peaks."""
     if not summary.peaks:
         return None
     several = len(summary.spectra) > 1
     rows: list[Row] = []
     for peak in summary.peaks:
-        found = {one.label: one.probability for one in peak.assignments[:MOST_LISTED]}
-        if peak.spurious_probability >= LEAST:
-            found["no mode"] = peak.spurious_probability
+        probabilities = {
+            assignment.label: assignment.probability for assignment in peak.assignments[:MOST_MODES_OF_PEAK]
+        }
+        if peak.spurious_probability >= LEAST_MODE_PROBABILITY:
+            probabilities["no mode"] = peak.spurious_probability
         name = f"{peak.hz:.6g}" + (f" {peak.setup}" if several else "")
         miss = number(peak.residual_cents, 1, signed=True)
-        rows.append((name, peak.stated, chances(found), number(peak.predicted_hz.mean, 1), miss))
+        rows.append((name, peak.stated, probabilities_text(probabilities), number(peak.predicted_hz.mean, 1), miss))
     return Table(
         "Peaks and the modes that they may be",
         ("peak, Hz", "on the card", "probability", "predicted, Hz", "cents"),

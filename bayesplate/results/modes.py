@@ -1,4 +1,4 @@
-"""The modes and peaks of a summary: each reading beside what the fitted model predicts."""
+"""The modes and peaks of a summary: each reading and its posterior prediction."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from bayesplate.posterior.assessment import Assessment
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.likely_labels import MOST_DRAWS_OF_LABELS
 from bayesplate.posterior.posing import PosedProblem
-from bayesplate.results.contract import finite
+from bayesplate.results.contract import finite_or_none
 
 LabelOrigin = Literal["card", "doubtful", "proposed"]
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """What the posterior says of a frequency, Hz."""
+    """The posterior of a frequency: mean and ends of the 90 % interval, Hz."""
 
     mean: float
     q05: float
@@ -33,14 +33,14 @@ class Prediction:
 
     @classmethod
     def of(cls, hertz: NDArray[np.float64]) -> Prediction:
-        """That of draws: (n_draws,) array, Hz."""
+        """The prediction of draws: (n_draws,) array, Hz."""
         low, high = np.quantile(hertz, [0.05, 0.95])
         return cls(float(hertz.mean()), float(low), float(high))
 
 
 @dataclass(frozen=True)
 class ModeRow:
-    """A labelled mode; but for `left_out_cents` and `leverage` every number belongs to the posterior."""
+    """A labelled mode; its numbers are of the posterior, except `left_out_cents` and `leverage`."""
 
     setup: str
     label: str
@@ -49,20 +49,20 @@ class ModeRow:
     residual_cents: float  # measured over the posterior mean of the prediction
     # measured over the ends of the predicted 90 % interval, the lower one first
     residual_interval_cents: tuple[float, float]
-    # ends of the rounding interval over the reading; None where it is not rounded
+    # ends of the rounding interval over the reading; None where the reading is not rounded
     rounding_cents: tuple[float, float] | None
-    # measured over predicted by the most likely constants of the other readings; None where too few are left. Of a mode
-    # that alone carries a constant or a size it says nothing, and no error counts it.
+    # measured over predicted by the most likely constants of the other readings; None where too few are left. It has no
+    # meaning for a mode that alone carries a constant or a size, and no error counts that mode.
     left_out_cents: float | None
-    leverage: float  # share of the mode in its own prediction, what else is free counted in
-    label_correlation: float  # of the mode's shape with what its label names
-    # whether the card states the label as sure or with a doubt, or the peak has none and this one is its likeliest; the
-    # probabilities of the latter two stand in `Summary.peaks`
+    leverage: float  # share of the reading in its own prediction, all free parameters included
+    label_correlation: float  # of the mode's shape with the beam functions of its label
+    # "card": stated as sure; "doubtful": stated with a doubt; "proposed": the likeliest label of a peak without one.
+    # `Summary.peaks` has the probabilities of the latter two
     label_origin: LabelOrigin = "card"
 
 
-def over(measured: float, predicted: float) -> float:
-    """A frequency over another, cents."""
+def ratio_cents(measured: float, predicted: float) -> float:
+    """Ratio of a measured to a predicted frequency, cents."""
     return float(cents(np.log(measured / predicted)))
 
 
@@ -70,13 +70,13 @@ def mode_rows(problem: PosedProblem, draws: Draws, assessment: Assessment) -> tu
     """One row per labelled mode, setup after setup."""
     predicted = np.exp(draws.log_frequency).reshape(-1, draws.log_frequency.shape[-1])
     rounding = rounding_intervals(problem)
-    rows = [
+    placed_readings = [
         (setup.name, reading, place)
         for setup, model in zip(problem.board.setups, problem.posterior.models, strict=True)
         for reading, place in zip(setup.readings, model.places, strict=True)
     ]
-    made = []
-    for i, (setup, reading, place) in enumerate(rows):
+    rows = []
+    for i, (setup, reading, place) in enumerate(placed_readings):
         hertz = reading.frequency.mean
         prediction = Prediction.of(predicted[:, i])
         row = ModeRow(
@@ -84,23 +84,23 @@ def mode_rows(problem: PosedProblem, draws: Draws, assessment: Assessment) -> tu
             label=str(reading.label),
             measured_hz=hertz,
             predicted_hz=prediction,
-            residual_cents=over(hertz, prediction.mean),
-            residual_interval_cents=(over(hertz, prediction.q95), over(hertz, prediction.q05)),
+            residual_cents=ratio_cents(hertz, prediction.mean),
+            residual_interval_cents=(ratio_cents(hertz, prediction.q95), ratio_cents(hertz, prediction.q05)),
             rounding_cents=rounding[i],
-            left_out_cents=finite(float(cents(assessment.left_out[i]))),
+            left_out_cents=finite_or_none(float(cents(assessment.left_out[i]))),
             leverage=float(assessment.leverages[i]),
             label_correlation=place.correlation,
             label_origin="card" if reading.is_sure else "doubtful" if reading.confidence else "proposed",
         )
-        made.append(row)
-    return tuple(made)
+        rows.append(row)
+    return tuple(rows)
 
 
-Row = TypeVar("Row", bound="Labelled")
+AnyLabelledRow = TypeVar("AnyLabelledRow", bound="LabelledRow")
 
 
-class Labelled(Protocol):
-    """A row of a mode of a setup."""
+class LabelledRow(Protocol):
+    """A row with the setup and the label of a mode."""
 
     @property
     def setup(self) -> str: ...
@@ -109,30 +109,34 @@ class Labelled(Protocol):
     def label(self) -> str: ...
 
 
-def foretold(rows: Iterable[Row], carrying: Iterable[CarryingMode]) -> list[Row]:
-    """Rows of the modes that others foretell: those that count in an error of modes left out."""
-    carried = {(one.setup, one.label) for one in carrying}
-    return [one for one in rows if (one.setup, one.label) not in carried]
+def drop_carrying_modes(rows: Iterable[AnyLabelledRow], carrying: Iterable[CarryingMode]) -> list[AnyLabelledRow]:
+    """Rows without the carrying modes, which no other mode predicts: those that count in a left-out error."""
+    carried = {(mode.setup, mode.label) for mode in carrying}
+    return [row for row in rows if (row.setup, row.label) not in carried]
 
 
 def rounding_intervals(problem: PosedProblem) -> list[tuple[float, float] | None]:
     """Ends of the rounding interval of each reading, cents over it; None where a reading is not rounded."""
-    found: list[tuple[float, float] | None] = []
-    for one in problem.posterior.readings:
-        ends = zip(cents(one.log_low - one.log_frequency), cents(one.log_high - one.log_frequency), strict=True)
-        found += [(float(low), float(high)) if high > low else None for low, high in ends]
-    return found
+    intervals: list[tuple[float, float] | None] = []
+    for readings in problem.posterior.readings:
+        ends = zip(
+            cents(readings.log_low - readings.log_frequency),
+            cents(readings.log_high - readings.log_frequency),
+            strict=True,
+        )
+        intervals += [(float(low), float(high)) if high > low else None for low, high in ends]
+    return intervals
 
 
-UNNAMED = "cannot tell"
-"""A mode whose shape is no clear product of beam functions."""
-LEAST = 0.005
+UNNAMED_MODE = "cannot tell"
+"""Label of a mode whose shape is no clear product of beam functions."""
+LEAST_MODE_PROBABILITY = 0.005
 """Probability below which a mode is not listed."""
 
 
 @dataclass(frozen=True)
 class Assignment:
-    """A mode that a peak may be, and the probability that it is."""
+    """A mode that a peak may be, with its probability."""
 
     label: str
     probability: float
@@ -140,20 +144,20 @@ class Assignment:
 
 @dataclass(frozen=True)
 class AssignedPeak:
-    """A peak without a label, or with one that may be wrong."""
+    """A peak without a label or with a doubtful one."""
 
     setup: str
-    hz: float  # as read
-    stated: str | None  # its label on the card
-    assignments: tuple[Assignment, ...]  # the most probable mode first; those below half a per cent are left out
-    spurious_probability: float  # that it is no mode of the plate
-    predicted_hz: Prediction  # of its most probable mode
-    residual_cents: float  # the peak over that mode's mean
+    hz: float  # reading
+    stated: str | None  # label on the card
+    assignments: tuple[Assignment, ...]  # the most probable mode first; modes below half a per cent are left out
+    spurious_probability: float  # that the peak is no mode of the plate
+    predicted_hz: Prediction  # of the most probable mode
+    residual_cents: float  # the reading over the mean prediction of that mode
 
 
 @dataclass(frozen=True)
 class PredictedMode:
-    """A mode that peaks may be."""
+    """A predicted mode of a setup whose peaks have no sure labels."""
 
     setup: str
     label: str
@@ -163,56 +167,60 @@ class PredictedMode:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """How the peaks of a setup were taken for modes."""
+    """The modes that the peaks of a setup may be, and the prior probabilities of missed modes and spurious peaks."""
 
     setup: str
-    missed_probability: float  # beforehand, that a mode left no peak
-    spurious_probability: float  # beforehand, that a peak is no mode
+    missed_probability: float  # prior, that a mode has no peak
+    spurious_probability: float  # prior, that a peak is no mode
     modes: tuple[PredictedMode, ...]  # in the order of frequency, up to a little above the highest peak
 
 
 def assigned_peaks(problem: PosedProblem, draws: Draws) -> tuple[tuple[AssignedPeak, ...], tuple[Spectrum, ...]]:
-    """Every peak whose label is not sure, by frequency, and the modes of its setup, averaged over the posterior."""
+    """The peaks whose label is not sure, by frequency, and the modes of their setups, averaged over the posterior."""
     peaks: list[AssignedPeak] = []
     spectra = []
     for i, (setup, likelihood) in enumerate(zip(problem.board.setups, problem.posterior.peaks, strict=True)):
         if likelihood is None:
             continue
-        every = draws.every_log_frequency[i]
-        flat, noise = every.reshape(-1, every.shape[-1]), draws.noise[..., i].ravel()
+        log_frequency = draws.every_log_frequency[i]
+        flat, noise = log_frequency.reshape(-1, log_frequency.shape[-1]), draws.noise[..., i].ravel()
         predicted = [Prediction.of(np.exp(column)) for column in flat[:, likelihood.columns].T]
         step = max(1, len(flat) // MOST_DRAWS_OF_LABELS)
         probabilities = likelihood.probabilities(flat[::step], noise[::step])
-        peaks += _of_setup(setup, likelihood, probabilities, predicted)
-        seen = probabilities.sum(axis=0)
+        peaks += _assign_peaks(setup, likelihood, probabilities, predicted)
+        seen_probabilities = probabilities.sum(axis=0)
         modes = (
-            PredictedMode(setup.name, _name(label), one, float(share))
-            for label, one, share in zip(likelihood.labels, predicted, seen, strict=True)
+            PredictedMode(setup.name, _label_text(label), prediction, float(probability))
+            for label, prediction, probability in zip(likelihood.labels, predicted, seen_probabilities, strict=True)
         )
-        in_order = tuple(sorted(modes, key=lambda mode: mode.predicted_hz.mean))
-        spectra.append(Spectrum(setup.name, setup.missed, setup.spurious, in_order))
+        sorted_modes = tuple(sorted(modes, key=lambda mode: mode.predicted_hz.mean))
+        spectra.append(Spectrum(setup.name, setup.missed, setup.spurious, sorted_modes))
     return tuple(peaks), tuple(spectra)
 
 
-def _of_setup(
+def _assign_peaks(
     setup: Setup, likelihood: PeakLikelihood, probabilities: NDArray[np.float64], predicted: list[Prediction]
 ) -> Iterator[AssignedPeak]:
-    for i, (row, at) in enumerate(zip(probabilities, likelihood.readings, strict=True)):
+    for i, (row, index) in enumerate(zip(probabilities, likelihood.readings, strict=True)):
         order = np.argsort(-row, kind="stable")
-        reading = setup.readings[at] if at >= 0 else None
-        stated = None if reading is None or not reading.confidence else reading.stated or reading.label
+        reading = setup.readings[index] if index >= 0 else None
+        stated_label = None if reading is None or not reading.confidence else reading.stated or reading.label
         hertz = float(likelihood.errors.frequency[i])
         best = predicted[order[0]]
         yield AssignedPeak(
             setup=setup.name,
             hz=hertz,
-            stated=None if stated is None else str(stated),
-            assignments=tuple(Assignment(_name(likelihood.labels[j]), float(row[j])) for j in order if row[j] >= LEAST),
+            stated=None if stated_label is None else str(stated_label),
+            assignments=tuple(
+                Assignment(_label_text(likelihood.labels[j]), float(row[j]))
+                for j in order
+                if row[j] >= LEAST_MODE_PROBABILITY
+            ),
             spurious_probability=float(max(1.0 - row.sum(), 0.0)),
             predicted_hz=best,
-            residual_cents=over(hertz, best.mean),
+            residual_cents=ratio_cents(hertz, best.mean),
         )
 
 
-def _name(label: Label | None) -> str:
-    return UNNAMED if label is None else str(label)
+def _label_text(label: Label | None) -> str:
+    return UNNAMED_MODE if label is None else str(label)

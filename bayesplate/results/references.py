@@ -1,4 +1,4 @@
-"""The references of what a fit uses: its model, its computation, its data and its priors; kept here alone."""
+"""The references of a fit: of its model, computation, data and priors."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ELEMENT = (
     "by the use of interpolation formulas. Proc. Conf. Matrix Methods in Structural Mechanics, Wright-Patterson AFB, "
     "397-443 (1965). [the plate's finite elements]"
 )
-THIN = "Kirchhoff's thin orthotropic plate, as in eq. (1) to (4) of Ducceschi et al. [the plate theory]"
+THIN_THEORY = "Kirchhoff's thin orthotropic plate, as in eq. (1) to (4) of Ducceschi et al. [the plate theory]"
 COMPUTATION = (
     "C. R. Harris et al.: Array programming with NumPy. Nature 585, 357-362 (2020), doi:10.1038/s41586-020-2649-2. "
     "[arrays, small eigenvalue problems]",
@@ -40,48 +40,50 @@ COMPUTATION = (
 
 
 @dataclass(frozen=True)
-class Section:
-    """A heading and what stands under it."""
+class ReferenceSection:
+    """A heading with its references."""
 
     title: str
     entries: tuple[str, ...]
 
 
-def references(card: Board, prior: PriorCard, board: Board) -> tuple[Section, ...]:
-    """What to cite for a fit of a card, whose effects the board declares: nothing that the fit does not use."""
+def references(card: Board, prior: PriorCard, board: Board) -> tuple[ReferenceSection, ...]:
+    """The references of a fit of a card, with the effects that `board` declares; only of what the fit uses."""
     systems = [system_of(board, setup) for setup in board.setups]
-    theory = (THIN,) if any(system.theory == "thin" for system in systems) else ()
-    effects = tuple(dict.fromkeys(entry for system in systems for one in system.effects for entry in one.references))
+    theory = (THIN_THEORY,) if any(system.theory == "thin" for system in systems) else ()
+    effects = tuple(
+        dict.fromkeys(entry for system in systems for effect in system.effects for entry in effect.references)
+    )
     return (
-        Section("Model", (PAPER, *theory, ELEMENT, *effects)),
-        Section("Computation", COMPUTATION),
-        Section("Data", _data(card, board)),
-        Section("Prior", _priors(prior, board)),
+        ReferenceSection("Model", (PAPER, *theory, ELEMENT, *effects)),
+        ReferenceSection("Computation", COMPUTATION),
+        ReferenceSection("Data", _data_references(card, board)),
+        ReferenceSection("Prior", _prior_references(prior, board)),
     )
 
 
-def _data(card: Board, board: Board) -> tuple[str, ...]:
-    entries = [f"board {card.name}: {_one_line(card.source) or 'the card states no source'}"]
+def _data_references(card: Board, board: Board) -> tuple[str, ...]:
+    entries = [f"board {card.name}: {_single_line(card.source) or 'the card states no source'}"]
     tables = [setup.published_coefficients for setup in board.setups if setup.published_coefficients is not None]
-    entries += [f"coefficients {table.name}: {_one_line(table.source)}" for table in tables]
+    entries += [f"coefficients {table.name}: {_single_line(table.source)}" for table in tables]
     return tuple(dict.fromkeys(entries))
 
 
-def _priors(prior: PriorCard, board: Board) -> tuple[str, ...]:
-    """Sources of the prior card that the fit uses, and of the priors of effects that the board card does not state."""
-    used = {name: source for name, source in prior.sources.items() if _is_used(name, board)}
-    entries = [f"{name} ({prior.name}): {_one_line(source)}" for name, source in used.items()]
+def _prior_references(prior: PriorCard, board: Board) -> tuple[str, ...]:
+    """Sources of the prior card that the fit uses, and of default priors of effects."""
+    sources = {name: source for name, source in prior.sources.items() if _is_prior_used(name, board)}
+    entries = [f"{name} ({prior.name}): {_single_line(source)}" for name, source in sources.items()]
     for setup in board.setups:
         for effect in effects_of(board, setup):
             for parameter in effect.parameters():
                 if parameter.source:
-                    what = effect.name if parameter.is_component else f"{parameter.key} ({effect.name})"
-                    entries.append(f"{what}: {_one_line(parameter.source)}")
+                    subject = effect.name if parameter.is_component else f"{parameter.key} ({effect.name})"
+                    entries.append(f"{subject}: {_single_line(parameter.source)}")
     return tuple(dict.fromkeys(entries))
 
 
-def _is_used(name: str, board: Board) -> bool:
-    """A prior's Poisson ratio and noise serve only where the board card does not state its own."""
+def _is_prior_used(name: str, board: Board) -> bool:
+    """Whether the fit uses an entry of the prior card: Poisson ratio and noise only if the board card has none."""
     if name == "poisson_xy":
         return board.parameter("poisson_xy").is_assumed
     if name == "noise_percent":
@@ -89,5 +91,5 @@ def _is_used(name: str, board: Board) -> bool:
     return True
 
 
-def _one_line(text: str) -> str:
+def _single_line(text: str) -> str:
     return " ".join(text.split())

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from bayesplate.board.board import Board
 from bayesplate.estimates.sheet import Sheet, SheetMode
-from bayesplate.posterior.first_labels import Way
+from bayesplate.posterior.first_labels import Labelling
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class SheetRow:
     hz: float
     measured_hz: float | None
     miss_cents: float | None  # computed over measured
-    likely_hz: tuple[float, float] | None  # where it is expected two times in three, if it was not measured
+    likely_hz: tuple[float, float] | None  # interval of probability 2/3 of a mode that was not measured
     share_percent: EnergyShares
     # a, b, c: the paper's coefficients
     a: float
@@ -38,7 +38,7 @@ class SheetRow:
 
 @dataclass(frozen=True)
 class MixtureRow:
-    """A mixture of modes that answers to one modulus alone: weight of each mode by label."""
+    """A mixture of modes that depends on one modulus alone: weight of each mode by label."""
 
     name: str
     modulus: str
@@ -58,12 +58,12 @@ class SheetReport:
 
 @dataclass(frozen=True)
 class ProposedLabel:
-    """What a peak without a label may be."""
+    """The label proposed for a peak, and the probability of each label."""
 
     setup: str
     measured_hz: float
-    label: str | None  # in the most probable way to label all peaks; None where it is no mode of the plate
-    # of each label, "none" for no mode, over all ways that were looked at; the highest first
+    label: str | None  # in the most probable labelling of all peaks; None where the peak is no mode of the plate
+    # of each label, "none" for no mode, over all labellings examined; the highest first
     probability: Mapping[str, float]
 
 
@@ -75,10 +75,10 @@ class ModesReport:
     ----------
     name, title : str
     basis : str
-        At which constants they are computed.
+        The constants with which the modes are computed.
     setups : tuple of SheetReport
     proposed : tuple of ProposedLabel
-        One per peak where no label was given at all; the modes are then those of the most probable labels.
+        One per peak if no peak has a label; the modes are then computed with the most probable labels.
     notes : tuple of str
     files : tuple of str
         Sheets that were written.
@@ -93,41 +93,45 @@ class ModesReport:
     files: tuple[str, ...]
 
     def __repr__(self) -> str:
-        told = "; ".join(f"{one.setup}: {len(one.modes)} from {one.modes[0].hz:.4g} Hz" for one in self.setups)
-        return f"<ModesReport of {self.name}: {told}>"
+        sheets = "; ".join(
+            f"{sheet.setup}: {len(sheet.modes)} from {sheet.modes[0].hz:.4g} Hz" for sheet in self.setups
+        )
+        return f"<ModesReport of {self.name}: {sheets}>"
 
 
-def proposed_labels(board: Board, ways: Sequence[tuple[Way, float]]) -> tuple[ProposedLabel, ...]:
-    """What each peak of a board without a label may be, by the ways to label all of them; empty without any."""
+def proposed_labels(board: Board, ways: Sequence[tuple[Labelling, float]]) -> tuple[ProposedLabel, ...]:
+    """The proposed label of each peak of a board, from labellings of all peaks and their probabilities."""
     if not ways:
         return ()
     return tuple(
-        _proposed(setup.name, hertz, [(_label(way, setup.name, hertz), share) for way, share in ways])
+        _proposed_label(
+            setup.name, hertz, [(_peak_label(labelling, setup.name, hertz), share) for labelling, share in ways]
+        )
         for setup in board.setups
         for hertz in sorted(setup.unlabelled)
     )
 
 
-def _proposed(setup: str, hertz: float, found: Sequence[tuple[str | None, float]]) -> ProposedLabel:
+def _proposed_label(setup: str, hertz: float, labels: Sequence[tuple[str | None, float]]) -> ProposedLabel:
     total: dict[str, float] = {}
-    for label, share in found:
+    for label, share in labels:
         total[label or "none"] = total.get(label or "none", 0.0) + share
-    return ProposedLabel(setup, hertz, found[0][0], dict(sorted(total.items(), key=lambda item: -item[1])))
+    return ProposedLabel(setup, hertz, labels[0][0], dict(sorted(total.items(), key=lambda item: -item[1])))
 
 
-def _label(way: Way, setup: str, hertz: float) -> str | None:
-    """Label of a peak in one way to label them; None where it is no mode."""
-    readings = (one for each in way.board.setups if each.name == setup for one in each.readings)
-    return next((str(one.label) for one in readings if one.frequency.mean == hertz), None)
+def _peak_label(labelling: Labelling, setup_name: str, hertz: float) -> str | None:
+    """Label of a peak in a labelling; None where the peak is no mode."""
+    readings = (reading for setup in labelling.board.setups if setup.name == setup_name for reading in setup.readings)
+    return next((str(reading.label) for reading in readings if reading.frequency.mean == hertz), None)
 
 
 def sheet_report(sheet: Sheet) -> SheetReport:
-    mixtures = tuple(MixtureRow(one.name, one.modulus, dict(one.weights)) for one in sheet.combined)
-    rows = tuple(_row(mode) for mode in sheet.modes)
+    mixtures = tuple(MixtureRow(mixture.name, mixture.modulus, dict(mixture.weights)) for mixture in sheet.combined)
+    rows = tuple(_sheet_row(mode) for mode in sheet.modes)
     return SheetReport(sheet.setup, dict(sheet.edges), sheet.theory, rows, mixtures)
 
 
-def _row(mode: SheetMode) -> SheetRow:
+def _sheet_row(mode: SheetMode) -> SheetRow:
     shares = EnergyShares(*(round(100.0 * float(share), 1) for share in mode.shares))
     a, b, c = (float(value) for value in mode.coefficients)
     return SheetRow(mode.name, mode.hertz, mode.measured_hz, mode.miss_cents, mode.band_hz, shares, a, b, c)

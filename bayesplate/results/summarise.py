@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.board.material import MODULI, RIGIDITIES, moduli
-from bayesplate.estimates.identifiability import remarks
+from bayesplate.estimates.identifiability import identifiability_remarks
 from bayesplate.estimates.leave_one_out import carrying_sentence
 from bayesplate.estimates.paper import PaperSystem, paper_system
 from bayesplate.estimates.percentile import percentile_estimate
@@ -22,8 +22,8 @@ from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains
 from bayesplate.results.budget import input_remarks, prior_remarks
-from bayesplate.results.contract import Elastic, Joint, Rigidity, Spread, finite, rms
-from bayesplate.results.modes import assigned_peaks, foretold, mode_rows
+from bayesplate.results.contract import Elastic, JointMoments, Rigidity, Spread, finite_or_none, rms
+from bayesplate.results.modes import assigned_peaks, drop_carrying_modes, mode_rows
 from bayesplate.results.summary import (
     FORMAT,
     ErrorFigures,
@@ -34,7 +34,7 @@ from bayesplate.results.summary import (
     PointEstimate,
     SamplerHealth,
     Summary,
-    Unconverged,
+    UnconvergedSummary,
 )
 
 HIGH_EXACT_ERROR = 0.5
@@ -43,9 +43,9 @@ HIGH_EXACT_ERROR = 0.5
 
 def unconverged_summary(
     problem: PosedProblem, chains: Chains, convergence: Convergence, seed: int, versions: Mapping[str, str], sha256: str
-) -> Unconverged:
-    """The summary of a run that failed the gate."""
-    return Unconverged(
+) -> UnconvergedSummary:
+    """The summary of a run that failed the convergence gate."""
+    return UnconvergedSummary(
         format=FORMAT,
         name=problem.board.name,
         seed=seed,
@@ -67,7 +67,7 @@ def summarise(
     system = paper_system(board, problem.estimate, compared=False)
     rows = mode_rows(problem, draws, assessment)
     peaks, spectra = assigned_peaks(problem, draws)
-    paper, off = system.solve(), assessment.surrogate_errors
+    paper_rigidities, surrogate_errors = system.solve(), assessment.surrogate_errors
     return Summary(
         format=FORMAT,
         name=board.name,
@@ -78,18 +78,20 @@ def summarise(
         converged=True,
         elastic=Elastic(**{name: Spread.of(values, "Pa") for name, values in draws.moduli.items()}),
         rigidity=Rigidity(**{name: Spread.of(values, "N m") for name, values in draws.rigidities.items()}),
-        effects=_effects(problem, draws),
+        effects=_effect_spreads(problem, draws),
         noise={setup.name: Spread.of(draws.noise[..., i], "1") for i, setup in enumerate(board.setups)},
         inputs={
-            one.name: Spread.of(draws.inputs[one.name], one.unit)
-            for one in board.uncertain
-            if one.is_listed and not one.is_of_effect
+            parameter.name: Spread.of(draws.inputs[parameter.name], parameter.unit)
+            for parameter in board.uncertain
+            if parameter.is_listed and not parameter.is_of_effect
         },
         derived={name: Spread.of(item.values, item.unit) for name, item in draws.derived.items()},
-        joint=Joint.of(draws),
-        least_squares=_point(np.stack(system.moduli(paper)), paper, system.condition_number),
-        weighted_least_squares=_weighted(problem),
-        percentile=_percentile(system),
+        joint=JointMoments.of(draws),
+        least_squares=_point_estimate(
+            np.stack(system.moduli(paper_rigidities)), paper_rigidities, system.condition_number
+        ),
+        weighted_least_squares=_weighted_estimate(problem),
+        percentile=_percentile_method(system),
         linear_means=law_means(*assessment.means["linear"]),
         exact_means=law_means(*assessment.means["exact"]),
         modes=rows,
@@ -97,11 +99,13 @@ def summarise(
         spectra=spectra,
         error=ErrorFigures(
             in_sample_rms_cents=float(np.sqrt(np.mean([row.residual_cents**2 for row in rows]))),
-            leave_one_out_rms_cents=rms([one.left_out_cents for one in foretold(rows, assessment.carrying)]),
+            leave_one_out_rms_cents=rms([row.left_out_cents for row in drop_carrying_modes(rows, assessment.carrying)]),
             linearisation_rms_cents=rms(assessment.linear_errors),
             exact_law_worst_cents=assessment.exact_worst,
-            surrogate_rms_cents=rms(off),
-            surrogate_worst_cents=finite(np.nanmax(np.abs(off))) if off.size else None,
+            surrogate_rms_cents=rms(surrogate_errors),
+            surrogate_worst_cents=finite_or_none(np.nanmax(np.abs(surrogate_errors)))
+            if surrogate_errors.size
+            else None,
         ),
         sampler=replace(
             sampler_health(inference.chains, inference.convergence),
@@ -109,13 +113,13 @@ def summarise(
             pareto_k=inference.pareto_k,
         ),
         identifiability=(
-            *remarks(board, problem.identifiability, carrying_sentence(assessment.carrying)),
+            *identifiability_remarks(board, problem.identifiability, carrying_sentence(assessment.carrying)),
             *prior_remarks(draws, problem.prior),
             *input_remarks(draws, board),
             *filter(None, [air_sentence(board, problem.estimate)]),
         ),
-        warnings=tuple(warnings_of(problem, assessment)),
-        doubts=doubts_of(problem, assessment),
+        warnings=tuple(fit_warnings(problem, assessment)),
+        doubts=fit_doubts(problem, assessment),
         carrying_modes=assessment.carrying,
     )
 
@@ -132,61 +136,66 @@ def sampler_health(chains: Chains, convergence: Convergence) -> SamplerHealth:
         ensembles=n_ensembles,
         walkers=n_walkers,
         steps=n_steps,
-        tau_max=finite(convergence.tau_max),
-        rhat_max=finite(convergence.rhat_max),
-        ess_min=finite(convergence.ess_min),
-        acceptance=finite(convergence.acceptance),
+        tau_max=finite_or_none(convergence.tau_max),
+        rhat_max=finite_or_none(convergence.rhat_max),
+        ess_min=finite_or_none(convergence.ess_min),
+        acceptance=finite_or_none(convergence.acceptance),
     )
 
 
-def _effects(problem: PosedProblem, draws: Draws) -> dict[str, dict[str, dict[str, Spread]]]:
+def _effect_spreads(problem: PosedProblem, draws: Draws) -> dict[str, dict[str, dict[str, Spread]]]:
     """Parameters of the declared effects, by board or setup, effect and parameter; exact ones have no spread."""
     result: dict[str, dict[str, dict[str, Spread]]] = {}
 
-    def drawn(name: str) -> Floats:
+    def input_values(name: str) -> Floats:
         return draws.inputs[name] if name in draws.inputs else np.array(problem.board.inputs[name].mean)
 
     for model in problem.posterior.models:
         for effect in model.system.effects:
             owner = result.setdefault(effect.owner.title, {})
             owner[effect.name] = {
-                parameter.key: Spread.of(drawn(parameter.name), parameter.unit) for parameter in effect.parameters()
+                parameter.key: Spread.of(input_values(parameter.name), parameter.unit)
+                for parameter in effect.parameters()
             }
     return result
 
 
 def law_means(means: Mapping[str, float], effective: float) -> LawMeans:
-    """Posterior means under a law; none where the two laws are too far apart for one to stand for the other."""
-    known = effective >= FEWEST_WEIGHTED_DRAWS
-    return LawMeans(**{name: value if known else None for name, value in means.items()}, effective_draws=effective)
+    """Posterior means under a law; None where too few effective draws are left after reweighting to it."""
+    is_reliable = effective >= FEWEST_WEIGHTED_DRAWS
+    return LawMeans(
+        **{name: value if is_reliable else None for name, value in means.items()}, effective_draws=effective
+    )
 
 
-def _weighted(problem: PosedProblem) -> PointEstimate:
+def _weighted_estimate(problem: PosedProblem) -> PointEstimate:
     estimate = problem.estimate
     values = estimate.values
     D_x, D_y, D_s = estimate.rigidities
     elastic = moduli(D_x, D_y, D_s, values["thickness"], values["poisson_xy"])
-    return _point(np.stack(elastic), estimate.rigidities, problem.identifiability.condition_number)
+    return _point_estimate(np.stack(elastic), estimate.rigidities, problem.identifiability.condition_number)
 
 
-def _point(elastic: Floats, constants: Floats, condition_number: float) -> PointEstimate:
-    named = zip((*MODULI, *RIGIDITIES), (*elastic, *constants), strict=True)
-    return PointEstimate(**{name: finite(float(v)) for name, v in named}, condition_number=condition_number)
+def _point_estimate(elastic: Floats, constants: Floats, condition_number: float) -> PointEstimate:
+    entries = zip((*MODULI, *RIGIDITIES), (*elastic, *constants), strict=True)
+    return PointEstimate(**{name: finite_or_none(float(v)) for name, v in entries}, condition_number=condition_number)
 
 
-def _percentile(system: PaperSystem) -> Percentile | None:
-    found = percentile_estimate(system)
-    if found is None:
+def _percentile_method(system: PaperSystem) -> Percentile | None:
+    estimate = percentile_estimate(system)
+    if estimate is None:
         return None
     values = {
-        name: PercentileValue(finite(found.mean[name]), finite(100.0 * found.sd[name] / found.mean[name]))
+        name: PercentileValue(
+            finite_or_none(estimate.mean[name]), finite_or_none(100.0 * estimate.sd[name] / estimate.mean[name])
+        )
         for name in MODULI
     }
-    return Percentile(**values, n_subsets=found.n_subsets)
+    return Percentile(**values, n_subsets=estimate.n_subsets)
 
 
-def warnings_of(problem: PosedProblem, assessment: Assessment) -> list[str]:
-    """What a reader of the summary must know, one sentence each."""
+def fit_warnings(problem: PosedProblem, assessment: Assessment) -> list[str]:
+    """The warnings of a fit, one sentence each."""
     sentences = [*problem.doubts, *problem.board.notes]
     if not problem.estimate.converged:
         sentences.append("the least-squares steps did not settle: two modes near one frequency may swap their labels")
@@ -203,10 +212,10 @@ def warnings_of(problem: PosedProblem, assessment: Assessment) -> list[str]:
     return sentences
 
 
-def doubts_of(problem: PosedProblem, assessment: Assessment) -> tuple[str, ...]:
-    """Those of the warnings that are reasons not to trust the constants.
+def fit_doubts(problem: PosedProblem, assessment: Assessment) -> tuple[str, ...]:
+    """The warnings that are reasons not to trust the constants.
 
-    A label that a veering leaves open is none: the fit counts with both modes.
+    A label left open by a veering is no such reason, for the fit weighs both modes.
     """
-    of_readings = (one for one in problem.doubts if one not in problem.veerings)
+    of_readings = (doubt for doubt in problem.doubts if doubt not in problem.veerings)
     return (*of_readings, *assessment.doubts)

@@ -1,4 +1,4 @@
-"""summary.json as types: everything a reader of a fit needs, in SI units, fields in the order of the file."""
+"""summary.json as types: SI units, fields in the order of the file."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Literal
 
 from bayesplate.estimates.leave_one_out import CarryingMode
-from bayesplate.results.contract import Constants, Elastic, Joint, Rigidity, Spread
+from bayesplate.results.contract import Constants, Elastic, JointMoments, Rigidity, Spread
 from bayesplate.results.modes import AssignedPeak, ModeRow, Spectrum
 from bayesplate.results.tables import constants_table, render
 from bayesplate.results.words import GPA, plus_minus
 
 FORMAT = 1
-TOO_FEW_LEFT = "too few modes to leave one out"
-NONE_JUDGED = "there is no left-out error, for every mode alone carries a constant or a size"
+TOO_FEW_MODES = "too few modes to leave one out"
+ALL_MODES_CARRYING = "there is no left-out error, for every mode alone carries a constant or a size"
 
 
 @dataclass(frozen=True)
 class ModelHeader:
-    """What was fitted: plate theory, frequency law, declared effects, whether the noise is Student's, prior card.
+    """The fitted model: plate theory, frequency law, declared effects, whether the noise is Student's, prior card.
 
-    Of an isotropic board one modulus: E_x and E_y are E in every draw, and G_xy is E / (2 (1 + nu)).
+    An isotropic board has one modulus E: in every draw E_x and E_y are E, and G_xy is E / (2 (1 + nu)).
     """
 
     theory: str
@@ -36,7 +36,7 @@ class ModelHeader:
 
 @dataclass(frozen=True)
 class SamplerHealth:
-    """How the sampler fared; None where a number does not exist, or not yet."""
+    """Convergence diagnostics of the sampler; None where a number does not exist, or not yet."""
 
     ensembles: int
     walkers: int
@@ -45,14 +45,14 @@ class SamplerHealth:
     rhat_max: float | None
     ess_min: float | None
     acceptance: float | None
-    # the law of the model, or a polynomial in its place whose draws are weighted to it
+    # the frequency law of the model, or its polynomial surrogate, whose draws are then weighted to the law
     drawn_from: Literal["law", "surrogate"] = "law"
-    pareto_k: float | None = None  # k-hat of these weights
+    pareto_k: float | None = None  # Pareto k-hat of these weights
 
 
 @dataclass(frozen=True)
 class PointEstimate(Constants[float | None]):
-    """Constants without an uncertainty; None where the estimate is no plate's."""
+    """Constants without an uncertainty; None where the estimate is no possible plate."""
 
     condition_number: float
 
@@ -74,7 +74,7 @@ class Percentile(Elastic[PercentileValue]):
 
 @dataclass(frozen=True)
 class LawMeans(Constants[float | None]):
-    """Posterior means under one frequency law; None where too few draws stand for it."""
+    """Posterior means under one frequency law; None where it has too few effective draws."""
 
     effective_draws: float
 
@@ -84,20 +84,20 @@ class ErrorFigures:
     """Errors of the fit, cents."""
 
     in_sample_rms_cents: float  # of the residuals of `Summary.modes`: readings over posterior mean predictions
-    # of each reading by the most likely constants of the others, those of `Summary.carrying_modes` not counted; None
-    # where too few are left, or none
+    # of each reading by the most likely constants of the others, without the modes of `Summary.carrying_modes`; None
+    # where too few modes are left
     leave_one_out_rms_cents: float | None
     linearisation_rms_cents: float | None  # linear less exact law over the posterior
-    exact_law_worst_cents: float  # exact law against full solves
-    # surrogate_rms_cents, surrogate_worst_cents: surrogate of the exact law less that law over the posterior; None
-    # where the walkers walked on none
+    exact_law_worst_cents: float  # exact law less full solves
+    # surrogate_rms_cents, surrogate_worst_cents: surrogate less exact law over the posterior; None where the walkers
+    # used no surrogate
     surrogate_rms_cents: float | None
     surrogate_worst_cents: float | None
 
 
 @dataclass(frozen=True)
-class Run:
-    """What was run, before any result."""
+class RunHeader:
+    """The header of a summary: board, seed, versions and model of a run."""
 
     format: int
     name: str  # of the board
@@ -108,8 +108,8 @@ class Run:
 
 
 @dataclass(frozen=True)
-class Unconverged(Run):
-    """The summary of a run that failed the convergence gate: its diagnostics, and no constants."""
+class UnconvergedSummary(RunHeader):
+    """The summary of a run that failed the convergence gate: its diagnostics, without constants."""
 
     converged: bool
     sampler: SamplerHealth
@@ -117,7 +117,7 @@ class Unconverged(Run):
 
 
 @dataclass(frozen=True, repr=False)
-class Summary(Run):
+class Summary(RunHeader):
     """The summary of a converged fit: `summary.elastic.E_x.mean` is a number in Pa.
 
     Attributes
@@ -134,28 +134,28 @@ class Summary(Run):
     inputs : dict of Spread
         Uncertain inputs of the card, by name.
     derived : dict of Spread
-        What makers derive from the constants, by name.
-    joint : Joint
-        How the constants and the density vary together.
+        Quantities that makers derive from the constants, by name.
+    joint : JointMoments
+        Joint moments of the logarithms of constants and density.
     least_squares : PointEstimate
-        The paper's.
+        The paper's unweighted least squares.
     weighted_least_squares : PointEstimate
-        That of relative errors.
+        Least squares of relative errors.
     percentile : Percentile or None
         None where there are too few or too many modes, or no estimate is positive.
     linear_means, exact_means : LawMeans
     modes : tuple of ModeRow
     peaks : tuple of AssignedPeak
-        Those whose label is not sure, with the modes that they may be.
+        Peaks whose label is not sure, with the modes that they may be.
     spectra : tuple of Spectrum
-        Of the setups that have such peaks: all modes that they may be.
+        Of the setups with such peaks: all modes that the peaks may be.
     error : ErrorFigures
     sampler : SamplerHealth
     identifiability, warnings : tuple of str
     doubts : tuple of str
-        Those of the warnings that are reasons not to trust the constants.
+        The warnings that are reasons not to trust the constants.
     carrying_modes : tuple of CarryingMode
-        Modes that alone carry a constant or a size: they count in no error of modes left out.
+        Modes that alone carry a constant or a size; no left-out error counts them.
     """
 
     converged: bool
@@ -165,7 +165,7 @@ class Summary(Run):
     noise: Mapping[str, Spread]
     inputs: Mapping[str, Spread]
     derived: Mapping[str, Spread]
-    joint: Joint
+    joint: JointMoments
     least_squares: PointEstimate
     weighted_least_squares: PointEstimate
     percentile: Percentile | None
@@ -183,16 +183,16 @@ class Summary(Run):
 
     @property
     def why_no_left_out(self) -> str:
-        """Why there is no error of modes left out, where there is none."""
-        are_left_out = any(one.left_out_cents is not None for one in self.modes)
-        return NONE_JUDGED if are_left_out else TOO_FEW_LEFT
+        """Why there is no left-out error, if there is none."""
+        are_left_out = any(mode.left_out_cents is not None for mode in self.modes)
+        return ALL_MODES_CARRYING if are_left_out else TOO_FEW_MODES
 
     def __repr__(self) -> str:
         constants = ", ".join(f"{name} = {plus_minus(entry, GPA)} GPa" for name, entry in self.elastic.items())
         return f"<Summary of {self.name}: {constants}; {len(self.modes)} modes, {self.model.law} law>"
 
     def _repr_html_(self) -> str:
-        """The constants as a notebook shows them."""
+        """The constants as an HTML table for notebooks."""
         table = constants_table(f"{self.name}, GPa", self.elastic, isotropic=self.model.isotropic)
         return render(table, "html")
 
@@ -201,11 +201,11 @@ PACKAGES = ("bayesplate", "numpy", "scipy", "emcee", "scikit-fem")
 
 
 def versions() -> dict[str, str]:
-    """Version of Python and of every package that has a part in the numbers."""
-    found = {"python": platform.python_version()}
+    """Versions of Python and of the packages on which the numbers depend."""
+    installed = {"python": platform.python_version()}
     for package in PACKAGES:
         try:
-            found[package] = version(package)
+            installed[package] = version(package)
         except PackageNotFoundError:
-            found[package] = "unknown"
-    return found
+            installed[package] = "unknown"
+    return installed

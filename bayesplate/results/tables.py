@@ -1,4 +1,4 @@
-"""A table of values, and each medium that shows it: terminal, page and notebook, CSV, LaTeX."""
+"""A table of values, rendered for terminal, page and notebook, CSV and LaTeX."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from bayesplate.results.layout import laid_out
-from bayesplate.results.words import CONSTANTS, GPA, MISSING, Interval, Value, interval, narrow_name, plus_minus
+from bayesplate.results.layout import lay_out_table
+from bayesplate.results.words import GPA, MISSING, MODULUS_WORDS, Interval, Value, interval, narrow_name, plus_minus
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -26,23 +26,25 @@ class Table:
     title: str
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
-    keys: tuple[str, ...] = ()  # what programs call the columns, where that differs
+    keys: tuple[str, ...] = ()  # names of the columns for programs, where they differ
 
     @property
     def texts(self) -> tuple[tuple[str, ...], ...]:
-        """The rows as people read them."""
-        return tuple(tuple(map(_text, row)) for row in self.rows)
+        """The rows as texts for people."""
+        return tuple(tuple(map(_cell_text, row)) for row in self.rows)
 
 
-def by_constant(
+def table_by_constant(
     title: str,
     columns: Mapping[str, Callable[[str], Cell]],
     *,
     isotropic: bool = False,
-    names: Iterable[str] = CONSTANTS,
+    names: Iterable[str] = MODULUS_WORDS,
 ) -> Table:
-    """A row for each modulus among the names; a column is its heading and what it holds of a modulus."""
-    rows = ((narrow_name(name, isotropic=isotropic), *(held(name) for held in columns.values())) for name in names)
+    """A table with a row for each modulus; a column is its heading and a function from the modulus to its cell."""
+    rows = (
+        (narrow_name(name, isotropic=isotropic), *(make_cell(name) for make_cell in columns.values())) for name in names
+    )
     return Table(title, ("constant", *columns), tuple(rows))
 
 
@@ -53,44 +55,44 @@ def constants_table(
     *,
     isotropic: bool = False,
 ) -> Table:
-    """Moduli in GPa: mean ± sd, 90 % interval, and further columns as of `by_constant`."""
-    shown: dict[str, Callable[[str], Cell]] = {
+    """Moduli in GPa: mean ± sd, 90 % interval, and further columns as of `table_by_constant`."""
+    columns: dict[str, Callable[[str], Cell]] = {
         "mean ± sd": lambda name: plus_minus(moduli[name], GPA),
         "90 % interval": lambda name: interval(moduli[name], GPA),
     }
-    return by_constant(title, shown | dict(more or {}), isotropic=isotropic)
+    return table_by_constant(title, columns | dict(more or {}), isotropic=isotropic)
 
 
 def render(shown: Table | str, medium: Medium, *, width: int = 80, styled: bool = False, kind: str = "") -> str:
-    """A table, or a sentence, as a medium shows it; every text in it is escaped.
+    """A table, or a sentence, rendered for a medium; every text in it is escaped.
 
-    Programs read CSV at full precision: a number with its uncertainty has two columns, and so has an interval. `kind`
-    are classes of a table of HTML, `styled` terminals know bold letters.
+    CSV has full precision: a number with its uncertainty has two columns, and so has an interval. `kind` holds classes
+    of an HTML table; `styled` terminals show bold letters.
     """
     if medium == "terminal":
-        return _printed(shown, width, styled=styled)
+        return _terminal_text(shown, width, styled=styled)
     if isinstance(shown, str):
         return f"<p>{escape(shown, medium)}</p>" if medium == "html" else escape(shown, medium)
     if medium == "html":
-        return str(_html(shown, kind))
-    return csv_text(*_columns_of_numbers(shown)) if medium == "csv" else _latex(shown)
+        return str(_html_table(shown, kind))
+    return csv_text(*_csv_columns(shown)) if medium == "csv" else _latex_table(shown)
 
 
-def notebook(heading: str, sentences: Iterable[str], tables: Iterable[Table]) -> str:
-    """A result as a notebook shows it: a heading, sentences and tables in HTML."""
-    told, shown = ([render(one, "html") for one in some] for some in (sentences, tables))
-    return "\n".join([f"<h3>{escape(heading, 'html')}</h3>", *told, *shown])
+def notebook_html(heading: str, sentences: Iterable[str], tables: Iterable[Table]) -> str:
+    """A result as HTML for notebooks: a heading, sentences and tables."""
+    paragraphs, table_texts = ([render(item, "html") for item in items] for items in (sentences, tables))
+    return "\n".join([f"<h3>{escape(heading, 'html')}</h3>", *paragraphs, *table_texts])
 
 
 _SYMBOL = r"\b(?P<letter>E|G|D|L|nu)_(?P<index>xy|xz|yz|x|y|s)\b"
 SYMBOL = re.compile(_SYMBOL)
-"""A symbol of ours: every medium that can sets its index lower."""
+"""A symbol of the package, whose index is set lower where a medium can."""
 GREEK = {"nu": ("ν", r"\nu")}
 _POWER = re.compile(r"(?<=[a-z])\^(-?\d)")
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_TOGETHER = re.compile(r"(?<=[\d±]) (?=[±%])|(?<=±) (?=\d)")
-_STARTS_A_FORMULA = ("=", "+", "-", "@")
-_IN_LATEX = {
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_UNBREAKABLE_SPACE = re.compile(r"(?<=[\d±]) (?=[±%])|(?<=±) (?=\d)")
+_FORMULA_STARTS = ("=", "+", "-", "@")
+_LATEX_ESCAPES = {
     "\\": r"\textbackslash{}",
     "{": r"\{",
     "}": r"\}",
@@ -109,63 +111,66 @@ _IN_LATEX = {
     "–": "--",
     "\N{NARROW NO-BREAK SPACE}": r"\,",
 }
-_OF_LATEX = re.compile(
-    "|".join([_SYMBOL, r"(?P<signed>(?<![\w.])[+-]\d[\d.]*)", r"(?<=\d) %", *map(re.escape, _IN_LATEX)])
+_LATEX_PATTERN = re.compile(
+    "|".join([_SYMBOL, r"(?P<signed>(?<![\w.])[+-]\d[\d.]*)", r"(?<=\d) %", *map(re.escape, _LATEX_ESCAPES)])
 )
 JOINERS = "\u200c\u200d"
-"""Format characters that shape letters and join emoji; they steer nothing."""
+"""Zero-width characters that shape letters and join emoji; they are kept."""
 
 
-def visible(text: str) -> str:
-    """A text without what steers the way it runs: control characters and direction marks are removed."""
+def strip_control_characters(text: str) -> str:
+    """A text without control characters and direction marks."""
     if text.isprintable():
         return text
-    kept = (character if character not in "\t\n\r" else " " for character in text)
-    return "".join(c for c in kept if unicodedata.category(c) not in {"Cc", "Cf", "Cs", "Co", "Cn"} or c in JOINERS)
+    characters = (character if character not in "\t\n\r" else " " for character in text)
+    return "".join(
+        c for c in characters if unicodedata.category(c) not in {"Cc", "Cf", "Cs", "Co", "Cn"} or c in JOINERS
+    )
 
 
 def escape(text: str, medium: Medium) -> str:
-    """A text, whatever stands in it, as a medium shows it: what steers is removed, and nothing is taken for a command.
+    """Any text, made safe for a medium: control characters are removed, and nothing is read as markup or a command.
 
-    A terminal keeps the ends of lines. A page sets our symbols with lowered indices and units with raised powers, LaTeX
-    the symbols and signed numbers as mathematics. A spreadsheet does not take it for a formula.
+    A terminal keeps the line ends. HTML sets symbols of the package with lowered indices and units with raised powers,
+    LaTeX sets symbols and signed numbers as mathematics, and a spreadsheet does not read a CSV cell as a formula.
     """
     if medium == "terminal":
-        return "\n".join(map(visible, text.split("\n")))
-    text = visible(text)
+        return "\n".join(map(strip_control_characters, text.split("\n")))
+    text = strip_control_characters(text)
     if medium == "html":
         return _escaped_html(text)
     text = " ".join(text.split())
     if medium == "csv":
-        return f"'{text}" if text.startswith(_STARTS_A_FORMULA) else text
-    return _OF_LATEX.sub(_latex_of, text)
+        return f"'{text}" if text.startswith(_FORMULA_STARTS) else text
+    return _LATEX_PATTERN.sub(_latex_escape, text)
 
 
 def _escaped_html(text: str) -> Markup:
     from markupsafe import Markup
     from markupsafe import escape as escaped
 
-    together = _TOGETHER.sub("\N{NO-BREAK SPACE}", str(escaped(text)))
+    unbroken = _UNBREAKABLE_SPACE.sub("\N{NO-BREAK SPACE}", str(escaped(text)))
     lowered = SYMBOL.sub(
-        lambda found: f"<i>{GREEK.get(found['letter'], found['letter'])[0]}</i><sub>{found['index']}</sub>", together
+        lambda match: f"<i>{GREEK.get(match['letter'], match['letter'])[0]}</i><sub>{match['index']}</sub>",
+        unbroken,
     )
-    raised = _POWER.sub(lambda found: found[1].translate(_RAISED), lowered)
-    return Markup(raised)  # what was escaped, and tags of our own
+    raised = _POWER.sub(lambda match: match[1].translate(_SUPERSCRIPTS), lowered)
+    return Markup(raised)  # escaped text, and tags added here
 
 
-def _latex_of(found: re.Match[str]) -> str:
-    if found["letter"]:
-        return f"${GREEK.get(found['letter'], ('', found['letter']))[1]}_{{{found['index']}}}$"
-    return f"${found[0]}$" if found["signed"] else _IN_LATEX.get(found[0], r"\,\%")
+def _latex_escape(match: re.Match[str]) -> str:
+    if match["letter"]:
+        return f"${GREEK.get(match['letter'], ('', match['letter']))[1]}_{{{match['index']}}}$"
+    return f"${match[0]}$" if match["signed"] else _LATEX_ESCAPES.get(match[0], r"\,\%")
 
 
-def _text(cell: Cell) -> str:
+def _cell_text(cell: Cell) -> str:
     if cell is None:
         return MISSING
     return f"{cell:.6g}" if isinstance(cell, float) else str(cell)
 
 
-def _printed(shown: Table | str, width: int, *, styled: bool) -> str:
+def _terminal_text(content: Table | str, width: int, *, styled: bool) -> str:
     from io import StringIO
 
     from rich.console import Console
@@ -173,17 +178,19 @@ def _printed(shown: Table | str, width: int, *, styled: bool) -> str:
 
     stream = StringIO()
     console = Console(file=stream, width=width, force_terminal=styled, soft_wrap=False, highlight=False)
-    if isinstance(shown, str):
-        console.print(Text(escape(shown, "terminal")))
+    if isinstance(content, str):
+        console.print(Text(escape(content, "terminal")))
     else:
-        title, *texts = (escape(text, "terminal") for text in (shown.title, *shown.columns, *sum(shown.texts, ())))
-        n = len(shown.columns)
+        title, *texts = (
+            escape(text, "terminal") for text in (content.title, *content.columns, *sum(content.texts, ()))
+        )
+        n = len(content.columns)
         columns, *rows = (texts[i : i + n] for i in range(0, len(texts), n))
-        console.print(laid_out(title, columns, rows, width))
+        console.print(lay_out_table(title, columns, rows, width))
     return stream.getvalue()
 
 
-def _html(table: Table, kind: str) -> Markup:
+def _html_table(table: Table, kind: str) -> Markup:
     from markupsafe import Markup
 
     def html(text: str) -> Markup:
@@ -191,11 +198,13 @@ def _html(table: Table, kind: str) -> Markup:
 
     heads = [html(column) for column in table.columns]
     rows = []
-    for first, *others in table.texts:
-        cells = zip(heads[1:], others, strict=True)
-        named = (Markup('<td data-name="{}"><bdi>{}</bdi></td>').format(h.striptags(), html(text)) for h, text in cells)
+    for first, *texts in table.texts:
+        cells = zip(heads[1:], texts, strict=True)
+        data_cells = (
+            Markup('<td data-name="{}"><bdi>{}</bdi></td>').format(h.striptags(), html(text)) for h, text in cells
+        )
         row = Markup('<tr><th scope="row"><bdi>{}</bdi></th>{}</tr>')
-        rows.append(row.format(html(first), Markup("").join(named)))
+        rows.append(row.format(html(first), Markup("").join(data_cells)))
     return Markup(
         '\n<div class="table"><table{}>\n<caption>{}</caption>\n<thead><tr>{}</tr></thead>\n'
         "<tbody>\n{}\n</tbody></table></div>"
@@ -207,26 +216,26 @@ def _html(table: Table, kind: str) -> Markup:
     )
 
 
-def _columns_of_numbers(table: Table) -> tuple[list[str], list[list[Cell]]]:
-    """Names and cells of plain numbers and texts: what has an uncertainty or is an interval takes two columns."""
+def _csv_columns(table: Table) -> tuple[list[str], list[list[Cell]]]:
+    """Names and cells of plain numbers and texts: a number with uncertainty, or an interval, takes two columns."""
     names: list[str] = []
     columns: list[Sequence[Cell]] = []
     for name, cells in zip(table.keys or table.columns, zip(*table.rows, strict=True), strict=True):
-        values = [one if isinstance(one, Value) else None for one in cells]
-        if any(one is not None and one.ends for one in values):
+        values = [cell if isinstance(cell, Value) else None for cell in cells]
+        if any(value is not None and value.ends for value in values):
             names += [f"{name}_q05", f"{name}_q95"]
-            columns += zip(*(one.ends if one and one.ends else (None, None) for one in values), strict=True)
+            columns += zip(*(value.ends if value and value.ends else (None, None) for value in values), strict=True)
             continue
         names.append(name)
-        columns.append([one.mean if isinstance(one, Value) else one for one in cells])
-        if any(one is not None and one.sd is not None for one in values):
+        columns.append([cell.mean if isinstance(cell, Value) else cell for cell in cells])
+        if any(value is not None and value.sd is not None for value in values):
             names.append(f"{name}_sd")
-            columns.append([one and one.sd for one in values])
+            columns.append([value and value.sd for value in values])
     return names, [list(row) for row in zip(*columns, strict=True)]
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """CSV with full precision of plain numbers and texts; without a header its line is left out."""
+    """CSV of plain numbers, at full precision, and texts; an empty header is left out."""
     from pandas import DataFrame
 
     def safe(cells: Sequence[Any]) -> list[Any]:
@@ -236,8 +245,8 @@ def csv_text(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
     return frame.to_csv(index=False, header=bool(header), lineterminator="\n")
 
 
-def _latex(table: Table) -> str:
-    """A tabular under its title as a comment; it needs no package."""
+def _latex_table(table: Table) -> str:
+    """A LaTeX tabular, its title as a comment above it; it needs no package."""
     from pandas import DataFrame
 
     cells = [[escape(text, "latex") for text in row] for row in table.texts]

@@ -80,8 +80,8 @@ def test_the_name_must_be_that_of_the_file(path):
 
 
 def test_neither_shelf_is_there(tmp_path, monkeypatch):
-    monkeypatch.setattr("bayesplate.board.shelf._INSTALLED", tmp_path / "one")
-    monkeypatch.setattr("bayesplate.board.shelf._CHECKOUT", tmp_path / "two")
+    monkeypatch.setattr("bayesplate.board.shelf._INSTALLED_SHELF", tmp_path / "one")
+    monkeypatch.setattr("bayesplate.board.shelf._CHECKOUT_SHELF", tmp_path / "two")
     with refused(f"neither {tmp_path / 'one' / 'boards'} nor {tmp_path / 'two' / 'boards'}"):
         card_names("boards")
 

@@ -17,11 +17,11 @@ from made_campaigns import TWO_BOARDS as CAMPAIGN
 from bayesplate.board.board import Board
 from bayesplate.board.campaign import load_campaign
 from bayesplate.board.checks import physical_faults
-from bayesplate.board.fragment import merged
+from bayesplate.board.fragment import merge_fragment
 from bayesplate.board.shelf import CardFile, shelf_folder
-from bayesplate.board.toml import read_table
+from bayesplate.board.toml import parse_toml
 from bayesplate.board.writing import toml_text
-from bayesplate.commands.batch_boards import boards_of
+from bayesplate.commands.batch_boards import list_boards
 from bayesplate.errors import Fault, InputError
 
 BOARD = "finnish-spruce-cantilever"
@@ -70,7 +70,7 @@ CARD_KEYS = [
 ]
 KEYS = st.one_of(st.text(max_size=8), st.sampled_from(CARD_KEYS))
 TREES = st.recursive(LEAVES, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(KEYS, inner, max_size=4))
-SOUND: dict[str, Any] = read_table(CARD.encode(), "board.toml")
+SOUND: dict[str, Any] = parse_toml(CARD.encode(), "board.toml")
 BENCH: dict[str, Path] = {}
 
 
@@ -146,13 +146,13 @@ def reading(name: str, read: Callable[[Path], Any]) -> Callable[..., None]:
 
 def each_of(table: Path, template: Path | None) -> list[Any]:
     """The boards of a table or of a folder: a fault of one is that one's alone."""
-    boards, _ = boards_of(table, template)
+    boards, _ = list_boards(table, template)
     return [accepted_or_refused(board.card) for board in boards]
 
 
 def written_and_read(tree: dict[str, Any]) -> None:
     """What is written as TOML is read again as it was."""
-    found = read_table(toml_text({"tree": tree}).encode("utf-8"), "a.toml")
+    found = parse_toml(toml_text({"tree": tree}).encode("utf-8"), "a.toml")
     assert in_order(found) == in_order({"tree": tree})
 
 
@@ -189,10 +189,10 @@ test_toml, test_toml_at_length = fuzzed(written_and_read, 80, tree=NAMED)
 
 def test_what_is_spoilt_here_was_sound():
     """The negative control."""
-    whole, _ = merged(SOUND, "board.toml", written("fragment.toml", FRAGMENT))
+    whole, _ = merge_fragment(SOUND, "board.toml", written("fragment.toml", FRAGMENT))
     assert len(Board.from_text(toml_text(whole), BOARD).setups[0].readings) == 1
     assert load_campaign(written("my-campaign.toml", CAMPAIGN)).name == "my-campaign"
-    boards, _ = boards_of(written("boards.csv", ROWS), BENCH["folder"] / "template.toml")
+    boards, _ = list_boards(written("boards.csv", ROWS), BENCH["folder"] / "template.toml")
     assert [board.card().name for board in boards] == ["a", "b"]
 
 
@@ -208,7 +208,7 @@ def test_a_huge_number_is_a_fault_of_its_key_and_stops_no_batch(tmp_path):
     found = each_of(tmp_path, None)
     assert [isinstance(one, InputError) for one in found] == [False, True, True]
 
-    huge = CardFile(read_table((tmp_path / "b.toml").read_bytes(), "b.toml"), "b.toml")
+    huge = CardFile(parse_toml((tmp_path / "b.toml").read_bytes(), "b.toml"), "b.toml")
     (tmp_path / "fragment.toml").write_text(FRAGMENT)
     (tmp_path / "template.toml").write_text(TEMPLATE.replace("length_x_mm = 253", f"length_x_mm = {HUGE}"))
     (tmp_path / "boards.csv").write_text(ROWS)
@@ -222,4 +222,4 @@ def test_a_table_that_is_a_fifo_is_refused_without_waiting(tmp_path):
     os.mkfifo(tmp_path / "boards.csv")
 
     with stopped_if_it_hangs(1.0), pytest.raises(InputError, match=r"boards\.csv: wanted a regular file"):
-        boards_of(tmp_path / "boards.csv", tmp_path / "template.toml")
+        list_boards(tmp_path / "boards.csv", tmp_path / "template.toml")

@@ -10,7 +10,7 @@ from stated import changed, read
 import bayesplate
 from bayesplate.board.board import Board
 from bayesplate.board.campaign import is_campaign, load_campaign
-from bayesplate.board.named import load_named
+from bayesplate.board.named import load_named_cards
 from bayesplate.board.shelf import shelf_folder
 from bayesplate.board.words import EFFECT_NAMES
 from bayesplate.campaign.population import require_moduli
@@ -26,8 +26,8 @@ EFFECTS = 'effects = ["transverse_shear"]'
 
 def test_cards_that_are_not_there_are_named_at_once():
     own_table = changed(RESOLUTION, RESOLUTION + 'published_coefficients = "paper"\n')
-    table_alone = load_named(read(own_table))
-    both = load_named(read(changed("poisson_xy = 0.51", 'prior = "spruse"', text=own_table)))
+    table_alone = load_named_cards(read(own_table))
+    both = load_named_cards(read(changed("poisson_xy = 0.51", 'prior = "spruse"', text=own_table)))
     places = [
         'my-board.toml [material] prior -> "spruse"',
         'my-board.toml [setup] published_coefficients -> "paper"',
@@ -44,13 +44,13 @@ def test_cards_are_found_beside_the_board(tmp_path):
     text = changed("poisson_xy = 0.51", 'prior = "./mine.toml"')
     text = changed(RESOLUTION, RESOLUTION + 'published_coefficients = "sub/own.toml"\n', text=text)
     (tmp_path / "my-board.toml").write_text(text, encoding="utf-8")
-    missing = load_named(Board.from_toml(tmp_path / "my-board.toml"))
+    missing = load_named_cards(Board.from_toml(tmp_path / "my-board.toml"))
     (tmp_path / "sub").mkdir()
     shipped = (("priors", "spruce", "mine.toml", "mine"), ("coefficients", "paper-cantilever", "sub/own.toml", "own"))
     for kind, name, target, own in shipped:
         text = (shelf_folder(kind) / f"{name}.toml").read_text(encoding="utf-8")
         (tmp_path / target).write_text(text.replace(f'name = "{name}"', f'name = "{own}"'), encoding="utf-8")
-    found = load_named(Board.from_toml(tmp_path / "my-board.toml"))
+    found = load_named_cards(Board.from_toml(tmp_path / "my-board.toml"))
 
     assert [fault.got for fault in missing.faults] == ["no such file", "no such file"]
     assert found.faults == ()

@@ -12,10 +12,10 @@ import ritz
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.random_field import (
     LENGTH_SCALE,
-    THICKNESS,
+    THICKNESS_SCALES,
     PlacedReadings,
     Surface,
-    conditioned,
+    condition_field,
     thickness_readings,
     width_readings,
 )
@@ -26,7 +26,7 @@ MIDDLE = (np.arange(60) + 0.5) / 60
 
 
 def read(values, x=AT_X, y=AT_Y, resolution=0.0, place_sd=(0.0, 0.0)):
-    return PlacedReadings(tuple(map(float, values)), tuple(x), tuple(y), resolution, place_sd, THICKNESS)
+    return PlacedReadings(tuple(map(float, values)), tuple(x), tuple(y), resolution, place_sd, THICKNESS_SCALES)
 
 
 def course(found):
@@ -38,7 +38,7 @@ def curved(x, y):
 
 
 def test_many_exact_readings_are_the_field():
-    found = conditioned(read(4.7 * curved(*GRID), *GRID))
+    found = condition_field(read(4.7 * curved(*GRID), *GRID))
     there = found.mean * (1.0 + course(found)(MIDDLE[:, None], MIDDLE))
     assert there == pytest.approx(4.7 * curved(MIDDLE[:, None], MIDDLE), rel=2e-3)
     assert found.mean == pytest.approx(4.7, rel=1e-3)
@@ -46,7 +46,7 @@ def test_many_exact_readings_are_the_field():
 
 
 def test_no_course_has_a_mean_over_the_board():
-    found = conditioned(read([4.7, 4.5, 4.8, 4.8, 4.6, 4.5, 4.5, 4.9, 4.9, 4.7], resolution=0.1))
+    found = condition_field(read([4.7, 4.5, 4.8, 4.8, 4.6, 4.5, 4.5, 4.9, 4.9, 4.7], resolution=0.1))
     points, weights = np.polynomial.legendre.leggauss(12)
     at, weights = 0.5 * (points + 1.0), 0.5 * weights
     values = course(found)(at[:, None], at)
@@ -62,9 +62,9 @@ def test_conditioning_is_that_of_a_gaussian_process():
     rng = np.random.default_rng(1)
     readings = 1.0 + 0.02 * rng.standard_normal(10)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "_STEPS_AMPLITUDE", np.array([amplitude]))
-        patch.setattr(module, "_STEPS_SCATTER", np.array([scatter]))
-        found = conditioned.__wrapped__(read(readings))
+        patch.setattr(module, "_AMPLITUDES", np.array([amplitude]))
+        patch.setattr(module, "_SCATTERS", np.array([scatter]))
+        found = condition_field.__wrapped__(read(readings))
     # The covariances of the smooth functions at the places and at the middle of the board, the mean taken out.
     places = (np.append(AT_X, 0.5), np.append(AT_Y, 0.5))
     fine = (np.arange(400) + 0.5) / 400
@@ -87,9 +87,9 @@ def test_conditioning_is_that_of_a_gaussian_process():
 def test_what_rounding_explains_shrinks_to_a_uniform_board():
     """Readings that differ by a quarter of the step to which they are rounded, and the same without rounding."""
     values = [4.7, 4.7, 4.75, 4.75, 4.8] * 2
-    coarse, fine = (conditioned(read(values, resolution=r)) for r in (0.4, 0.001))
+    coarse, fine = (condition_field(read(values, resolution=r)) for r in (0.4, 0.001))
     assert course(coarse).size < 0.3 * course(fine).size
-    alike = conditioned(read([4.7] * 10, resolution=1e-3))
+    alike = condition_field(read([4.7] * 10, resolution=1e-3))
     assert course(alike).size < 1e-6
     assert np.sqrt(np.trace(alike.covariance)) < 5e-4
 
@@ -98,7 +98,7 @@ def test_each_reading_is_rounded_on_its_own():
     """Forty readings of a board that hardly varies: the rounding error of their mean is that of forty, not of one."""
     rng = np.random.default_rng(3)
     x, y = rng.uniform(size=(2, 40))
-    found = conditioned(read(np.round(4.7 + 0.02 * rng.standard_normal(40), 1), x, y, resolution=0.1))
+    found = condition_field(read(np.round(4.7 + 0.02 * rng.standard_normal(40), 1), x, y, resolution=0.1))
     assert 0.1 / np.sqrt(12 * 40) < found.sd < 2.5 * 0.1 / np.sqrt(12 * 40)
     assert found.sd < 0.1 / np.sqrt(12) / 2
 
@@ -108,7 +108,7 @@ def test_doubtful_places_leave_more_open_where_the_field_is_steep():
     level = np.full(readings.size, 4.7)
     for values, factor in ((readings, 2.0), (level, 1.0)):
         exact, doubtful = (
-            np.trace(conditioned(read(values, *GRID, resolution=0.01, place_sd=sd)).covariance) ** 0.5
+            np.trace(condition_field(read(values, *GRID, resolution=0.01, place_sd=sd)).covariance) ** 0.5
             for sd in ((0.0, 0.0), (0.05, 0.05))
         )
         assert doubtful > factor * exact if factor > 1.0 else doubtful == pytest.approx(exact, rel=1e-3)
@@ -117,8 +117,8 @@ def test_doubtful_places_leave_more_open_where_the_field_is_steep():
 def test_a_place_error_counts_by_the_slope():
     """A taper of 20 % along x read at places with an error of 2 % of the side: 0.4 % more scatter."""
     readings = 4.7 * (1.0 + 0.2 * (GRID[0] - 0.5))
-    moved = conditioned(read(readings, *GRID, place_sd=(0.02, 0.5)))
-    rounded = conditioned(read(readings, *GRID, resolution=4.7 * 0.2 * 0.02 * np.sqrt(12.0)))
+    moved = condition_field(read(readings, *GRID, place_sd=(0.02, 0.5)))
+    rounded = condition_field(read(readings, *GRID, resolution=4.7 * 0.2 * 0.02 * np.sqrt(12.0)))
     assert moved.sd == pytest.approx(rounded.sd, rel=0.1)
 
 

@@ -10,32 +10,32 @@ from hypothesis import strategies as st
 from stated import changed, frequencies, read
 
 from bayesplate.board.repeated import (
-    FURTHEST_FREQUENCIES,
-    FURTHEST_SIZES,
+    LARGEST_FREQUENCY_RATIO,
+    LARGEST_SIZE_RATIO,
     comma_complaint,
     peak_comma_complaint,
-    spread,
+    spread_ratio,
 )
 
-FURTHEST = st.sampled_from([FURTHEST_SIZES, FURTHEST_FREQUENCIES])
+FURTHEST = st.sampled_from([LARGEST_SIZE_RATIO, LARGEST_FREQUENCY_RATIO])
 
 
 @given(FURTHEST, st.integers(3, 3000), st.lists(st.tuples(st.floats(0, 1), st.integers(1, 3)), min_size=1, max_size=8))
-@example(FURTHEST_SIZES, 28, [(0.0, 1), (1.0, 1)])
+@example(LARGEST_SIZE_RATIO, 28, [(0.0, 1), (1.0, 1)])
 def test_whatever_was_written_with_commas_is_refused(furthest, tenths, shares):
     """Decimals within a tenth of one another: refused, unless the whole numbers could be the readings themselves."""
     texts = [f"{tenths / 10 * (1 + 0.09 * share):.{digits}f}" for share, digits in shares]
     items = [int(part) for text in texts for part in text.split(".")]
     assume(not any(part.startswith("0") and part != "0" for text in texts for part in text.split(".")))
     decimals = [float(f"{w}.{d}") for w, d in zip(items[::2], items[1::2], strict=True)]
-    assume(spread(decimals) <= 1.1)
+    assume(spread_ratio(decimals) <= 1.1)
 
-    assert (comma_complaint(items, furthest) is None) == (spread(items) <= 1.5)
+    assert (comma_complaint(items, furthest) is None) == (spread_ratio(items) <= 1.5)
 
 
 @given(FURTHEST, st.integers(1, 3000), st.lists(st.floats(0, 1), min_size=1, max_size=12))
-@example(FURTHEST_SIZES, 2, [0.0, 1.0])
-@example(FURTHEST_SIZES, 250, [0.0, 0.01])
+@example(LARGEST_SIZE_RATIO, 2, [0.0, 1.0])
+@example(LARGEST_SIZE_RATIO, 250, [0.0, 0.01])
 def test_whole_numbers_that_agree_are_never_refused(furthest, smallest, shares):
     assert comma_complaint([math.floor(smallest * (1 + 0.5 * share)) for share in shares], furthest) is None
 

@@ -9,8 +9,8 @@ import pytest
 from stated import frequencies
 
 from bayesplate.board.checks import readings_sha256
-from bayesplate.board.csv_table import csv_table
-from bayesplate.board.rows import Columns
+from bayesplate.board.csv_table import read_csv_table
+from bayesplate.board.rows import TableColumns
 from bayesplate.errors import InputError
 
 FREE = 'edges = { x0 = "free", x1 = "free", y0 = "free", y1 = "free" }'
@@ -30,10 +30,10 @@ TWICE = CARD.replace("[setup]", '[[setup]]\nname = "one"') + f'[[setup]]\nname =
 READ = CARD + 'unlabelled_hz = [300]\n[setup.frequencies_hz]\n"(1, 1)" = 51.8\n"(3,0)" = 202\n"(1,2)" = 174\n'
 
 
-def columns(tmp_path: Path, header: str, card: str = CARD) -> Columns:
+def columns(tmp_path: Path, header: str, card: str = CARD) -> TableColumns:
     """The columns of a header beside a template."""
     (tmp_path / "template.toml").write_text(card)
-    return Columns(tmp_path / "template.toml", csv_table(header.encode(), "t.csv")[0], "t.csv")
+    return TableColumns(tmp_path / "template.toml", read_csv_table(header.encode(), "t.csv")[0], "t.csv")
 
 
 HEADERS = [

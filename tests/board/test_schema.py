@@ -11,7 +11,7 @@ from made_campaigns import TWO_BOARDS
 from stated import CARD, PRIOR, assert_said, changed, read, told
 
 from bayesplate.board.campaign import load_campaign
-from bayesplate.board.checks import remarks
+from bayesplate.board.checks import board_remarks
 from bayesplate.board.coefficients import load_coefficients
 from bayesplate.board.prior import load_prior
 from bayesplate.commands.prepare import prepare
@@ -479,7 +479,7 @@ REMARKS = [
 
 def test_what_a_card_leaves_to_be_assumed_or_to_be_doubted_is_remarked_on_once(tmp_path):
     for old, new, effects, passages in REMARKS:
-        found = remarks(read(changed(old, new)), effects)
+        found = board_remarks(read(changed(old, new)), effects)
         assert len(found) == bool(passages), (new, found)
         assert all(passage in found[0] for passage in passages), (new, found)
     path = tmp_path / "my-board.toml"

@@ -9,7 +9,7 @@ from stated import frequencies, millimetres, read
 
 from bayesplate.board.board import Board
 from bayesplate.board.campaign import load_campaign
-from bayesplate.board.checks import board_mass, physical_faults
+from bayesplate.board.checks import nominal_mass, physical_faults
 from bayesplate.board.coefficients import load_coefficients
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
@@ -123,7 +123,7 @@ def test_the_free_boards():
         (setup,) = card.setups
         thickness = card.inputs["thickness"]
 
-        assert 1e3 * board_mass(card) == pytest.approx(mass)
+        assert 1e3 * nominal_mass(card) == pytest.approx(mass)
         assert (len(setup.readings), len(setup.peaks)) == (labelled, unlabelled)
         assert {reading.confidence for reading in setup.readings} == {confidence}
         assert (setup.bounce.mean - setup.bounce.sd, setup.bounce.mean + setup.bounce.sd) == rigid

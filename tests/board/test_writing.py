@@ -11,7 +11,7 @@ import pytest
 from stated import PRIOR, assert_said
 
 from bayesplate import AttachedItem, Board, DeclaredFluid, InputError, Peak, PriorCard, Quantity, Setup
-from bayesplate.board.named import load_named
+from bayesplate.board.named import load_named_cards
 from bayesplate.board.prior import load_prior
 from bayesplate.board.shelf import card_names
 from bayesplate.commands.prepare import prepare
@@ -162,7 +162,7 @@ def whole():
 def again(board, text=None):
     """The board of a card, or of the card that another board is written as."""
     found = Board.from_text(text or board.to_toml(), board.name)
-    named = load_named(found)
+    named = load_named_cards(found)
     return found.assuming(named.prior, named.tables)
 
 

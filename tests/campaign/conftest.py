@@ -22,7 +22,7 @@ def _no_slips():
 @pytest.fixture
 def _few_points(monkeypatch):
     """For rates over many campaigns, where moments of few points are enough."""
-    monkeypatch.setattr(together, "_N_POINTS", dict.fromkeys((1, 2), 2**11))
+    monkeypatch.setattr(together, "_N_POINTS_BY_DIMENSION", dict.fromkeys((1, 2), 2**11))
     monkeypatch.setattr(together, "FEWEST_POINTS", 100)
 
 

@@ -9,8 +9,14 @@ import pytest
 from linear_boards import exactly_together, linear_boards, log_evidence
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.campaign.claim import TaughtBoard, judge, left_out, p_value, refusing
-from bayesplate.campaign.pulls import Pull
+from bayesplate.campaign.claim import (
+    TaughtBoard,
+    board_p_value,
+    judge_left_out_boards,
+    judge_shared_effect,
+    refusing_boards,
+)
+from bayesplate.campaign.pulls import NormalLikelihood
 
 
 @pytest.mark.usefixtures("_few_points")
@@ -20,7 +26,7 @@ def test_p_values_of_boards_that_share_are_uniform():
     for seed in range(60):
         rng = np.random.default_rng(seed)
         together = exactly_together(linear_boards(rng, 5, 2, rng.standard_normal(2)))
-        values.append([p_value(together, i) for i in range(5)])
+        values.append([board_p_value(together, i) for i in range(5)])
     values = np.array(values)
     n = values.size / 2  # the boards of one campaign are compared with each other
 
@@ -35,17 +41,17 @@ def test_of_two_boards_that_differ_both_are_named_and_of_more_the_odd_one():
     for seed in range(3):
         boards = linear_boards(np.random.default_rng(seed), 5, 1, [3.0], sd=0.2, without=(0,))
 
-        assert refusing(exactly_together(boards[:2])) == ("board 0", "board 1")
-        assert refusing(exactly_together(boards[:3])) == ("board 0",)
-        assert refusing(exactly_together(boards[::-1])) == ("board 4",)
-        assert refusing(exactly_together(boards[1:])) == ()
+        assert refusing_boards(exactly_together(boards[:2])) == ("board 0", "board 1")
+        assert refusing_boards(exactly_together(boards[:3])) == ("board 0",)
+        assert refusing_boards(exactly_together(boards[::-1])) == ("board 4",)
+        assert refusing_boards(exactly_together(boards[1:])) == ()
 
 
 def test_a_board_that_says_nothing_of_a_number_that_cannot_be_negative_has_no_pull():
     prior = Quantity.from_mean(0.0, 1.0, "normal", lower=0.0)
     z = np.abs(np.random.default_rng(0).standard_normal((200_000, 1)))
     weights = np.full(len(z), 1.0 / len(z))
-    silent, mistaken = Pull.of_draws(z, weights, [prior]), Pull.of_draws(z, weights)
+    silent, mistaken = NormalLikelihood.of_draws(z, weights, [prior]), NormalLikelihood.of_draws(z, weights)
 
     assert abs(silent.precision[0, 0]) < 0.05
     assert abs(silent.lean[0]) < 0.05
@@ -57,19 +63,21 @@ def test_a_board_that_only_leans_does_not_refuse(size):
     """Its likelihood rises with the first number without a bend, and tells the second well: its posterior moves by as
     much as one of the prior's sds and stays as wide."""
     draws = np.random.default_rng(4).standard_normal((4000, 2)) * np.array([0.98, 0.5]) + np.array([size, 0.2])
-    pull = Pull.of_draws(draws, np.full(len(draws), 1.0 / len(draws)))
+    pull = NormalLikelihood.of_draws(draws, np.full(len(draws), 1.0 / len(draws)))
     others = SimpleNamespace(pulls=[pull], taught=lambda without: (np.zeros(2), 0.1 * np.eye(2)))
 
     assert np.linalg.eigvalsh(pull.precision)[0] < 0.1  # which its lean would be divided by
-    assert p_value(others, 0) > 0.3
-    others.pulls[0] = Pull(30.0 * np.eye(2), 30.0 * np.array([3.0 * size, 0.2]))  # control: off, and sure of it
-    assert p_value(others, 0) < 0.001
+    assert board_p_value(others, 0) > 0.3
+    others.pulls[0] = NormalLikelihood(
+        30.0 * np.eye(2), 30.0 * np.array([3.0 * size, 0.2])
+    )  # control: off, and sure of it
+    assert board_p_value(others, 0) < 0.001
 
 
 def test_the_log_score_is_that_of_the_board_under_what_the_others_teach():
     boards = linear_boards(np.random.default_rng(2), 4, 2, [0.5, 1.0])
 
-    for i, one in enumerate(left_out(exactly_together(boards)).values()):
+    for i, one in enumerate(judge_left_out_boards(exactly_together(boards)).values()):
         exact = log_evidence(boards) - log_evidence([b for j, b in enumerate(boards) if j != i])
         assert abs(one.log_score - exact) < 1e-3
 
@@ -78,10 +86,10 @@ def claimed(seed, size, without):
     """The claim on a campaign of eight linear boards with one shared number, whose absence is zero."""
     boards = linear_boards(np.random.default_rng(seed), 8, 1, [size], without=without)
     taught = {}
-    for (name, one), each in zip(left_out(exactly_together(boards)).items(), boards, strict=True):
+    for (name, one), each in zip(judge_left_out_boards(exactly_together(boards)).items(), boards, strict=True):
         alone = float(each.at(np.zeros((1, 1)))[0])
         taught[name] = TaughtBoard(one.log_score - alone, 0.0, 0.0, one.p_value, one.refuses, {})
-    return judge(taught).holds
+    return judge_shared_effect(taught).holds
 
 
 @pytest.mark.usefixtures("_few_points")
@@ -112,7 +120,7 @@ def test_what_all_boards_share_is_claimed_and_nothing_else(seeds, size, without,
 )
 def test_a_claim_needs_a_clear_gain_on_most_boards_and_no_refusal(gains, refused_by, holds):
     boards = {str(i): TaughtBoard(gain, 10.0, 8.0, 0.5, str(i) in refused_by, {}) for i, gain in enumerate(gains)}
-    found = judge(boards)
+    found = judge_shared_effect(boards)
 
     assert (found.holds, found.refused_by) == (holds, refused_by)
     assert found.gain == pytest.approx(sum(gains))

@@ -10,9 +10,9 @@ import pytest
 from bayesplate.board.material import ORTHOTROPIC, RIGIDITIES
 from bayesplate.board.setup import Setup
 from bayesplate.campaign.claim import SharedClaim
-from bayesplate.campaign.common import CLEAR, _pooled, clear_of_zero, common_residuals
+from bayesplate.campaign.common import CLEAR_BELOW, _pool_residuals, common_residuals, modes_clear_of_zero
 from bayesplate.campaign.diagnosis import next_step, pooled_rms
-from bayesplate.campaign.search import Explanation
+from bayesplate.campaign.search import CampaignExplanation
 
 N_MODES, N_CAMPAIGNS = 12, 400
 
@@ -29,7 +29,7 @@ def noise(rng, n_boards, offset=0.0):
     n_spare = N_MODES - len(RIGIDITIES)
     told = np.sqrt((residuals**2).sum(axis=1) / n_spare)
     return {
-        f"({mode},0)": _pooled(
+        f"({mode},0)": _pool_residuals(
             {f"board {i}": (residuals[i, mode], told[i]) for i in range(n_boards)}, n_boards * n_spare
         )
         for mode in range(N_MODES)
@@ -41,17 +41,17 @@ def test_chance_is_seldom_called_clear_of_zero(n_boards):
     """In one campaign of twenty at most; two errors for each mode call it so in many: the negative control."""
     rng = np.random.default_rng(n_boards)
     campaigns = [noise(rng, n_boards) for _ in range(N_CAMPAIGNS)]
-    found = np.mean([bool(clear_of_zero(one)) for one in campaigns])
+    found = np.mean([bool(modes_clear_of_zero(one)) for one in campaigns])
     each = np.mean([any(abs(m.mean_cents) > 2.0 * m.error_cents for m in one.values()) for one in campaigns])
 
-    assert CLEAR == 0.05
-    assert found < CLEAR + 3.0 * np.sqrt(CLEAR / N_CAMPAIGNS)
+    assert CLEAR_BELOW == 0.05
+    assert found < CLEAR_BELOW + 3.0 * np.sqrt(CLEAR_BELOW / N_CAMPAIGNS)
     assert each > 0.15
 
 
 def test_an_error_has_the_freedom_of_what_it_is_of():
     """Alike on both boards, it is of the noise, which all their residuals tell; apart, of the scatter between two."""
-    alike, apart = (_pooled({"a": (10.0, 5.0), "b": (far, 5.0)}, 18) for far in (11.0, 40.0))
+    alike, apart = (_pool_residuals({"a": (10.0, 5.0), "b": (far, 5.0)}, 18) for far in (11.0, 40.0))
 
     assert alike.error_cents == pytest.approx(5.0 / np.sqrt(2.0))
     assert (alike.degrees_of_freedom, apart.degrees_of_freedom) == (19, 1)
@@ -61,7 +61,7 @@ def test_an_error_has_the_freedom_of_what_it_is_of():
 def test_what_all_boards_have_is_clear_of_zero():
     common = noise(np.random.default_rng(1), 6, offset=30.0)
 
-    assert clear_of_zero(common) == ["(0,0)"]
+    assert modes_clear_of_zero(common) == ["(0,0)"]
     assert next_step(noise(np.random.default_rng(1), 6), None, 6, is_declared=True) == ""
     for is_declared, told in ((True, "of a card that names nothing shared searches for"), (False, ", for one board")):
         step = next_step(common, None, 6, is_declared=is_declared)
@@ -86,8 +86,8 @@ def test_boards_that_refuse_are_to_be_measured_again(refused, told):
     [("", "the campaign's card", ", for each board one of its own,"), ("a", "the card of a", ", and")],
 )
 def test_what_boards_have_of_their_own_is_to_be_declared(board, where, each):
-    best = Explanation("one board" if board else "own", ("support_stiffness",), board, 0.0, 0.9)
-    nothing = Explanation("none", (), "", 0.0, 0.04)
+    best = CampaignExplanation("one board" if board else "own", ("support_stiffness",), board, 0.0, 0.9)
+    nothing = CampaignExplanation("none", (), "", 0.0, 0.04)
     step = next_step({}, None, 6, is_declared=False, verdict="unexplained", explanations=[nothing, best])
 
     start = f"declare support stiffness on {where}, support_stiffness in its effects beside those that it has{each}"

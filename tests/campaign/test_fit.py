@@ -11,9 +11,9 @@ import pytest
 import bayesplate
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
-from bayesplate.campaign.pulls import Pull
-from bayesplate.campaign.shared import Shared
-from bayesplate.commands.check import expected_sds
+from bayesplate.campaign.pulls import NormalLikelihood
+from bayesplate.campaign.shared import SharedParameter
+from bayesplate.commands.check import expected_shared_sds
 from bayesplate.errors import InputError
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.results.folder import OutputFolder
@@ -133,13 +133,13 @@ def test_check_says_what_the_boards_would_share(campaign):
 def test_the_sd_to_expect_is_over_that_of_the_prior(lower, sd_before):
     """That of a half-normal prior is 0.6 of its scale: far from its bound two boards of sd 0.1 leave 0.1 / 2^0.5."""
     prior = Quantity.from_mean(0.0, 2e4, "normal", lower=lower)
-    shared = (Shared("support_stiffness", "stiffness", prior, "N/m^3"),)
+    shared = (SharedParameter("support_stiffness", "stiffness", prior, "N/m^3"),)
     z = np.random.default_rng(1).normal(1.2, 0.1, (20000, 1))
-    pull = Pull.of_draws(z, np.full(len(z), 1.0 / len(z)), [prior])
+    pull = NormalLikelihood.of_draws(z, np.full(len(z), 1.0 / len(z)), [prior])
 
-    assert expected_sds(shared, [pull])[0] == pytest.approx(0.1 / sd_before, rel=0.03)
-    assert expected_sds(shared, [pull, pull])[0] == pytest.approx(0.1 / np.sqrt(2.0) / sd_before, rel=0.03)
-    assert expected_sds(shared, [Pull(np.zeros((1, 1)), np.zeros(1))]) == pytest.approx([1.0])
+    assert expected_shared_sds(shared, [pull])[0] == pytest.approx(0.1 / sd_before, rel=0.03)
+    assert expected_shared_sds(shared, [pull, pull])[0] == pytest.approx(0.1 / np.sqrt(2.0) / sd_before, rel=0.03)
+    assert expected_shared_sds(shared, [NormalLikelihood(np.zeros((1, 1)), np.zeros(1))]) == pytest.approx([1.0])
 
 
 def test_where_a_value_is_shared_no_draw_is_weighted(fitted_campaign):

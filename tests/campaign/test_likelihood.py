@@ -11,9 +11,9 @@ from linear_boards import linear_boards
 from scipy import stats
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.campaign.boards import Member, Sample
+from bayesplate.campaign.boards import FittedBoard, Sample
 from bayesplate.campaign.evidence import bridge_sampling
-from bayesplate.campaign.likelihood import _REACH, SharedLikelihood, _near
+from bayesplate.campaign.likelihood import _REACH, SharedLikelihood, _within_reach
 from bayesplate.diagnosis.terms import log_sum
 
 N = 6000
@@ -95,16 +95,16 @@ def test_a_polynomial_is_believed_in_a_ball_about_its_draws():
     """Not in a box: in its corners, six standard deviations off, the sum over boards rose to peaks of its own."""
     corners = 3.4 * np.array(list(product((-1.0, 1.0), repeat=3)))
 
-    assert np.linalg.norm(_near(corners), axis=1) == pytest.approx(_REACH)
-    assert _near(corners) == pytest.approx(corners * _REACH / np.linalg.norm(corners[0]))
-    assert np.array_equal(_near(0.5 * corners), 0.5 * corners)
+    assert np.linalg.norm(_within_reach(corners), axis=1) == pytest.approx(_REACH)
+    assert _within_reach(corners) == pytest.approx(corners * _REACH / np.linalg.norm(corners[0]))
+    assert np.array_equal(_within_reach(0.5 * corners), 0.5 * corners)
 
 
 def test_a_board_that_was_walked_anew_is_known_where_its_own_draws_are_as_well():
     """The others learn of it from there: from draws near what they teach it alone, its peak would be extrapolated."""
     rng, grid = np.random.default_rng(6), np.linspace(-6.0, 6.0, 24001)[:, None]
     prior = Quantity.from_mean(0.0, 1.0, "normal")
-    member = Member(None, None, (SimpleNamespace(prior=prior),))
+    member = FittedBoard(None, None, (SimpleNamespace(prior=prior),))
 
     def log_likelihood(z):
         """A narrow peak, and a wide foot of what the board's noise makes up for."""

@@ -11,8 +11,8 @@ from read_pages import Read, faults
 
 import bayesplate
 from bayesplate.campaign.claim import SharedClaim, TaughtBoard
-from bayesplate.campaign.diagnosis import CampaignDiagnosis, PooledErrors, claim_sentence
-from bayesplate.campaign.search import Explanation
+from bayesplate.campaign.diagnosis import CampaignDiagnosis, PooledErrors, campaign_claim_sentence
+from bayesplate.campaign.search import CampaignExplanation
 from bayesplate.campaign.tables import shared_table
 from bayesplate.commands.shown import show_campaign_diagnosis, show_campaign_fit
 from bayesplate.errors import InputError
@@ -79,7 +79,7 @@ def test_the_page_of_a_diagnosis(fitted_campaign, diagnosis, tmp_path):
 
 def test_a_text_stays_a_text(fitted_campaign, diagnosis, tmp_path, monkeypatch):
     """The title of the card, warnings, reasons and what is recommended; figures have none of them."""
-    monkeypatch.setattr(f"{home.__name__}.every_picture", lambda *_: dict.fromkeys(PLACES, ()))
+    monkeypatch.setattr(f"{home.__name__}.campaign_pictures", lambda *_: dict.fromkeys(PLACES, ()))
     told = replace(diagnosis, declared=False, reason=EVERY, recommendation=EVERY)
     summary = replace(fitted_campaign.summary, warnings=(EVERY,))
     text = write_campaign_report(tmp_path, EVERY, summary, told).read_text(encoding="utf-8")
@@ -94,17 +94,17 @@ def test_what_is_claimed_is_said_and_what_is_not_is_said_too(diagnosis):
     """Of a group the sentence names what the boards were fitted with."""
     refused = replace(diagnosis, claim=False, conditions=SharedClaim(5.0, 1.5, ("board-1",), 2, False))
     nothing = replace(diagnosis, claim=False, conditions=None, left_out_boards={}, reason="nothing is lacking")
-    both = Explanation("shared", ("transverse_shear", "attached_mass"), "", 0.0, 0.6)
-    other = Explanation("shared", ("transverse_shear", "fluid_loading"), "", 0.0, 0.4)
+    both = CampaignExplanation("shared", ("transverse_shear", "attached_mass"), "", 0.0, 0.6)
+    other = CampaignExplanation("shared", ("transverse_shear", "fluid_loading"), "", 0.0, 0.4)
     every = ("transverse_shear", "attached_mass", "fluid_loading")
     group = replace(diagnosis, claim=False, effects=every, explanations=(both, other))
 
-    assert claim_sentence(diagnosis).startswith("The boards share attached mass: 2 of 3")
-    assert "5.0 ± 1.5 in log score" in claim_sentence(diagnosis)
-    assert claim_sentence(refused).startswith("It is not claimed that the boards share attached mass")
-    assert "board-1 does not want it" in claim_sentence(refused)
-    assert claim_sentence(nothing) == "Nothing is claimed: nothing is lacking."
-    assert "that the boards share transverse shear and attached mass: 2 of 3" in claim_sentence(group)
+    assert campaign_claim_sentence(diagnosis).startswith("The boards share attached mass: 2 of 3")
+    assert "5.0 ± 1.5 in log score" in campaign_claim_sentence(diagnosis)
+    assert campaign_claim_sentence(refused).startswith("It is not claimed that the boards share attached mass")
+    assert "board-1 does not want it" in campaign_claim_sentence(refused)
+    assert campaign_claim_sentence(nothing) == "Nothing is claimed: nothing is lacking."
+    assert "that the boards share transverse shear and attached mass: 2 of 3" in campaign_claim_sentence(group)
 
 
 def test_what_the_terminal_shows(fitted_campaign, diagnosis):
@@ -119,7 +119,7 @@ def test_what_the_terminal_shows(fitted_campaign, diagnosis):
     assert in_grams == pytest.approx([1e3 * one for one in (mass.mean, mass.sd, mass.q05, mass.q95)], rel=0.05)
     assert any("each board alone" in title for title in titles)
     assert any(title.startswith("Population") for title in titles)
-    assert show_campaign_diagnosis(diagnosis).closing == claim_sentence(diagnosis)
+    assert show_campaign_diagnosis(diagnosis).closing == campaign_claim_sentence(diagnosis)
 
 
 def test_figures_and_draws_of_a_result(fitted_campaign):
@@ -160,5 +160,5 @@ def test_where_boards_differ_the_page_says_by_how_much_and_what_the_band_is(fitt
     assert "the grey band is where their median lies" in captions["differing"]
     assert "median" not in captions["alike"]
     assert "16 ± 12" in tables["differing"]
-    assert "The boards' own differ from it by 16 ± 12 %." in home.sentences(summaries["differing"])
+    assert "The boards' own differ from it by 16 ± 12 %." in home.campaign_sentences(summaries["differing"])
     assert "scatter" not in tables["alike"]

@@ -12,9 +12,9 @@ import bayesplate
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Peak
 from bayesplate.campaign.scatter import expected_width
-from bayesplate.planning.bench import bands, benches
+from bayesplate.planning.bench import make_benches, reading_bands
 from bayesplate.planning.proposals import Costs, Planner
-from bayesplate.planning.together import _judged, _linear, beliefs_together
+from bayesplate.planning.together import _linearise_board, _weigh_readings, campaign_beliefs
 
 SHARED = "attached_mass.mass"
 
@@ -23,7 +23,7 @@ SHARED = "attached_mass.mass"
 def planned(campaign, planner, tmp_path_factory):
     """A plan of three boards with one sensor, with its files."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("bayesplate.commands.plan.beliefs_together", lambda *_: planner.beliefs)
+        patch.setattr("bayesplate.commands.plan.campaign_beliefs", lambda *_: planner.beliefs)
         return bayesplate.plan(campaign, out=tmp_path_factory.mktemp("plan"))
 
 
@@ -50,7 +50,7 @@ def posed(campaign):
 @pytest.fixture(scope="module")
 def planner(posed):
     """All boards to first order, for the sake of E_y."""
-    return Planner(beliefs_together(*posed), 1, "E_y")
+    return Planner(campaign_beliefs(*posed), 1, "E_y")
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def judged(posed, planner, **other):
     """What the first board says where it has other readings or shares something else, its plate as it was solved."""
     known, noise = planner.beliefs.boards[0], planner.beliefs.explanations[0].noise[0, :1]
     given = {"board": known.board, "shared": posed[2], "laws": known.laws[:1]} | other
-    return _judged(given["board"], posed[1][0], given["shared"], known.values, noise, given["laws"])
+    return _weigh_readings(given["board"], posed[1][0], given["shared"], known.values, noise, given["laws"])
 
 
 def test_a_board_whose_number_scatters_says_less_of_the_middle(posed, planner):
@@ -101,7 +101,7 @@ def test_peaks_that_stand_by_a_mode_are_taken_for_it(posed):
     (setup,) = board.setups
     peaks = tuple(Peak(one.frequency) for one in setup.readings[-2:])
     bare = replace(board, setups=(replace(setup, readings=setup.readings[:-2], peaks=peaks),))
-    (law,) = _linear(bare, prior, shared).known.laws
+    (law,) = _linearise_board(bare, prior, shared).known.laws
 
     assert law.station.n_old == len(setup.readings)
     assert set(law.station.setup.labels[: law.station.n_old]) == set(setup.labels)
@@ -109,7 +109,7 @@ def test_peaks_that_stand_by_a_mode_are_taken_for_it(posed):
 
 
 def test_modes_to_look_for_have_a_sheet_with_the_sensor_where_it_stands(posed, planner, listed):
-    found = [one.entry for one in benches(planner.beliefs, listed)]
+    found = [one.entry for one in make_benches(planner.beliefs, listed)]
 
     assert len(found) == 2
     for bench in found:
@@ -152,7 +152,7 @@ def test_boards_that_tell_most_may_be_held_another_way(planner, listed):
 
 def test_the_sheets_are_those_of_the_steps_that_are_proposed_together(campaign, planner, listed, tmp_path, monkeypatch):
     """Where modes are all that could be read, the best three are of three boards; two of them get a sheet."""
-    monkeypatch.setattr("bayesplate.commands.plan.beliefs_together", lambda *_: planner.beliefs)
+    monkeypatch.setattr("bayesplate.commands.plan.campaign_beliefs", lambda *_: planner.beliefs)
     of_modes = tuple(one for one in listed if one.entry.what in ("modes", "edges"))
     monkeypatch.setattr(Planner, "ranked", lambda *_: of_modes)
     found = bayesplate.plan(campaign, goal="E_y", out=tmp_path / "out")
@@ -170,7 +170,7 @@ def test_the_band_of_a_mode_has_what_is_not_known_of_the_board_and_the_noise(pla
     reading = next(one for one in listed if one.entry.what == "modes").readings
     (now,) = planner.beliefs.explanations
     known = replace(planner.beliefs, explanations=(replace(now, covariance=np.zeros_like(now.covariance)),))
-    of_both, of_noise = (np.diff(bands(one, reading)[:, [0, 2]])[:, 0] for one in (planner.beliefs, known))
+    of_both, of_noise = (np.diff(reading_bands(one, reading)[:, [0, 2]])[:, 0] for one in (planner.beliefs, known))
 
     rows, variance = reading.slopes[0][0], reading.variance[0][0]
     assert of_noise == pytest.approx(2.0 * 0.9674 * np.sqrt(variance), rel=1e-3)

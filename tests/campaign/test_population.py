@@ -11,7 +11,7 @@ from scipy.stats import binom
 from bayesplate.board.material import MODULI
 from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.board.quantity import Quantity
-from bayesplate.campaign.population import BoardConstants, Population, find_population, prior_of, require_moduli
+from bayesplate.campaign.population import BoardConstants, Population, find_population, next_board_prior, require_moduli
 from bayesplate.errors import InputError
 from bayesplate.posterior.sampling import Chains, SamplerSettings
 
@@ -96,7 +96,7 @@ def test_a_board_given_the_population_is_the_closed_form():
 
 
 def test_the_prior_card_says_what_the_next_board_will_be(found):
-    card = prior_of(found, "half-tops", "forty boards", np.random.default_rng(5))
+    card = next_board_prior(found, "half-tops", "forty boards", np.random.default_rng(5))
 
     assert card.constants["E_x"].median == pytest.approx(np.exp(MEAN[0]), rel=4 * SD[0] / np.sqrt(40))
     assert np.log(card.constants["E_y"].factor) == pytest.approx(SD[1], rel=0.4)

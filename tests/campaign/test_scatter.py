@@ -12,11 +12,11 @@ from scipy.stats import norm
 
 from bayesplate.board.quantity import Quantity
 from bayesplate.campaign import scatter
-from bayesplate.campaign.claim import p_value
-from bayesplate.campaign.pulls import Pull
+from bayesplate.campaign.claim import board_p_value
+from bayesplate.campaign.pulls import NormalLikelihood
 from bayesplate.campaign.scatter import ScatteredLikelihood
-from bayesplate.campaign.shared import Shared
-from bayesplate.campaign.together import values_of
+from bayesplate.campaign.shared import SharedParameter
+from bayesplate.campaign.together import shared_values
 
 SCALE = 0.5
 LOG_SD = 0.4
@@ -25,7 +25,9 @@ LOG_SD = 0.4
 def numbers(n, scale=SCALE):
     """Shared numbers of log-normal prior; the first of them scatters, and the last."""
     prior = Quantity.from_median(1.0, np.exp(LOG_SD))
-    return tuple(Shared("effect", f"z{i}", prior, "1", scatter=scale if i in (0, n - 1) else 0.0) for i in range(n))
+    return tuple(
+        SharedParameter("effect", f"z{i}", prior, "1", scatter=scale if i in (0, n - 1) else 0.0) for i in range(n)
+    )
 
 
 def scattered_boards(rng, n_boards, n_shared, width, z_true=0.3, sd=0.5):
@@ -84,7 +86,7 @@ def test_a_board_that_is_not_normal_is_integrated_as_by_a_fine_rule():
     weights /= weights.sum()
     mean = weights @ z[:, 0]
     precision = 1.0 / (weights @ (z[:, 0] - mean) ** 2)
-    pull = Pull(np.array([[precision]]), np.array([precision * mean]))
+    pull = NormalLikelihood(np.array([[precision]]), np.array([precision * mean]))
     scattered = ScatteredLikelihood(numbers(1), Skewed(), pull)
     for middle, u in [(0.0, 0.3), (1.0, 1.0), (-0.5, 2.0)]:
         width = u * SCALE / LOG_SD
@@ -182,7 +184,7 @@ def test_p_values_are_uniform_where_boards_scatter_and_not_where_that_is_left_ou
         boards, _ = scattered_boards(rng, 5, 1, width, z_true=rng.normal(), sd=0.1)
         for found, numbers_of in ((values, shared), (without, same)):
             whole = exactly_together(boards, numbers_of)
-            found.append([p_value(whole, i) for i in range(5)])
+            found.append([board_p_value(whole, i) for i in range(5)])
     n = 60  # boards of one campaign are compared with each other
     error = 4.0 * np.sqrt(0.1 * 0.9 / n)
 
@@ -194,7 +196,7 @@ def test_values_have_names_and_the_scatter_its_own():
     (number,) = numbers(1)
     boards, _ = scattered_boards(np.random.default_rng(3), 3, 1, 0.5)
     coordinates = exactly_together(boards, (number,)).coordinates
-    values = values_of(coordinates, np.array([[0.0, 1.0]]))
+    values = shared_values(coordinates, np.array([[0.0, 1.0]]))
 
     assert values == {"effect.z0": pytest.approx([1.0]), "effect.z0 scatter": pytest.approx([SCALE])}
     assert exactly_together(boards, (replace(number, scatter=0.0),)).coordinates == (replace(number, scatter=0.0),)

@@ -10,17 +10,17 @@ import pytest
 from made_campaigns import MASS, write_campaign
 
 import bayesplate
-from bayesplate.campaign.diagnosis import named
+from bayesplate.campaign.diagnosis import campaign_verdict
 from bayesplate.campaign.search import (
-    OF_TWO,
-    PRIOR,
-    Explanation,
-    explanations,
+    PRIOR_SHARE_OF_TWO,
+    SHARING_PRIOR,
+    CampaignExplanation,
     log_evidence_shared,
+    rank_campaign_explanations,
     search_board,
-    shown,
+    visible_effects,
 )
-from bayesplate.commands.campaign_diagnose import _sharing, shareable
+from bayesplate.commands.campaign_diagnose import _share_effects, shareable_effects
 from bayesplate.diagnosis.baseline import baseline_of
 
 
@@ -65,20 +65,20 @@ def test_each_way_has_the_probability_of_its_prior_and_its_evidence():
         Cells("other", -2.0, a={0.0: 0.5, 1.0: 1.0}, b={0.0: 0.0}),
     )
     of_one, of_other = np.log(0.5 + 0.5 * np.exp(2.0)), np.log(0.5 * np.exp(0.5) + 0.5 * np.exp(1.0))
-    half_own = 0.5 * (PRIOR["own"] + PRIOR["shared and own"])  # no two effects are asked for
+    half_own = 0.5 * (SHARING_PRIOR["own"] + SHARING_PRIOR["shared and own"])  # no two effects are asked for
     by_hand = {
-        ("none", (), ""): (PRIOR["none"], -3.0),
-        ("shared", ("a",), ""): (0.5 * PRIOR["shared"], np.log(0.5 * np.exp(0.5) + 0.5 * np.exp(3.0))),
-        ("shared", ("b",), ""): (0.5 * PRIOR["shared"], 1.0),
+        ("none", (), ""): (SHARING_PRIOR["none"], -3.0),
+        ("shared", ("a",), ""): (0.5 * SHARING_PRIOR["shared"], np.log(0.5 * np.exp(0.5) + 0.5 * np.exp(3.0))),
+        ("shared", ("b",), ""): (0.5 * SHARING_PRIOR["shared"], 1.0),
         ("own", ("a",), ""): (half_own, of_one + of_other),
         ("own", ("b",), ""): (half_own, 1.0),
-        ("one board", ("a",), "one"): (0.25 * PRIOR["one board"], of_one - 2.0),
-        ("one board", ("a",), "other"): (0.25 * PRIOR["one board"], of_other - 1.0),
-        ("one board", ("b",), "one"): (0.25 * PRIOR["one board"], 1.0 - 2.0),
-        ("one board", ("b",), "other"): (0.25 * PRIOR["one board"], 0.0 - 1.0),
+        ("one board", ("a",), "one"): (0.25 * SHARING_PRIOR["one board"], of_one - 2.0),
+        ("one board", ("a",), "other"): (0.25 * SHARING_PRIOR["one board"], of_other - 1.0),
+        ("one board", ("b",), "one"): (0.25 * SHARING_PRIOR["one board"], 1.0 - 2.0),
+        ("one board", ("b",), "other"): (0.25 * SHARING_PRIOR["one board"], 0.0 - 1.0),
     }
     total = sum(prior * np.exp(log_evidence) for prior, log_evidence in by_hand.values())
-    found = explanations([one, other], [("a",), ("b",)])
+    found = rank_campaign_explanations([one, other], [("a",), ("b",)])
 
     assert len(found) == len(by_hand)
     for each in found:
@@ -86,7 +86,7 @@ def test_each_way_has_the_probability_of_its_prior_and_its_evidence():
         assert each.log_evidence == pytest.approx(log_evidence), each
         assert each.probability == pytest.approx(prior * np.exp(log_evidence) / total), each
     assert [each.probability for each in found] == sorted((each.probability for each in found), reverse=True)
-    assert sum(PRIOR.values()) == pytest.approx(1.0)
+    assert sum(SHARING_PRIOR.values()) == pytest.approx(1.0)
 
 
 def test_two_effects_alike_take_their_share_of_what_is_shared():
@@ -94,13 +94,13 @@ def test_two_effects_alike_take_their_share_of_what_is_shared():
     sizes = {0.0: 3.0, 1.0: 5.0}
     boards = [Cells(name, 0.0, mass=sizes, stiffness=sizes, mass_stiffness=sizes) for name in "ab"]
     effects = [("mass",), ("stiffness",), ("mass", "stiffness")]
-    both = {one.effects: one for one in explanations(boards, effects) if one.way == "shared"}
+    both = {one.effects: one for one in rank_campaign_explanations(boards, effects) if one.way == "shared"}
 
     assert both["mass", "stiffness"].log_evidence == pytest.approx(np.log(0.5 * np.exp(6.0) + 0.5 * np.exp(10.0)))
     ratio = both["mass", "stiffness"].probability / both["mass",].probability
-    assert (ratio, OF_TWO) == (pytest.approx(OF_TWO / (0.5 * (1.0 - OF_TWO))), 0.2)
+    assert (ratio, PRIOR_SHARE_OF_TWO) == (pytest.approx(PRIOR_SHARE_OF_TWO / (0.5 * (1.0 - PRIOR_SHARE_OF_TWO))), 0.2)
     one_shows_less = [boards[0], Cells("b", 0.0, mass=sizes, stiffness=sizes)]
-    alone = {one.effects: one for one in explanations(one_shows_less, effects) if one.way == "shared"}
+    alone = {one.effects: one for one in rank_campaign_explanations(one_shows_less, effects) if one.way == "shared"}
     assert set(alone) == {("mass",), ("stiffness",)}
 
 
@@ -112,14 +112,14 @@ def test_an_effect_alike_is_found_beside_another_that_each_board_has_of_its_own(
         one.effects["support"] = {z: 8.0 - 4.0 * (z - size) ** 2 for z in SIZES}
         both = {(a, b): one.effects["mass"][a] + one.effects["support"][b] for a in SIZES for b in SIZES}
         one.effects["mass_support"] = both
-    found = explanations(boards, [("mass",), ("support",), ("mass", "support")])
+    found = rank_campaign_explanations(boards, [("mass",), ("support",), ("mass", "support")])
     by_kind = {(one.way, one.effects): one for one in found if not one.board}
     one = by_kind["shared and own", ("mass", "support")]
 
     own = by_kind["own", ("support",)].log_evidence
     assert one.log_evidence == pytest.approx(by_kind["shared", ("mass",)].log_evidence + own)
     none = by_kind["none", ()]
-    ratio = 0.5 * PRIOR["shared and own"] / PRIOR["none"] * np.exp(one.log_evidence - none.log_evidence)
+    ratio = 0.5 * SHARING_PRIOR["shared and own"] / SHARING_PRIOR["none"] * np.exp(one.log_evidence - none.log_evidence)
     assert one.probability / none.probability == pytest.approx(ratio)
     assert sum(each.probability for each in found) == pytest.approx(1.0)
     assert (found[0].way == "shared and own") is (sizes[0] != sizes[1])
@@ -127,7 +127,7 @@ def test_an_effect_alike_is_found_beside_another_that_each_board_has_of_its_own(
 
 
 def explanation(way, probability, *effects):
-    return Explanation(way, () if way == "none" else effects or ("attached_mass",), "", 0.0, probability)
+    return CampaignExplanation(way, () if way == "none" else effects or ("attached_mass",), "", 0.0, probability)
 
 
 @pytest.mark.parametrize(
@@ -144,7 +144,7 @@ def explanation(way, probability, *effects):
     ],
 )
 def test_what_a_search_allows_to_say(found, verdict, effects):
-    said = named([explanation(*one) for one in found])
+    said = campaign_verdict([explanation(*one) for one in found])
 
     assert said[:2] == (verdict, effects)
     assert said[2]
@@ -153,7 +153,7 @@ def test_what_a_search_allows_to_say(found, verdict, effects):
 def test_what_may_be_as_probable_as_something_that_is_not_shared_is_told():
     found = [explanation("own", 0.5, "b"), explanation("shared and own", 0.4, "a", "b"), explanation("none", 0.01)]
 
-    assert named(found)[2] == (
+    assert campaign_verdict(found)[2] == (
         "the most probable is b of another size on each board, which the boards do not share; a alike on all boards "
         "beside b of another size on each may be as probable"
     )
@@ -174,18 +174,18 @@ def searching(folder, twice="", **planted):
 def test_what_a_fit_could_not_share_is_not_searched_for(tmp_path):
     """Of the air only the baffle's share is not known; a Poisson ratio is each board's own."""
     campaign = searching(tmp_path)
-    found = shareable(campaign)
+    found = shareable_effects(campaign)
 
     single = {"transverse_shear", "attached_mass", "fluid_loading", "support_stiffness"}
     assert {each for each in found if len(each) == 1} == {(name,) for name in single}
     assert {frozenset(each) for each in found if len(each) == 2} == {frozenset(two) for two in combinations(single, 2)}
     for effects in found:
-        assert _sharing(campaign, effects).shared
-    assert [one.name for one in _sharing(campaign, ("fluid_loading",)).shared] == ["fluid_loading.baffle"]
+        assert _share_effects(campaign, effects).shared
+    assert [one.name for one in _share_effects(campaign, ("fluid_loading",)).shared] == ["fluid_loading.baffle"]
 
 
 def test_an_effect_that_each_setup_has_at_a_size_of_its_own_is_not_searched_for(tmp_path):
-    assert shareable(searching(tmp_path, twice="board-1")) == (("transverse_shear",),)
+    assert shareable_effects(searching(tmp_path, twice="board-1")) == (("transverse_shear",),)
 
 
 SHEAR_AND_SENSOR = ("transverse_shear", "attached_mass")
@@ -213,8 +213,8 @@ def found_on_boards(request, tmp_path_factory):
 def test_shear_and_a_sensor_are_found_together(found_on_boards):
     """And the sensor alone where it is alone, though no board by itself would show one sensor beside shear."""
     (masses, _, way, expected), boards = found_on_boards
-    effects = shown(boards, [*((name,) for name in SHEAR_AND_SENSOR), SHEAR_AND_SENSOR])
-    best = explanations(boards, effects)[0]
+    effects = visible_effects(boards, [*((name,) for name in SHEAR_AND_SENSOR), SHEAR_AND_SENSOR])
+    best = rank_campaign_explanations(boards, effects)[0]
 
     assert max(masses) > MASS or not any("attached_mass" in one.ground.paired for one in boards)
     assert (best.way, best.effects) == (way, expected)
@@ -260,5 +260,5 @@ def test_a_pair_is_asked_for_where_the_boards_together_would_show_both():
         return SimpleNamespace(ground=SimpleNamespace(candidates=candidates))
 
     effects = [("mass",), ("shear",), ("mass", "shear")]
-    assert shown([seen(mass=1.5, shear=9.0)], effects) == (("mass",), ("shear",))
-    assert shown([seen(mass=1.5, shear=9.0)] * 2, effects) == tuple(effects)
+    assert visible_effects([seen(mass=1.5, shear=9.0)], effects) == (("mass",), ("shear",))
+    assert visible_effects([seen(mass=1.5, shear=9.0)] * 2, effects) == tuple(effects)

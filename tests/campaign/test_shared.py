@@ -10,9 +10,9 @@ from made_campaigns import MASS
 from scipy.linalg import block_diag
 
 from bayesplate.campaign import learning
-from bayesplate.campaign.boards import Member, _joint
-from bayesplate.campaign.claim import judge, left_out, rms_cents, taught_boards
-from bayesplate.campaign.learning import learn
+from bayesplate.campaign.boards import FittedBoard, _log_joint_density
+from bayesplate.campaign.claim import judge_left_out_boards, judge_shared_effect, rms_cents, taught_boards
+from bayesplate.campaign.learning import learn_shared
 from bayesplate.campaign.likelihood import moments
 from bayesplate.commands.campaign_diagnose import _without_shared
 from bayesplate.commands.campaign_fit import fit_boards
@@ -87,10 +87,12 @@ def test_the_truth_is_inside_and_sharing_narrows(fitted_campaign):
 def test_what_is_told_of_boards_that_are_left_out(fitted_campaign):
     """Against each board alone, which here has the sensor as well."""
     learnt, alone = fitted_campaign.learnt, fitted_campaign.alone
-    members = {name: Member(one.inference, one.draws, ()) for name, one in alone.items()}
+    members = {name: FittedBoard(one.inference, one.draws, ()) for name, one in alone.items()}
     taught = taught_boards(learnt, members, 1)
 
-    for i, (told, score) in enumerate(zip(taught.values(), left_out(learnt.together).values(), strict=True)):
+    for i, (told, score) in enumerate(
+        zip(taught.values(), judge_left_out_boards(learnt.together).values(), strict=True)
+    ):
         name = learnt.members[i].name
         assert told.log_score_gain == pytest.approx(score.log_score - members[name].alone.log_evidence)
         assert told.before_rms_cents == pytest.approx(rms_cents(alone[name].inference, alone[name].draws))
@@ -103,10 +105,10 @@ def test_what_is_told_of_boards_that_are_left_out(fitted_campaign):
 @pytest.mark.slow
 def test_a_sensor_on_all_boards_is_claimed_from_those_left_out(campaign, fitted_campaign):
     before = fit_boards(_without_shared(campaign), Run())
-    members = {name: Member(one.inference, one.draws, ()) for name, one in before.items()}
+    members = {name: FittedBoard(one.inference, one.draws, ()) for name, one in before.items()}
     taught = taught_boards(fitted_campaign.learnt, members, 1)
 
-    assert judge(taught).holds
+    assert judge_shared_effect(taught).holds
     for name, one in taught.items():
         others = fitted_campaign.summary.shared[SHARED].others[name]
         assert one.log_score_gain > 0.0
@@ -119,7 +121,7 @@ def test_a_board_that_is_left_out_has_what_the_others_teach(fitted_campaign, sca
     """Its shared number as they teach it; its constants as they go with such numbers."""
     shared = tuple(replace(one, scatter=scatter) for one in fitted_campaign.learnt.together.shared)
     members = tuple(replace(one, shared=shared) for one in fitted_campaign.learnt.members)
-    learnt = learn(members, SamplerSettings(seed=1)) if scatter else fitted_campaign.learnt
+    learnt = learn_shared(members, SamplerSettings(seed=1)) if scatter else fitted_campaign.learnt
     for i, member in enumerate(learnt.members):
         _, draws = learnt.board_left_out(i, np.random.default_rng(0), 1)
         z = member.given.z_of(draws.flat)[:, 0]
@@ -162,7 +164,7 @@ def test_a_board_that_others_lead_far_off_is_walked_where_its_law_is_known(fitte
     own = member.given.own_columns
     centre, covariance = moments(np.column_stack([drawn.theta[:, own], drawn.z]), drawn.weights)
     chains, convergence = sample(
-        _joint(member.given, others), centre, covariance, SamplerSettings(seed=2, n_ensembles=2)
+        _log_joint_density(member.given, others), centre, covariance, SamplerSettings(seed=2, n_ensembles=2)
     )
     assert convergence.passed
     for i in range(own.size):
@@ -186,5 +188,5 @@ def test_a_likelihood_that_is_off_its_draws_is_found_again(fitted_campaign):
     tilted = replace(first, coefficients=first.coefficients + np.eye(1, first.coefficients.size)[0] * 2.0)
     together = replace(learnt.together, likelihoods=(tilted, *learnt.together.likelihoods[1:]))
 
-    assert (learnt.astray < learning.ASTRAY).all()
-    assert replace(learnt, together=together).astray[0] > learning.ASTRAY
+    assert (learnt.astray < learning.LARGEST_OFFSET).all()
+    assert replace(learnt, together=together).astray[0] > learning.LARGEST_OFFSET

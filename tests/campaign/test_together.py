@@ -7,8 +7,8 @@ import pytest
 from linear_boards import exactly_together, joint_posterior, linear_boards, log_evidence, standard_shared
 
 from bayesplate.campaign.likelihood import SharedLikelihood
-from bayesplate.campaign.pulls import Pull
-from bayesplate.campaign.together import FEWEST_POINTS, Together, walk
+from bayesplate.campaign.pulls import NormalLikelihood
+from bayesplate.campaign.together import FEWEST_POINTS, CombinedBoards, sample_shared
 from bayesplate.posterior.sampling import SamplerSettings
 
 N = 6000
@@ -28,7 +28,7 @@ def together_of(boards, rng):
         for one, z in zip(boards, drawn, strict=True)
     ]
     names = [f"board {i}" for i in range(len(boards))]
-    return Together.of(shared, names, found, [Pull.of_draws(z, weights) for z in drawn])
+    return CombinedBoards.of(shared, names, found, [NormalLikelihood.of_draws(z, weights) for z in drawn])
 
 
 def tolerance(together):
@@ -58,7 +58,7 @@ def test_all_boards_and_all_but_one_are_the_closed_form():
 def test_the_walk_has_the_moments_of_the_sums():
     rng = np.random.default_rng(3)
     together = exactly_together(linear_boards(rng, 4, 2, [1.2, -0.7]))
-    chains, convergence = walk(together, SamplerSettings(seed=1))
+    chains, convergence = sample_shared(together, SamplerSettings(seed=1))
     mean, covariance = together.moments()
     sd = np.sqrt(np.diagonal(covariance))
 
@@ -71,8 +71,8 @@ def test_points_find_their_way_to_where_the_boards_are():
     """The boards are sharp, and the normal likelihoods that the points are laid out by say nothing of them."""
     rng = np.random.default_rng(6)
     boards = linear_boards(rng, 4, 2, [2.5, -2.0], sd=0.01)
-    nothing = Pull(np.zeros((2, 2)), np.zeros(2))
-    together = Together.of(standard_shared(2), [f"board {i}" for i in range(4)], boards, [nothing] * 4)
+    nothing = NormalLikelihood(np.zeros((2, 2)), np.zeros(2))
+    together = CombinedBoards.of(standard_shared(2), [f"board {i}" for i in range(4)], boards, [nothing] * 4)
     mean, covariance = joint_posterior(boards)
     found_mean, found_covariance = together.moments()
     sd = np.sqrt(np.diagonal(covariance))

@@ -26,11 +26,11 @@ from runs import files_in
 
 import bayesplate
 from bayesplate.board.board import Board
-from bayesplate.board.named import load_named
+from bayesplate.board.named import load_named_cards
 from bayesplate.board.prior import load_prior
 from bayesplate.cli import main
 from bayesplate.commands.batch import default_batch_folder
-from bayesplate.commands.batch_boards import boards_of
+from bayesplate.commands.batch_boards import list_boards
 from bayesplate.errors import BatchError, InputError
 from bayesplate.results.contract import json_text
 
@@ -70,7 +70,7 @@ def test_what_is_no_board_card_is_left_aside(tmp_path):
     (tmp_path / "own-prior.toml").write_text(load_prior("spruce").to_toml().replace('"spruce"', '"own-prior"'))
     (tmp_path / "setup.toml").write_text('[setup.frequencies_hz]\n"(1,1)" = 50.0\n')
     (tmp_path / "unfinished.toml").write_text('format = 1\nname = "unfinished"\n[setup]\n')
-    boards, aside = boards_of(tmp_path, None)
+    boards, aside = list_boards(tmp_path, None)
 
     assert aside == ("own-prior.toml", "setup.toml")
     assert [board.name for board in boards] == ["unfinished"]
@@ -82,7 +82,7 @@ def test_a_folder_that_cannot_be_read_is_refused(tmp_path, monkeypatch):
 
     monkeypatch.setattr(os, "listdir", denied)
     with pytest.raises(InputError, match=f"{tmp_path}: wanted a readable folder, got Permission denied"):
-        boards_of(tmp_path, None)
+        list_boards(tmp_path, None)
 
 
 @pytest.mark.skipif(not hasattr(os, "symlink"), reason="needs links")
@@ -96,7 +96,7 @@ def test_a_link_out_of_the_folder_is_no_card_of_it(tmp_path):
     (folder / "c.toml").symlink_to(folder / "inner" / "c.toml")
     (folder / "d.toml").symlink_to(folder / "d.toml")  # to itself
     read = {}
-    for board in boards_of(folder, None)[0]:
+    for board in list_boards(folder, None)[0]:
         try:
             read[board.name] = board.card().name
         except InputError as error:
@@ -114,7 +114,7 @@ def test_one_board_is_a_pure_function_that_travels(two, one):
     board, prior = Board.from_text(card_text("b", 1.01), "b"), load_prior("weakly-informative")
     with pytest.raises(InputError, match="request tables clamped: wanted the published coefficients"):
         bayesplate.fit_board(board, prior)
-    request = bayesplate.FitRequest(seed=int(row["seed"]), tables=load_named(board).tables)
+    request = bayesplate.FitRequest(seed=int(row["seed"]), tables=load_named_cards(board).tables)
 
     found = bayesplate.fit_board(*pickle.loads(pickle.dumps((board, prior, request))))
 
@@ -163,7 +163,7 @@ def answered(monkeypatch):
                     future.set_exception(error)
                 yield key, future
 
-        monkeypatch.setattr("bayesplate.commands.batch_run.computed", computed_here)
+        monkeypatch.setattr("bayesplate.commands.batch_run.compute_calls", computed_here)
         return names
 
     return by
@@ -252,10 +252,10 @@ def test_a_cluster_of_two_processes_gives_the_same_bytes(cards, two, tmp_path):
 
 SCRIPT = """
 import os
-from bayesplate.commands.workers import computed, processes
+from bayesplate.commands.workers import compute_calls, worker_processes
 calls = [(0, (abs, (-1,))), (1, (os._exit, (1,))), (2, (abs, (-3,))), (3, (int, ("x",)))]
-with processes(2) as free:
-    found = dict(computed(free, iter(calls)))
+with worker_processes(2) as free:
+    found = dict(compute_calls(free, iter(calls)))
 print(found[0].result(), repr(found[1].exception()), found[2].result(), repr(found[3].exception()))
 """
 
@@ -293,7 +293,7 @@ def table(tmp_path) -> Path:
 
 
 def test_a_row_is_the_card_that_the_template_and_its_cells_make(table):
-    boards, _ = boards_of(table, table.parent / "template.toml")
+    boards, _ = list_boards(table, table.parent / "template.toml")
     one, two = (board.card() for board in boards if board.name in ("top-1", "top-2"))
 
     assert (one.inputs["mass"].mean, one.inputs["mass"].sd) == (0.3, 0.002)
@@ -329,7 +329,7 @@ def test_a_table_in_parquet_says_the_same(table, tmp_path):
     parquet.write_table(pyarrow.table(columns | hertz), tmp_path / "tops.parquet")
     texts = []
     for file in ("tops.csv", "tops.parquet"):
-        boards, _ = boards_of(tmp_path / file, tmp_path / "template.toml")
+        boards, _ = list_boards(tmp_path / file, tmp_path / "template.toml")
         texts.append([board.card().text for board in boards if board.name in ("1", "007")])
 
     assert texts[0] == texts[1]

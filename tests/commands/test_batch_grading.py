@@ -6,7 +6,7 @@ import pytest
 
 from bayesplate.commands.batch_grading import grading_request
 from bayesplate.errors import InputError
-from bayesplate.grading.figures import limit_told
+from bayesplate.grading.figures import limit_text
 from bayesplate.grading.matching import GradingRequest
 
 
@@ -18,7 +18,7 @@ def test_words_become_a_request_in_si_units():
     assert request.rigidity == 20.0
     assert grading_request("7", [], None).match_percent == {"E_x": 7.0, "E_y": 7.0, "G_xy": 7.0}
     assert grading_request(None, [], None) == GradingRequest()
-    told = [limit_told(name, limit) for name, limit in request.limits.items()]
+    told = [limit_text(name, limit) for name, limit in request.limits.items()]
     assert told == ["E_x from 11 to 14 GPa", "density up to 450 kg/m^3", "thickness from 2.5 mm"]
 
 

@@ -62,7 +62,7 @@ def invoke(*arguments: str) -> Result:
 def test_the_report_printed_is_the_one_returned_and_nothing_is_written(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     found = bayesplate.check("finnish-spruce-cantilever")
-    monkeypatch.setattr("bayesplate.commands.check.by_kind", lambda *_, **__: found)  # it is not computed again
+    monkeypatch.setattr("bayesplate.commands.check.dispatch_card", lambda *_, **__: found)  # it is not computed again
     told, mirrored = (invoke("check", "finnish-spruce-cantilever", *option) for option in ((), ("--json",)))
 
     assert (told.exit_code, mirrored.exit_code) == (0, 0)

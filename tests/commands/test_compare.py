@@ -132,8 +132,8 @@ def test_all_methods_stand_on_the_labels_that_the_draws_leave(monkeypatch):
     (setup,) = board.setups
     *sure, last = setup.readings
     bare = replace(setup, readings=tuple(sure), peaks=(Peak(last.frequency),))
-    monkeypatch.setattr("bayesplate.posterior.likely_labels.LIKELY", 1.0)
-    monkeypatch.setattr("bayesplate.commands.compare._SHEAR", ())  # the thin plate twice: shear takes its time
+    monkeypatch.setattr("bayesplate.posterior.likely_labels.LIKELY_LABEL", 1.0)
+    monkeypatch.setattr("bayesplate.commands.compare._SHEAR_EFFECTS", ())  # the thin plate twice: shear takes its time
     runs.sample_loosely(monkeypatch, "compare")
 
     result = compare(replace(board, setups=(bare,)))

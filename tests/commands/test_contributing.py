@@ -21,10 +21,10 @@ BOARD = "finnish-spruce-cantilever"
 IMPORTS = """
 from __future__ import annotations
 from typing import Annotated
-from bayesplate.board.checks import board_mass
-from bayesplate.commands.arguments import checked
+from bayesplate.board.checks import nominal_mass
+from bayesplate.commands.arguments import check_arguments
 from bayesplate.commands.options import CARD, SetupFile
-from bayesplate.commands.prepare import Card
+from bayesplate.commands.prepare import CardSource
 from bayesplate.commands.problem import Problem, as_problem
 """
 

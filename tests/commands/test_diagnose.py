@@ -18,7 +18,7 @@ from bayesplate.commands.check import check
 from bayesplate.commands.diagnose import advice
 from bayesplate.commands.diagnose import diagnose as run_diagnose
 from bayesplate.diagnosis.joint import full_search
-from bayesplate.diagnosis.verdict import Answer, Verdict
+from bayesplate.diagnosis.verdict import Explanation, Verdict
 
 WITH_SHEAR = "paper-cantilever-fe"
 CALM = "fiemme-spruce-clamped"
@@ -228,16 +228,16 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[list[tuple[str, ...]]]:
     kept: list[list[tuple[str, ...]]] = []
     home = "bayesplate.commands.diagnose"
     monkeypatch.setattr(f"{home}.wrong_reading", lambda _: "Read (1,1) again.")
-    monkeypatch.setattr(f"{home}.survivors", lambda _, rivals: kept.append(rivals) or ())
-    monkeypatch.setattr(f"{home}.believed", lambda *_: None)
+    monkeypatch.setattr(f"{home}.surviving_explanations", lambda _, rivals: kept.append(rivals) or ())
+    monkeypatch.setattr(f"{home}.search_beliefs", lambda *_: None)
     monkeypatch.setattr(f"{home}.Planner", lambda *_: SimpleNamespace(ranked=tuple))
-    monkeypatch.setattr(f"{home}.first_of", lambda *_: "Measure more.")
+    monkeypatch.setattr(f"{home}.plan_first_line", lambda *_: "Measure more.")
     return kept
 
 
 def test_a_wrong_reading_is_told_where_nothing_explains_the_readings_and_else_the_first_line_of_the_plan(asked):
     """Alternatives of a verdict survive whatever their probability."""
-    rivals = Answer(("shear",), 1, 0.9), Answer(("mass",), 3, 0.0)
+    rivals = Explanation(("shear",), 1, 0.9), Explanation(("mass",), 3, 0.0)
     for word, stands_for, told in (
         ("unexplained", (), "Read (1,1) again."),
         ("none needed", (), "Measure more."),

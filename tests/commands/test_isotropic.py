@@ -16,7 +16,7 @@ from bayesplate.errors import InputError
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.laws import cents
 from bayesplate.planning.beliefs import Beliefs, prior_explanation
-from bayesplate.planning.gains import Readings, expected_gain
+from bayesplate.planning.gains import PlannedReadings, expected_gain
 from bayesplate.report.content import summary_sentences
 from bayesplate.results.contract import as_json
 
@@ -109,7 +109,7 @@ def test_a_reading_to_come_informs_of_one_modulus():
     one = prior_explanation(problem.prepared.board, problem.prior, np.random.default_rng(0))
     beliefs = Beliefs((SimpleNamespace(board=problem.prepared.board),), (one,))
     n = one.n_terms
-    reading = Readings((np.zeros((n, 1)),), (np.full((n, 1, 1), 0.5),), (np.full((n, 1), 0.01**2),))
+    reading = PlannedReadings((np.zeros((n, 1)),), (np.full((n, 1, 1), 0.5),), (np.full((n, 1), 0.01**2),))
     found = expected_gain(beliefs, reading, np.random.default_rng(0), n_draws=64)
     before, after = np.log(20.0) ** 2, 1.0 / (np.log(20.0) ** -2 + (0.5 / 0.01) ** 2)
 

@@ -21,7 +21,7 @@ from bayesplate.cli import main
 from bayesplate.commands.campaign_fit import fit_boards
 from bayesplate.commands.fitting import Run
 from bayesplate.errors import InputError
-from bayesplate.locks import take
+from bayesplate.locks import lock_folder
 from bayesplate.posterior import checkpoint
 from bayesplate.posterior.checkpoint import CHAINS
 from bayesplate.results.folder import OutputFolder
@@ -142,7 +142,7 @@ def test_a_folder_that_another_run_holds_is_left_as_it_is(tmp_path, arguments):
     for name in ("summary.json", "diagnosis.json", "boards.csv", "grading.html"):
         (folder / name).write_text("earlier")
     before = files_in(folder)
-    with take(folder / "checkpoint"):
+    with lock_folder(folder / "checkpoint"):
         refused = run(folder, *arguments, "--force")
         after = {name: data for name, data in files_in(folder).items() if name != "checkpoint/lock"}
 

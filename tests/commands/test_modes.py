@@ -8,7 +8,7 @@ import ritz
 import runs
 from click.testing import CliRunner
 
-from bayesplate.board.board import density, vibrating_lengths
+from bayesplate.board.board import board_density, vibrating_lengths
 from bayesplate.cli import main
 from bayesplate.commands.modes import modes
 from bayesplate.commands.prepare import prepare
@@ -55,7 +55,7 @@ def test_the_table_of_the_cantilever_board(finnish_sheet):
     (held,) = board.setups
     nominal = board.nominal()
     sides = (float(length) for length in vibrating_lengths(nominal, held))
-    material = (float(nominal["poisson_xy"]), float(density(nominal)), float(nominal["thickness"]))
+    material = (float(nominal["poisson_xy"]), float(board_density(nominal)), float(nominal["thickness"]))
     bare = ritz.Ritz(ritz.Plate(*weighted_least_squares(board).rigidities, *material, *sides, held.edges), 12)
     hertz = ritz.solve(bare, bare.stiffness).frequencies[:12]
     assert cents(np.log([mode["hz"] for mode in setup["modes"]] / hertz)) == pytest.approx(np.zeros(12), abs=0.5)

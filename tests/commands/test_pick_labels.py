@@ -9,15 +9,15 @@ from generator.sand import photograph
 from made_recordings import CARD, SENSOR, SIDES, board
 
 from bayesplate.board.board import Board
-from bayesplate.commands.pick_labels import Labels, label_peaks, pictures_of
-from bayesplate.commands.pick_words import moved_between_hits
-from bayesplate.commands.prepare import Prepared, prepare
+from bayesplate.commands.pick_labels import Labels, assign_pictures, label_peaks
+from bayesplate.commands.pick_words import moved_hit_remarks
+from bayesplate.commands.prepare import PreparedBoard, prepare
 from bayesplate.recordings.contract import LabelChance, PickedRow
-from bayesplate.recordings.picking import Picked
-from bayesplate.recordings.sand import straightened
+from bayesplate.recordings.picking import PickedModes
+from bayesplate.recordings.sand import straighten_picture
 from bayesplate.recordings.spectra import Spectra
-from bayesplate.recordings.strength import Answer
-from bayesplate.results.words import chances
+from bayesplate.recordings.strength import ModeMobility
+from bayesplate.results.words import probabilities_text
 
 CASES = {
     "both say the same: the confidence is that of sand and residues": (
@@ -46,7 +46,7 @@ PEAK = PickedRow(
 )  # fmt: skip
 
 
-def planted(material: str = "poisson_xy = 0.4") -> Prepared:
+def planted(material: str = "poisson_xy = 0.4") -> PreparedBoard:
     """The board that rings, before anything of it was read."""
     text = CARD.replace("poisson_xy = 0.4", material)
     return prepare(Board.from_text(text, "planted", may_lack_frequencies=True), may_lack_frequencies=True)
@@ -66,9 +66,9 @@ def test_a_picture_of_another_mode_or_crosswise_is_told():
     sand = [photograph(rng, board().modes.shape(m), SIDES) for m in (2, 3)]
     names = ["({},{})".format(*name) for name, _ in board().modes.names()[:4]]
 
-    shown = [straightened(picture) for picture in sand]
+    shown = [straighten_picture(picture) for picture in sand]
     labels = label_peaks(prepared.card, prepared.prior, heard(likely), None, {2: [shown[1]], 3: [shown[1]]})
-    kept, told = pictures_of(prepared.board, likely, {likely[2].hz: sand[0], 150.0: sand[1].T})
+    kept, told = assign_pictures(prepared.board, likely, {likely[2].hz: sand[0], 150.0: sand[1].T})
 
     (doubt,) = labels.doubts
     assert f"shows {names[3]}, and its frequency is that of {names[2]}: is it the picture of this peak" in doubt
@@ -97,18 +97,18 @@ def test_false_peaks_among_the_lowest_do_not_change_the_labels_of_the_others():
 HAMMERS = ((0.03, 0.02), (0.29, 0.02), (0.145, 0.19), (0.43, 0.1))
 
 
-def hit_at(given: tuple[tuple[float, float], ...]) -> Picked:
+def hit_at(given: tuple[tuple[float, float], ...]) -> PickedModes:
     """What was picked with a force, the hammer at four places of which others may be given."""
     ring = board()
     hz = ring.damped[:6]
     residues = np.stack([ring.residues(hammer, SENSOR)[:6] for hammer in HAMMERS], axis=1)
-    answers = tuple(Answer(row + 0j, np.full(4, 0.01 * np.abs(residues).max()), 1.0) for row in residues)
+    answers = tuple(ModeMobility(row + 0j, np.full(4, 0.01 * np.abs(residues).max()), 1.0) for row in residues)
     lines, n = np.linspace(0.0, 500.0, 9), np.arange(4)
     spectra = Spectra(
         lines, np.ones((9, 4), dtype=complex), np.ones((9, 4), dtype=complex), ("a", "b", "c", "d"), n, n,
         tuple((hammer, SENSOR) for hammer in given), "acceleration", 2.0,
     )  # fmt: skip
-    return Picked(tuple(replace(PEAK, hz=one, sd_hz=1e-3 * one) for one in hz), answers, spectra, (), 20.0, 500.0)
+    return PickedModes(tuple(replace(PEAK, hz=one, sd_hz=1e-3 * one) for one in hz), answers, spectra, (), 20.0, 500.0)
 
 
 def test_places_that_contradict_every_label_say_nothing_and_are_asked_about():
@@ -142,9 +142,9 @@ def test_a_peak_that_fits_none_of_the_boards_modes_is_rather_no_mode_of_it():
     assert ROW.is_likely
     assert ROW.mode_probability == pytest.approx(0.9 * 0.4)
     assert bare.mode_probability == pytest.approx(0.9)
-    assert chances(ROW.may_be(2)) == "(1,2) 35 %, (3,0) 4 %, none 60 %"
-    assert chances(replace(ROW, unlabelled_probability=0.05).may_be(1)) == "(1,2) 35 %"
-    assert chances(bare.may_be(2)) == "–"
+    assert probabilities_text(ROW.may_be(2)) == "(1,2) 35 %, (3,0) 4 %, none 60 %"
+    assert probabilities_text(replace(ROW, unlabelled_probability=0.05).may_be(1)) == "(1,2) 35 %"
+    assert probabilities_text(bare.may_be(2)) == "–"
 
 
 def test_loud_peaks_that_differ_from_hit_to_hit_ask_whether_the_hits_were_at_one_place():
@@ -152,6 +152,6 @@ def test_loud_peaks_that_differ_from_hit_to_hit_ask_whether_the_hits_were_at_one
     steady, faint = replace(unlike, damping_percent=0.01), replace(unlike, amplitude=0.02)
     moved = [replace(unlike, hz=hz) for hz in (181.0, 263.9, 283.3)]
 
-    assert moved_between_hits([ROW, *moved[:2], steady, faint], 2.0) == []
-    (told,) = moved_between_hits([ROW, *moved], 2.0)
+    assert moved_hit_remarks([ROW, *moved[:2], steady, faint], 2.0) == []
+    (told,) = moved_hit_remarks([ROW, *moved], 2.0)
     assert told.startswith("3 loud peaks ring down but are not alike from hit to hit, 181.0, 263.9, 283.3 Hz: were all")

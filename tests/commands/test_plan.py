@@ -113,7 +113,7 @@ def taken_up(tmp_path, prepared):
 
     def take(text):
         (tmp_path / "diagnosis.json").write_text(text)
-        return home._finished(tmp_path, prepared)
+        return home._read_diagnosis(tmp_path, prepared)
 
     return take
 
@@ -130,7 +130,7 @@ def test_answers_within_a_factor_ten_and_those_that_a_group_lists_survive_a_diag
 def test_a_diagnosis_of_another_card_model_or_verdict_and_one_that_was_altered_is_not_taken_up(
     taken_up, told, prepared, tmp_path
 ):
-    assert home._finished(tmp_path, prepared) is None
+    assert home._read_diagnosis(tmp_path, prepared) is None
     for other in (
         {"card_sha256": "0"},
         {"declared": ["fluid_loading"]},

@@ -11,7 +11,7 @@ import pytest
 from bayesplate.commands.diagnose import DiagnoseResult, diagnose
 from bayesplate.commands.problem import Problem
 from bayesplate.diagnosis.baseline import baseline_of
-from bayesplate.diagnosis.search import Ground, prepare_search
+from bayesplate.diagnosis.search import SearchGround, prepare_search
 from bayesplate.posterior.posing import PosedProblem
 
 N_NULL = 100
@@ -23,7 +23,7 @@ class Grounded:
     """A board's problem and the ground of its search."""
 
     problem: PosedProblem
-    ground: Ground
+    ground: SearchGround
 
 
 def grounded(name: str, tried: Sequence[str] | None = None) -> Grounded:

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from made_searches import baseline, candidate, decided, ground_of, singles, visible_of
 
-from bayesplate.diagnosis.claim import Claim, Condition, judge_claim, nested_of
-from bayesplate.diagnosis.folds import Nested, log_score, log_score_gains
-from bayesplate.diagnosis.null_control import NullControl, made_to_choose, null_control
-from bayesplate.diagnosis.search import search
-from bayesplate.diagnosis.sensitivity import varied
-from bayesplate.diagnosis.verdict import answers
+from bayesplate.diagnosis.claim import Claim, Condition, judge_claim, nested_errors_of_board
+from bayesplate.diagnosis.folds import NestedErrors, log_score, log_score_gains
+from bayesplate.diagnosis.null_control import NullControl, force_choices, null_control
+from bayesplate.diagnosis.search import run_search
+from bayesplate.diagnosis.sensitivity import vary_priors
+from bayesplate.diagnosis.verdict import rank_explanations
 
 DIRECTION = 0.05 * np.random.default_rng(2).standard_normal(9)
 CONTROL = NullControl(against=np.linspace(-3.0, 0.0, 101), ratio=np.linspace(0.4, 1.4, 101))
@@ -27,7 +27,7 @@ def searched(size: float, direction: np.ndarray = DIRECTION, n_modes: int = 9, o
     effects = {name: candidate(base, name, each) for name, each in directions}
     ground = ground_of(base, *singles(base, effects, prior=0.5 / len(effects)), candidates=effects)
     noise = 0.004 * np.random.default_rng(3).standard_normal(n_modes)
-    return search(ground, size * visible_of(effects["a"]) + noise)
+    return run_search(ground, size * visible_of(effects["a"]) + noise)
 
 
 @pytest.fixture(scope="module")
@@ -37,14 +37,14 @@ def found():
 
 def judged(found, verdict, control):
     """The claim on a board whose own readings are left out here, those that alone carry something not counted."""
-    folded = nested_of(found, control, verdict.index)
+    folded = nested_errors_of_board(found, control, verdict.index)
     return judge_claim(found, verdict, control.without(() if folded is None else folded.carried), folded)
 
 
-def folds(found, ratio: float = 0.1) -> Nested:
+def folds(found, ratio: float = 0.1) -> NestedErrors:
     """Errors of a given ratio; every fold chose the effect."""
-    told = nested_of(found, CONTROL)
-    return Nested(told.before, ratio * told.before, np.ones_like(told.chosen))
+    told = nested_errors_of_board(found, CONTROL)
+    return NestedErrors(told.before, ratio * told.before, np.ones_like(told.chosen))
 
 
 def test_an_effect_that_is_there_meets_all_of_them(found):
@@ -96,7 +96,7 @@ def test_halved_and_doubled_priors_may_refuse_the_claim(size, widest):
     Of the small one its probability is below one in twenty with the usual priors and above it with the wide ones.
     """
     one = searched(size)
-    each = {factor: varied(one, width=factor).none for factor in (0.5, 1.0, 2.0)}
+    each = {factor: vary_priors(one, width=factor).none for factor in (0.5, 1.0, 2.0)}
     assert max(each, key=each.get) == widest
     told = judged(one, replace(decided(one), index=1), CONTROL).conditions[2]
     assert told.value == pytest.approx(each[widest], rel=1e-9, abs=0.0)
@@ -119,7 +119,7 @@ def test_a_name_with_a_rival_is_no_claim_unless_the_rival_is_told_too(alike, is_
     told = judged(found, verdict, CONTROL).conditions[3]
     assert (told.name, told.limit, told.is_met) == ("probability of another", 0.05, is_met)
     assert told.value >= found.probability[2]
-    both = replace(verdict, stands_for=answers(found))
+    both = replace(verdict, stands_for=rank_explanations(found))
     assert judged(found, both, CONTROL).conditions[3].value == 0.0
 
 
@@ -152,15 +152,15 @@ def test_nothing_is_claimed_where_nothing_was_added_or_nothing_is_left_to_judge_
 def test_the_folds_of_the_board_add_an_effect_where_the_null_simulations_call_for_one(found):
     weak = searched(0.1)
     calm, loud = (replace(CONTROL, against=np.full(100, level)) for level in (-50.0, 50.0))
-    assert nested_of(weak, calm).chosen.sum() == 9
-    assert nested_of(weak, loud).chosen.sum() == 0
-    assert 0 < nested_of(weak, CONTROL).chosen.sum() < 9
+    assert nested_errors_of_board(weak, calm).chosen.sum() == 9
+    assert nested_errors_of_board(weak, loud).chosen.sum() == 0
+    assert 0 < nested_errors_of_board(weak, CONTROL).chosen.sum() < 9
 
 
 def test_modes_that_alone_carry_something_count_in_no_condition(found):
     """Not in the ratio, not in that of the null sets, not in the score; before and after by the same modes."""
     null = null_control(found.ground, np.random.default_rng(5), 100)
-    control = made_to_choose(found.ground, null)
+    control = force_choices(found.ground, null)
     spoilt = folds(found, 0.5)
     spoilt.before[0, 3] = 1.0  # without the reading that nobody else foretells the error was hundreds of cents
     assert spoilt.ratio[0] < 0.2
@@ -168,7 +168,7 @@ def test_modes_that_alone_carry_something_count_in_no_condition(found):
     kept = np.delete(np.arange(9), 3)
     after, before = (getattr(control.folded, name)[:, kept] for name in ("after", "before"))
     assert same.ratio == pytest.approx(np.sqrt((after**2).sum(axis=1) / (before**2).sum(axis=1)))
-    assert made_to_choose(found.ground, null, carried=(3,)).ratio == pytest.approx(same.ratio)
+    assert force_choices(found.ground, null, carried=(3,)).ratio == pytest.approx(same.ratio)
     gains = log_score_gains(found.ground, found.residual, np.ones(9, dtype=int))
     by_ratio, by_score, *_ = judge_claim(found, decided(found), same, folded).conditions
     assert by_ratio.value == pytest.approx(0.5)
@@ -189,8 +189,8 @@ def test_nothing_is_claimed_where_every_mode_alone_carries_something(found):
 def test_the_folds_of_the_board_do_not_count_what_carries_something():
     """By the leverages of the search: an effect that shifts one mode alone."""
     alone = searched(1.5, 0.2 * np.eye(9)[4])
-    folded = nested_of(alone, CONTROL, 1)
-    assert set(nested_of(alone, CONTROL).carried) | {4} == set(folded.carried)
+    folded = nested_errors_of_board(alone, CONTROL, 1)
+    assert set(nested_errors_of_board(alone, CONTROL).carried) | {4} == set(folded.carried)
     assert not folded.counted[0, 4]
     claim = judged(alone, replace(decided(alone), index=1), CONTROL)
     gains = log_score_gains(alone.ground, alone.residual, folded.chosen[0], folded.carried)

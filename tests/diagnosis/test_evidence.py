@@ -11,9 +11,9 @@ from made_searches import NOISE, bare, baseline, ground_of, left_out, one_level,
 from scipy.stats import multivariate_normal
 
 from bayesplate.board.parameter import Owner
-from bayesplate.diagnosis.folds import log_score, log_score_gains, nested
+from bayesplate.diagnosis.folds import log_score, log_score_gains, nested_leave_one_out
 from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.terms import NoiseGrid, Terms, noise_grid
+from bayesplate.diagnosis.terms import NoiseGrid, NormalTerms, noise_grid
 
 _REACH, _STEP = 6.0, 1.0
 """Of the grid, in standard deviations.  The trapezoidal sum of a normal density errs by 2 exp(-2 (pi / step)^2) a
@@ -64,14 +64,14 @@ def test_evidence_is_the_integral_over_constants_sizes_inputs_and_noise(case, wi
     cells = table(rng, n_cells=2)
     grid = NoiseGrid(np.array([[0.6], [1.7]]) * [s.noise.median for s in base.board.setups], np.array([0.3, 0.7]))
     residual = 0.01 * rng.standard_normal(6)
-    terms = Terms(cells, base, grid)
+    terms = NormalTerms(cells, base, grid)
     used = np.arange(6) if without is None else np.delete(np.arange(6), without)
 
     found = [terms.log_evidence(residual[None, :])[0]]
     if without is not None:  # as a reading that is left out, and as one that is no mode
         fewer = base.labelled(np.where(np.isin(np.arange(6), used), base.rows, -1))
         found = [terms.left_out(residual[None, :])[0][without, 0]]
-        found += [Terms(cells, fewer, grid).log_evidence(residual[None, :])[0]]
+        found += [NormalTerms(cells, fewer, grid).log_evidence(residual[None, :])[0]]
     expected = by_grid(base, cells, grid, residual, used)
     assert found == pytest.approx([expected] * len(found), abs=EXACT)
 
@@ -83,12 +83,12 @@ def test_few_cells_at_a_time_give_what_all_together_do(monkeypatch):
     residuals = 0.01 * rng.standard_normal((5, base.n_modes))
 
     def found():
-        terms = Terms(cells, base, noise_grid(base.board))
+        terms = NormalTerms(cells, base, noise_grid(base.board))
         return terms.log_evidence(residuals), *terms.left_out(residuals)
 
     together = found()
-    monkeypatch.setattr("bayesplate.diagnosis.terms._MOST_NUMBERS", 300)
-    assert len(list(Terms(cells, base, noise_grid(base.board))._in_parts(5))) > 2
+    monkeypatch.setattr("bayesplate.diagnosis.terms._MOST_ARRAY_ELEMENTS", 300)
+    assert len(list(NormalTerms(cells, base, noise_grid(base.board))._in_parts(5))) > 2
     for apart, whole in zip(found(), together, strict=True):
         np.testing.assert_allclose(apart, whole, rtol=1e-12)
 
@@ -116,7 +116,7 @@ def test_a_reading_that_was_left_out_is_predicted_by_refits_of_cells_and_levels_
     cells = table(rng, n_cells=3)
     grid = noise_grid(base.board)
     residual = 0.01 * rng.standard_normal(6)
-    found = Terms(cells, base, grid).left_out(residual[None, :])[1][:, 0]
+    found = NormalTerms(cells, base, grid).left_out(residual[None, :])[1][:, 0]
     for mode in (1, 4):
         used = np.delete(np.arange(6), mode)
         total, predicted = 0.0, 0.0
@@ -157,7 +157,7 @@ def test_of_several_sessions_a_mode_is_left_out_with_all_its_readings(days):
         mode = [i, (i + 6) % 12]
         without = refitted_without(base, mode, residual, nothing_added, NOISE)
         assert found[i] == pytest.approx(without[0], abs=1e-12)
-    assert nested(ground, residual[None, :]).before[0] == pytest.approx(found, abs=1e-12)
+    assert nested_leave_one_out(ground, residual[None, :]).before[0] == pytest.approx(found, abs=1e-12)
     alone = refitted_without(base, 2, residual, nothing_added, NOISE)
     assert abs(found[2]) > abs(alone) + 1e-3
 

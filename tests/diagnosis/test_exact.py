@@ -13,7 +13,7 @@ from bayesplate.board.material import RIGIDITIES
 from bayesplate.diagnosis import sensitivity
 from bayesplate.diagnosis.draws import draw_terms
 from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.search import search
+from bayesplate.diagnosis.search import run_search
 from bayesplate.diagnosis.sensitivity import (
     draw_constants,
     draw_exact,
@@ -21,7 +21,7 @@ from bayesplate.diagnosis.sensitivity import (
     log_weights_of,
     under_exact_law,
 )
-from bayesplate.diagnosis.shifts import together
+from bayesplate.diagnosis.shifts import combine_cells
 
 NOISE = 0.01
 BEND = 4.0
@@ -64,7 +64,7 @@ def found():
         one = candidate(base, name, direction)
         candidates[name] = replace(one, laws=(BentLaw(one.laws[0].form, base, direction),))
     every = singles(base, candidates, levels, 0.2)
-    return search(ground_of(base, *every, candidates=candidates), 0.015 * rng.standard_normal(6))
+    return run_search(ground_of(base, *every, candidates=candidates), 0.015 * rng.standard_normal(6))
 
 
 def quadrature(found, law):
@@ -146,10 +146,10 @@ def test_draws_that_are_no_plate_by_the_exact_law_count_for_nothing(found, off):
 def test_two_effects_add_at_the_constants_of_a_draw(found):
     base, names = found.ground.baseline, ("a", "b")
     effects = [found.ground.candidates[name] for name in names]
-    both = together(*(one.coarse for one in effects))
+    both = combine_cells(*(one.coarse for one in effects))
     pair = Hypothesis(names, 0.1, both, found.ground.hypotheses[0].noise, base)
     ground = replace(found.ground, hypotheses=(*found.ground.hypotheses, pair))
-    with_pair = search(ground, found.residual)
+    with_pair = run_search(ground, found.residual)
     drawn = draw_terms(with_pair, 3, np.random.default_rng(4), 200)
     expected = bent(base)(drawn.log_rigidities)
     for member, one in enumerate(effects):

@@ -21,24 +21,24 @@ from made_searches import (
 )
 from made_summaries import SUMMARY, mode
 
-from bayesplate.board.parameter import BOARD, Parameter
+from bayesplate.board.parameter import BOARD_OWNER, Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.commands.shown import show_diagnosis
 from bayesplate.diagnosis import sensitivity
 from bayesplate.diagnosis.claim import Claim, Condition
 from bayesplate.diagnosis.entries import effect_entry, exchange_entries, fate_of
-from bayesplate.diagnosis.findings import Case, Side, _nearest_sentence, diagnosis_of
-from bayesplate.diagnosis.folds import Nested, log_score, nested
+from bayesplate.diagnosis.findings import Case, FittedModel, _nearest_sentence, diagnosis_of
+from bayesplate.diagnosis.folds import NestedErrors, log_score, nested_leave_one_out
 from bayesplate.diagnosis.hypotheses import RELABELLING, Swap, probabilities
 from bayesplate.diagnosis.null_control import NullControl, null_control
 from bayesplate.diagnosis.result import Diagnosis, EffectEntry, diagnosis_json
-from bayesplate.diagnosis.search import SearchResult, search
+from bayesplate.diagnosis.search import SearchResult, run_search
 from bayesplate.diagnosis.terms import noise_grid
-from bayesplate.diagnosis.verdict import Answer, answers
+from bayesplate.diagnosis.verdict import Explanation, rank_explanations
 from bayesplate.diagnosis.words import verdict_sentence, verdict_sentences, warnings
 from bayesplate.effects import EFFECTS
 from bayesplate.estimates.leave_one_out import CarryingMode, indices_of
-from bayesplate.report.verdict import diagnosis_section, quoted
+from bayesplate.report.verdict import diagnosis_section, quoted_summary
 from bayesplate.results.contract import Elastic, json_text
 
 SHEAR, AIR, GRAIN = NAMES = ("transverse_shear", "fluid_loading", "grain_angle")
@@ -63,7 +63,7 @@ def made(probability, **changed) -> SearchResult:
 
 
 def entries(found: SearchResult) -> dict[str, EffectEntry]:
-    verdict, ranked = decided(found), answers(found)
+    verdict, ranked = decided(found), rank_explanations(found)
     told = [effect_entry(found, verdict, ranked, one, 0.5) for one in found.ground.candidates.values()]
     return {one.name: one for one in told} | {RELABELLING: exchange_entries(found, verdict, ranked)[0]}
 
@@ -74,12 +74,18 @@ def draws_of(predictive: np.ndarray, E_x: float = 10e9) -> SimpleNamespace:
     return SimpleNamespace(predictive=predictive, **every)
 
 
-def case_of(found: SearchResult, control: NullControl, folded: Nested | None, **changed) -> Case:
+def case_of(found: SearchResult, control: NullControl, folded: NestedErrors | None, **changed) -> Case:
     verdict = decided(found)
     readings = np.concatenate([setup.measured for setup in found.ground.baseline.board.setups])
     draws = draws_of(readings * np.linspace(0.99, 1.01, 21)[None, :, None])
-    after = Side(verdict.index, MOVED, draws, readings) if verdict.index else Side(0, FIGURES, draws, readings)
-    case = Case(found, verdict, control, folded, Side(0, FIGURES, draws, readings), after, Claim(), "Measure on.")
+    after = (
+        FittedModel(verdict.index, MOVED, draws, readings)
+        if verdict.index
+        else FittedModel(0, FIGURES, draws, readings)
+    )
+    case = Case(
+        found, verdict, control, folded, FittedModel(0, FIGURES, draws, readings), after, Claim(), "Measure on."
+    )
     return replace(case, **changed)
 
 
@@ -91,9 +97,9 @@ def control_of(found: SearchResult, to_beat: float) -> NullControl:
     return NullControl(np.linspace(-5.0, 1.0, n), np.full(n, to_beat))
 
 
-def folds_of(found: SearchResult, ratio: float) -> Nested:
+def folds_of(found: SearchResult, ratio: float) -> NestedErrors:
     errors = 0.01 * np.ones((1, found.ground.baseline.n_modes))
-    return Nested(errors, ratio * errors, np.ones(errors.shape, dtype=np.intp))
+    return NestedErrors(errors, ratio * errors, np.ones(errors.shape, dtype=np.intp))
 
 
 def test_what_became_of_each_candidate_of_a_named_effect():
@@ -118,7 +124,7 @@ def test_less_probable_is_only_what_is_so_and_would_fit():
         "less probable", "less probable (0.100) than transverse shear (0.600)",
     )  # fmt: skip
     assert told[RELABELLING].rejected_because.startswith("with it alone the misfit is still too large (p < 0.001); ")
-    alike = fate_of(quiet, replace(decided(quiet), effects=()), answers(quiet), SHEAR, 1)
+    alike = fate_of(quiet, replace(decided(quiet), effects=()), rank_explanations(quiet), SHEAR, 1)
     assert alike == ("less probable", "no more probable (0.600) than transverse shear (0.600)")
 
 
@@ -141,7 +147,7 @@ def test_only_the_exchange_that_the_verdict_stands_for_is_in_it():
     shares = np.array([*found.probability, 0.01])
     ground = replace(ground, hypotheses=(*ground.hypotheses, more))
     found = SearchResult(ground, found.residual, np.log(shares + 1e-300), shares)
-    verdict, ranked = decided(found), answers(found)
+    verdict, ranked = decided(found), rank_explanations(found)
     assert verdict.effects == (SHEAR, RELABELLING)
     assert [one.fate for one in exchange_entries(found, verdict, ranked)] == ["in the verdict", "does not fit"]
     told = diagnosis_of(case_of(found, control_of(found, 0.5), folds_of(found, 0.25)))
@@ -172,7 +178,7 @@ def test_the_constants_to_quote_are_averaged_and_never_those_of_one_member(monke
 def test_a_size_that_the_card_fixes_is_shown():
     found = made(NAMED)
     one = found.ground.candidates[AIR]
-    fixed = Parameter("density", BOARD, Quantity.exact(1.2), "kg/m^3", 0.0, effect=AIR)
+    fixed = Parameter("density", BOARD_OWNER, Quantity.exact(1.2), "kg/m^3", 0.0, effect=AIR)
     board = replace(one.laws[0].form.board, parameters=(fixed,))
     law = replace(one.laws[0], form=replace(one.laws[0].form, free=(), board=board))
     ground = replace(found.ground, candidates={**found.ground.candidates, AIR: replace(one, laws=(law,))})
@@ -221,7 +227,7 @@ def test_what_the_width_of_a_prior_costs_and_how_far_a_size_left_it():
     Readings far out move the size; readings of large noise leave it where its prior has it.
     """
     made_up = made(NAMED)
-    found = search(made_up.ground, made_up.residual)
+    found = run_search(made_up.ground, made_up.residual)
     table, one = found.ground.candidates[SHEAR].fine, found.ground.hypotheses[1]
     log_terms = one.terms.log_densities(found.residual[None, :])[:, 0]
     after = np.exp(log_terms.reshape(one.noise.weights.size, table.n_cells)).sum(axis=0)
@@ -242,7 +248,7 @@ def named() -> Case:
 
 
 def test_a_named_effect_that_was_refitted(named):
-    answer = answers(named.found)[0]
+    answer = rank_explanations(named.found)[0]
     told = diagnosis_of(replace(named, finalists=[(answer, replace(named.after, index=answer.index, summary=MOVED))]))
     assert (told.verdict, told.effects, told.refitted) == ("named", (SHEAR,), (SHEAR,))
     assert told.sentences == (EFFECTS[SHEAR].sentence,)
@@ -280,7 +286,7 @@ def test_readings_outside_their_band_are_counted(named):
 def test_what_comes_nearest_is_told_though_it_is_not_enough(members):
     """Effects may be declared, beside what is declared already and once no reading looks wrong; an exchange may not."""
     found = made({members: 0.99, (): 0.01})
-    (nearest, *_), base = answers(found), found.ground.baseline
+    (nearest, *_), base = rank_explanations(found), found.ground.baseline
     case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25))
     case = replace(case, finalists=[(nearest, replace(case.after, index=nearest.index, summary=MOVED))])
     assert (case.verdict.word, case.verdict.nearest) == ("unexplained", nearest)
@@ -301,8 +307,8 @@ def judged(n_modes: int) -> tuple[SearchResult, Diagnosis]:
     """The whole road of a diagnosis without a refit, on readings that are nothing but noise."""
     found = made({}, n_modes=n_modes)
     rng = np.random.default_rng(4)
-    found = search(found.ground, NOISE * rng.standard_normal(n_modes))
-    folded = nested(found.ground, found.residual[None, :])
+    found = run_search(found.ground, NOISE * rng.standard_normal(n_modes))
+    folded = nested_leave_one_out(found.ground, found.residual[None, :])
     return found, diagnosis_of(case_of(found, null_control(found.ground, rng, 40), folded))
 
 
@@ -356,7 +362,7 @@ def test_a_misfit_beyond_all_doubt_has_odds():
 def test_a_board_that_declares_every_effect_has_no_odds():
     base = baseline(np.random.default_rng(1))
     ground = ground_of(base, bare(base, noise_grid(base.board), 1.0))
-    found = search(ground, 0.003 * np.random.default_rng(2).standard_normal(6))
+    found = run_search(ground, 0.003 * np.random.default_rng(2).standard_normal(6))
     control = null_control(ground, np.random.default_rng(3), 100, found.against_none)
     told = diagnosis_of(case_of(found, control, folds_of(found, 1.0)))
     assert (told.verdict, told.null_control.log_odds, told.gain_null_percentile) == ("none needed", None, None)
@@ -372,7 +378,7 @@ def test_two_effects_that_are_one_alternative_stay_together():
 
 
 def test_two_effects_come_nearest_where_one_comes_nearest(named):
-    told = _nearest_sentence(named, Answer((SHEAR, AIR), 1, 0.9), MOVED)
+    told = _nearest_sentence(named, Explanation((SHEAR, AIR), 1, 0.9), MOVED)
     assert told.startswith("Transverse shear and fluid loading come nearest: with them the error goes from")
     assert 'Declare them, effects = ["transverse_shear", "fluid_loading"],' in told
 
@@ -384,7 +390,7 @@ def test_what_is_named_in_part_stands_beside_the_word_unexplained_and_nothing_is
     """The best answer fails the gate, and was fitted again; without a part the model stays as it was."""
     found = made(UNEXPLAINED, residual=np.array([0.2, -0.2, 0.15, 0.1, -0.3, 0.2]))
     case = case_of(found, control_of(found, 0.4), folds_of(found, 0.5))
-    after = Side(1, MOVED, case.before.draws, case.before.measured)
+    after = FittedModel(1, MOVED, case.before.draws, case.before.measured)
     case = replace(case, after=after, finalists=[(case.verdict.nearest, after)], in_part=(SHEAR,))
     assert case.verdict.tried == 1
     told, whole = diagnosis_of(case), diagnosis_of(replace(case, after=case.before, in_part=()))
@@ -405,7 +411,7 @@ def test_what_is_named_in_part_stands_beside_the_word_unexplained_and_nothing_is
     assert section.heading == "Part of what is missing was found"
     assert any(one.startswith("Named in part: transverse shear") for one in section.sentences)
     assert "The model does not explain the readings" in warnings(told)[0]
-    assert quoted(MOVED, told).error.in_sample_rms_cents == 4.25
+    assert quoted_summary(MOVED, told).error.in_sample_rms_cents == 4.25
     assert whole.before == whole.after
     assert "in part" not in verdict_sentence(whole)
     assert diagnosis_section(whole).heading == "Something is missing that was not found"

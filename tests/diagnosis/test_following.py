@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesplate.diagnosis.laws import Following
+from bayesplate.diagnosis.laws import FollowedShapes
 from bayesplate.plate.reduced import ReducedClass
 from bayesplate.plate.terms import Parity, Weights
 
@@ -32,7 +32,7 @@ def modes() -> ReducedClass:
 )
 def test_a_mode_is_followed_at_the_plate_itself_beyond_a_crossing_and_at_no_plate(groups, crossed):
     without = Weights(np.array([[1.0, 0.0]]), np.array([[1.0]]))
-    following = Following.of(modes(), without, np.array((0, 1, 2)), tuple(np.array(group) for group in groups))
+    following = FollowedShapes.of(modes(), without, np.array((0, 1, 2)), tuple(np.array(group) for group in groups))
     found = following.eigenvalues(Weights(np.array([[1.0, 0.0], [1.0, 7.0], [-9.0, 0.0]]), np.ones((3, 1))))
     np.testing.assert_allclose(found[:2], [[1.0, 4.0, 9.0], crossed], rtol=1e-12)
     assert np.isnan(found[2]).all()

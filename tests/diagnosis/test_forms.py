@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from bayesplate.board.attached import AttachedItem
-from bayesplate.board.board import made_board
-from bayesplate.board.parameter import BOARD
+from bayesplate.board.board import make_board
+from bayesplate.board.parameter import BOARD_OWNER
 from bayesplate.commands.prepare import prepare
 from bayesplate.diagnosis.forms import forms, with_forms
-from bayesplate.diagnosis.shifts import COARSE, FINE, cells_along
+from bayesplate.diagnosis.shifts import COARSE_CELLS, FINE_CELLS, cells_along
 from bayesplate.effects import EFFECTS, effects_of
 
 
@@ -82,8 +82,8 @@ def test_two_setups_masses_are_two(board):
     (setup,) = board.setups
     thing = AttachedItem("weight", ((0.2, 0.05),))
     held = tuple(replace(setup, name=name, attached=(thing,), clamped={}) for name in ("first", "second"))
-    inputs = {one.key: one.prior for one in board.parameters if one.owner == BOARD}
-    both = forms(made_board("two", inputs, held))
+    inputs = {one.key: one.prior for one in board.parameters if one.owner == BOARD_OWNER}
+    both = forms(make_board("two", inputs, held))
     names = {name: {free.name for free in every[0].free} for name, every in both.items()}
     assert names["attached_mass"] == {"attached_mass.mass[first]", "attached_mass.mass[second]"}
     assert names["thickness_profile"] == {"thickness_profile.taper_x", "thickness_profile.taper_y"}
@@ -102,5 +102,5 @@ def test_readings_at_places_are_tried_as_the_components_that_they_leave_open():
 
 
 def test_a_table_stays_small_whatever_the_number_of_parameters():
-    assert [cells_along(n, FINE) for n in (1, 2, 3, 5, 20)] == [33, 11, 6, 3, 1]
-    assert [cells_along(n, COARSE) for n in (1, 2, 3, 5, 20)] == [9, 5, 3, 1, 1]
+    assert [cells_along(n, FINE_CELLS) for n in (1, 2, 3, 5, 20)] == [33, 11, 6, 3, 1]
+    assert [cells_along(n, COARSE_CELLS) for n in (1, 2, 3, 5, 20)] == [9, 5, 3, 1, 1]

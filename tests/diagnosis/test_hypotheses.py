@@ -21,19 +21,19 @@ from made_searches import (
 from bayesplate.board.attached import AttachedItem
 from bayesplate.board.quantity import Quantity
 from bayesplate.commands.prepare import prepare
-from bayesplate.diagnosis.folds import nested
+from bayesplate.diagnosis.folds import nested_leave_one_out
 from bayesplate.diagnosis.forms import with_labels_exchanged
 from bayesplate.diagnosis.hypotheses import (
     RELABELLING,
     Hypothesis,
     Swap,
     are_stated,
-    confusable,
-    hypotheses,
+    confusable_labels,
     log_evidences,
+    make_hypotheses,
     probabilities,
 )
-from bayesplate.diagnosis.shifts import nothing, together
+from bayesplate.diagnosis.shifts import combine_cells, no_effect_cells
 from bayesplate.diagnosis.terms import noise_grid
 
 CLOSE_PAIR = [(0, 0), (1, 1), (0, 0), (0, 0), (1, 1), (0, 0)]
@@ -46,13 +46,13 @@ def base():
 
 def swap_of(base, first, second, prior=0.5):
     swap = Swap(first, second)
-    return Hypothesis((RELABELLING,), prior, nothing(base.n_modes), one_level(base), swap.applied(base), swap)
+    return Hypothesis((RELABELLING,), prior, no_effect_cells(base.n_modes), one_level(base), swap.applied(base), swap)
 
 
 def test_prior_shares(base):
     rng = np.random.default_rng(2)
     fine = {name: table(rng) for name in "abc"}
-    found = hypotheses(base, fine, fine, ["a", "c"])
+    found = make_hypotheses(base, fine, fine, ["a", "c"])
     kinds = ["swap" if one.swap else len(one.members) for one in found]
     shares = {kind: sum(one.prior for one, other in zip(found, kinds, strict=True) if other == kind) for kind in kinds}
     assert found[0].members == ()
@@ -84,7 +84,7 @@ def test_a_stated_pair_has_the_prior_of_a_single_effect(base):
     item = AttachedItem("exciter", (), Quantity.exact(0.048))
     board = replace(base.board, setups=(replace(setup, attached=(item,)),))
     fine = {name: table(rng) for name in (AIR, EXCITER, TENSION)}
-    priors = {one.members: one.prior for one in hypotheses(replace(base, board=board), fine, fine, list(fine))}
+    priors = {one.members: one.prior for one in make_hypotheses(replace(base, board=board), fine, fine, list(fine))}
     assert priors[AIR, EXCITER] == priors[AIR,]
     assert priors[AIR, TENSION] == priors[EXCITER, TENSION] == pytest.approx(0.1 / 3)
 
@@ -92,7 +92,7 @@ def test_a_stated_pair_has_the_prior_of_a_single_effect(base):
 def test_two_effects_add(base):
     rng = np.random.default_rng(3)
     one, other = table(rng, n_cells=2), table(rng, n_cells=3, n_tangents=2)
-    both = together(one, other)
+    both = combine_cells(one, other)
     assert both.parts == (one, other)
     assert both.weights.sum() == pytest.approx(1.0)
     for i in range(2):
@@ -106,16 +106,16 @@ def test_two_effects_add(base):
 
 
 def test_only_close_neighbours_of_different_symmetry_may_be_exchanged(base):
-    assert confusable(base) == (Swap(0, 1), Swap(1, 2), Swap(3, 4), Swap(4, 5))
+    assert confusable_labels(base) == (Swap(0, 1), Swap(1, 2), Swap(3, 4), Swap(4, 5))
     near, apart = (baseline(np.random.default_rng(1), parities=CLOSE_PAIR, spacing=one) for one in (0.115, 0.125))
-    assert len(confusable(near)) == 4
-    assert confusable(apart) == ()
+    assert len(confusable_labels(near)) == 4
+    assert confusable_labels(apart) == ()
 
 
 def test_neighbours_of_one_class_that_stand_in_the_other_order_may_be_confused(base):
     """The third and fourth readings are of one class: only where they have crossed is there something to exchange."""
     crossed = base.log_frequency[[0, 1, 3, 2, 4, 5]] - base.log_frequency
-    assert Swap(3, 2) in confusable(with_residual(base, crossed))
+    assert Swap(3, 2) in confusable_labels(with_residual(base, crossed))
 
 
 def test_exchanging_twice_changes_nothing_and_once_takes_each_reading_for_the_other_mode(base):
@@ -146,10 +146,10 @@ def test_every_fold_that_can_see_an_exchange_makes_it_and_none_where_labels_are_
     straight = 1e-4 * np.random.default_rng(6).standard_normal((1, 6))
     swap = swap_of(base, 3, 4)
     ground = ground_of(base, bare(base, noise_grid(base.board)), swap)
-    mixed = nested(ground, exchanged(base, swap.swap, straight.copy()))
+    mixed = nested_leave_one_out(ground, exchanged(base, swap.swap, straight.copy()))
     assert (mixed.chosen[0, [0, 1, 2, 5]] == 1).all()
     assert mixed.ratio[0] < 0.1
-    assert (nested(ground, straight).chosen == 0).all()
+    assert (nested_leave_one_out(ground, straight).chosen == 0).all()
 
 
 def test_a_reading_takes_its_own_error_along_to_the_other_label(base):

@@ -10,9 +10,9 @@ from made_searches import baseline, candidate, decided, found_among, singles
 
 from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis import claim
-from bayesplate.diagnosis.claim import named_in_part
-from bayesplate.diagnosis.folds import Nested
-from bayesplate.diagnosis.search import PASSES, SearchResult
+from bayesplate.diagnosis.claim import effects_named_in_part
+from bayesplate.diagnosis.folds import NestedErrors
+from bayesplate.diagnosis.search import LEAST_P_VALUE, SearchResult
 
 N_MODES = 8
 SIZE = Quantity.from_median(1.0, 1.5)
@@ -31,9 +31,9 @@ def made(none=1e-6, rival=0.0, rest=0.1, prior=SIZE, planted=1.0) -> SearchResul
     return found_among(base, effects, singles(base, effects, prior=0.2), shares, residual)
 
 
-def folded(ratio: float) -> Nested:
+def folded(ratio: float) -> NestedErrors:
     before = 0.05 * np.ones((1, N_MODES))
-    return Nested(before, ratio * before, np.ones((1, N_MODES), dtype=int))
+    return NestedErrors(before, ratio * before, np.ones((1, N_MODES), dtype=int))
 
 
 LIMITS = [
@@ -59,26 +59,26 @@ def test_each_limit_of_what_is_named_in_part(changed, ratio, rival_elsewhere, is
     verdict = decided(found)
     assert (verdict.word, verdict.effects, verdict.index) == ("unexplained", (), 0)
     others = [] if rival_elsewhere is None else [("with another noise", made(rival=rival_elsewhere))]
-    assert named_in_part(found, verdict, folded(ratio), others) == (("a",) if is_named else ())
+    assert effects_named_in_part(found, verdict, folded(ratio), others) == (("a",) if is_named else ())
 
 
 def test_what_passes_the_gate_is_named_and_not_in_part():
     found = made(rest=0.0)
     assert decided(found).word == "named"
     gated = replace(decided(made()), best=decided(found).best)  # were the word unexplained for another reason
-    assert found.p_value(1) >= PASSES
+    assert found.p_value(1) >= LEAST_P_VALUE
     for verdict in (decided(found), gated):
-        assert named_in_part(found, verdict, folded(0.5), ()) == ()
+        assert effects_named_in_part(found, verdict, folded(0.5), ()) == ()
 
 
 def test_the_usual_variants_are_asked_where_none_are_given(monkeypatch):
     found = made()
-    assert named_in_part(found, decided(found), folded(0.5), None) == ("a",)
-    monkeypatch.setattr(claim, "variants", lambda found: iter([("with other priors", made(rival=0.26))]))
-    assert named_in_part(found, decided(found), folded(0.5), None) == ()
+    assert effects_named_in_part(found, decided(found), folded(0.5), None) == ("a",)
+    monkeypatch.setattr(claim, "variant_searches", lambda found: iter([("with other priors", made(rival=0.26))]))
+    assert effects_named_in_part(found, decided(found), folded(0.5), None) == ()
 
 
 def test_a_verdict_that_is_not_unexplained_has_no_part():
     found = made()
     idle = replace(decided(found), is_needed=False)
-    assert named_in_part(found, idle, folded(0.5), ()) == ()
+    assert effects_named_in_part(found, idle, folded(0.5), ()) == ()

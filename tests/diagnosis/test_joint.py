@@ -19,9 +19,9 @@ from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.draws import draw_terms
 from bayesplate.diagnosis.forms import forms
 from bayesplate.diagnosis.joint import with_joint_pairs
-from bayesplate.diagnosis.search import PASSES, prepare_search, search
+from bayesplate.diagnosis.search import LEAST_P_VALUE, prepare_search, run_search
 from bayesplate.diagnosis.sensitivity import exact_log_frequencies
-from bayesplate.diagnosis.shifts import joint_law, joint_table, together
+from bayesplate.diagnosis.shifts import combine_cells, joint_law, joint_table
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import full_log_frequencies, setup_model
 from bayesplate.frequencies.system import system_of
@@ -41,7 +41,7 @@ def ground():
 @pytest.fixture(scope="module")
 def solved(ground):
     """The search, its ground with the pair solved together, and which hypothesis that is."""
-    found = search(ground)
+    found = run_search(ground)
     index = next(i for i, one in enumerate(ground.hypotheses) if set(one.members) == PAIR)
     return found, with_joint_pairs(found, ground), index
 
@@ -60,7 +60,7 @@ def test_a_pair_is_found_of_which_neither_alone_lowers_the_misfit(solved):
     changed = [i for i, one in enumerate(both.hypotheses) if one is not ground.hypotheses[i]]
     assert changed == [i for i, one in enumerate(both.hypotheses) if one.joint] == [index]
     assert with_joint_pairs(found, both) is both  # once is enough
-    verdict = decided(search(both))
+    verdict = decided(run_search(both))
     assert (verdict.word, set(verdict.effects)) == ("named", PAIR)
 
 
@@ -78,7 +78,7 @@ def test_both_at_once_are_a_full_solve_of_both(solved):
     place, law = next(iter(ground.hypotheses[index].joint.items()))
     base = ground.baseline
     one, other = (ground.candidates[name] for name in members)
-    added = together(one.coarse, other.coarse)
+    added = combine_cells(one.coarse, other.coarse)
     table = joint_table(base, added, {place: law})
     first, second = np.divmod(np.arange(table.n_cells), other.coarse.n_cells)
     at = np.hstack([one.coarse.z[first], other.coarse.z[second]])
@@ -99,8 +99,8 @@ def test_both_at_once_are_a_full_solve_of_both(solved):
 
 def test_draws_of_a_pair_that_was_solved_have_its_law(solved):
     found, ground, index = solved
-    drawn = draw_terms(search(ground), index, np.random.default_rng(1), 8)
-    exact = exact_log_frequencies(search(ground), index, drawn)
+    drawn = draw_terms(run_search(ground), index, np.random.default_rng(1), 8)
+    exact = exact_log_frequencies(run_search(ground), index, drawn)
     apart = exact_log_frequencies(found, index, drawn)
     base = ground.baseline
     first, second = (ground.candidates[name].coarse for name in ground.hypotheses[index].members)
@@ -135,9 +135,9 @@ def test_only_plausible_pairs_are_solved_together(solved, monkeypatch):
     quiet, loud = np.zeros(found.residual.size), np.random.default_rng(1).choice([-0.2, 0.2], found.residual.size)
     for share, pairs in ((0.049, []), (0.051, [index])):
         told, solved_pairs = asked(quiet, share)
-        assert (told.p_value(0) >= PASSES, solved_pairs) == (True, pairs)
+        assert (told.p_value(0) >= LEAST_P_VALUE, solved_pairs) == (True, pairs)
     told, solved_pairs = asked(loud, 0.049)
-    assert told.p_value(0) < PASSES  # the sum of shifts may be why
+    assert told.p_value(0) < LEAST_P_VALUE  # the sum of shifts may be why
     assert (index in solved_pairs, len(solved_pairs)) == (True, 3)
 
 

@@ -11,12 +11,12 @@ from generator.boards import plant
 from scipy.stats import chi2
 
 from bayesplate.board.material import RIGIDITIES, moduli
-from bayesplate.board.parameter import BOARD, Owner
+from bayesplate.board.parameter import BOARD_OWNER, Owner
 from bayesplate.board.quantity import Quantity
 from bayesplate.commands.problem import Problem
 from bayesplate.diagnosis import known
 from bayesplate.diagnosis.known import (
-    every_combination,
+    known_combinations,
     known_effects,
     known_fit,
     known_fits,
@@ -124,32 +124,32 @@ def test_sizes_are_fixed_at_their_medians_and_all_else_is_left(fiemme):
     }
     assert {name: sized.inputs[name] for name in broad.inputs} == broad.inputs
     assert {one.owner for one in sized.parameters if one.effect == AIR} == {Owner("setup", "clamped")}
-    assert {one.owner for one in sized.parameters if one.effect == SHEAR} == {BOARD}
+    assert {one.owner for one in sized.parameters if one.effect == SHEAR} == {BOARD_OWNER}
 
 
 def test_every_combination_is_computed_whatever_is_declared(fiemme):
     for declared in [(), (SHEAR,), (AIR, SHEAR)]:
         board = replace(fiemme.board, effects=declared)
         assert known_effects(board) == (SHEAR, AIR)
-        assert every_combination(board) == [(), (SHEAR,), (AIR,), (SHEAR, AIR)]
+        assert known_combinations(board) == [(), (SHEAR,), (AIR,), (SHEAR, AIR)]
 
 
 def test_an_exciter_of_stated_mass_is_known_and_stated_though_an_empty_list_declares_nothing():
     board = Problem.from_card(FIEMME).prepared.board
     assert board.effects == ()
     assert (known_effects(board), stated_effects(board)) == ((SHEAR, AIR, "exciter"), ("exciter",))
-    assert len(every_combination(board)) == 2**3
+    assert len(known_combinations(board)) == 2**3
 
 
 def test_four_known_effects_are_combined_by_up_to_three_and_all_where_the_card_states_them(fiemme, monkeypatch):
     names = (MASS, "exciter", SHEAR, AIR)
     monkeypatch.setattr(known, "known_effects", lambda _: names)
     monkeypatch.setattr(known, "stated_effects", lambda _: names[:2])
-    found = every_combination(fiemme.board)
+    found = known_combinations(fiemme.board)
     assert [len(one) for one in found] == [0] + 4 * [1] + 6 * [2] + 4 * [3]
     assert len(set(found)) == len(found)
     monkeypatch.setattr(known, "stated_effects", lambda _: names)
-    assert every_combination(fiemme.board) == [*found, names]
+    assert known_combinations(fiemme.board) == [*found, names]
 
 
 def test_a_sensor_of_stated_mass_is_shown_by_leaving_it_out(tmp_path, monkeypatch):
@@ -229,7 +229,7 @@ def test_modes_that_lie_close_keep_their_names_from_one_model_to_the_next():
     """On this board air brings two modes so close that their shapes would exchange names."""
     problem = Problem.from_card("spruce-free-3L").posed
     board = with_combination(problem.board, (AIR,))
-    (solved,) = known._solved(problem, board, board.nominal(), np.log(problem.estimate.rigidities) + MOVED)
+    (solved,) = known._solve_models(problem, board, board.nominal(), np.log(problem.estimate.rigidities) + MOVED)
     (before,) = problem.posterior.models
     assert [(one.parity, one.rank) for one in solved.places] == [(one.parity, one.rank) for one in before.places]
     constants = dict(zip(RIGIDITIES, problem.estimate.rigidities * np.exp(MOVED), strict=True))

@@ -14,7 +14,7 @@ from made_searches import baseline
 from bayesplate.diagnosis.known import KnownFit
 from bayesplate.diagnosis.known_words import known_models, known_sentence, known_table
 from bayesplate.diagnosis.tables import write_diagnosis_tables
-from bayesplate.estimates.leave_one_out import Errors, Leverages
+from bayesplate.estimates.leave_one_out import Leverages, PredictionErrors
 from bayesplate.results.tables import render
 
 CENTS = np.log(2.0) / 1200.0
@@ -26,7 +26,7 @@ RISE = "Where the error rises, something that acts the other way is lacking"
 def test_what_is_told_of_a_fit_by_hand():
     def fit(effects, moduli, in_sample, left_out):
         nobody = Leverages(np.zeros(2), np.full(2, -1))
-        errors = Errors(*(CENTS * np.array(one) for one in (in_sample, left_out)), nobody)
+        errors = PredictionErrors(*(CENTS * np.array(one) for one in (in_sample, left_out)), nobody)
         return KnownFit(effects, effects, (), baseline(np.random.default_rng(1), 2), np.array(moduli), errors)
 
     first = fit((), [10e9, 1e9, 0.5e9], [3.0, -4.0], [6.0, 8.0])

@@ -7,9 +7,9 @@ import pytest
 from made_searches import baseline, candidate, found_among, singles
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.diagnosis.folds import carrying
+from bayesplate.diagnosis.folds import find_carrying_modes
 from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.shifts import together
+from bayesplate.diagnosis.shifts import combine_cells
 from bayesplate.diagnosis.terms import noise_grid
 
 WIDE = Quantity.from_mean(0.0, 1.0, "normal")
@@ -22,7 +22,7 @@ def found():
     base = baseline(np.random.default_rng(1), N_MODES, n_inputs=0)
     levels = noise_grid(base.board)
     effects = {name: candidate(base, name, 0.2 * np.eye(N_MODES)[mode], WIDE) for name, mode in (("a", 4), ("b", 6))}
-    both = together(effects["a"].coarse, effects["b"].coarse)
+    both = combine_cells(effects["a"].coarse, effects["b"].coarse)
     every = [*singles(base, effects), Hypothesis(("a", "b"), 0.1, both, levels, base)]
     return found_among(base, effects, every, [0.25] * 4, np.zeros(N_MODES))
 
@@ -41,7 +41,7 @@ def test_they_are_those_of_linear_regression(found, index, modes):
     """Those without the effect are among them: before and after are judged by the same modes."""
     labels = [str(label) for label in found.ground.baseline.board.setups[0].labels]
     wanted = {labels[i] for i in np.flatnonzero((hat(found) > 0.9) | (hat(found, *modes) > 0.9))}
-    told = carrying(found, index)
+    told = find_carrying_modes(found, index)
     assert {one.label for one in told} == wanted
     assert {labels[mode] for mode in modes} <= wanted
     by_label = {one.label: one for one in told}

@@ -14,8 +14,8 @@ from bayesplate.commands.prepare import prepare
 from bayesplate.diagnosis.entries import effect_entry
 from bayesplate.diagnosis.search import predictive_p_value
 from bayesplate.diagnosis.signatures import Signature, acts_both_ways, look_alikes, signatures
-from bayesplate.diagnosis.sizes import at_limit
-from bayesplate.diagnosis.verdict import answers
+from bayesplate.diagnosis.sizes import size_at_limit
+from bayesplate.diagnosis.verdict import rank_explanations
 from bayesplate.effects import declare, effects_of
 from bayesplate.posterior.posing import pose
 
@@ -38,7 +38,7 @@ def found_of(base, directions, probability, residual, prior=HALF_NORMAL, n_cells
 
 def entry_of(found):
     """What diagnosis.json says of a candidate."""
-    return effect_entry(found, decided(found), answers(found), found.ground.candidates[A], 0.0)
+    return effect_entry(found, decided(found), rank_explanations(found), found.ground.candidates[A], 0.0)
 
 
 @pytest.mark.parametrize("index", [0, 1], ids=["the bare model", "the winner"])
@@ -69,7 +69,7 @@ def test_a_size_is_at_its_limit_where_half_a_percent_of_its_prior_lies_beyond(ba
         law = replace(one.laws[0], form=replace(one.laws[0].form, free=(free,)))
         weighed = replace(found, ground=replace(found.ground, candidates={A: replace(one, laws=(law,))}))
         expected = f"size = {factor * float(prior.value(z)):.3g}{told}"
-        assert at_limit(weighed, 1) == (expected if is_limited else "")
+        assert size_at_limit(weighed, 1) == (expected if is_limited else "")
 
 
 def test_what_rounding_leaves_of_two_effects_looks_like_nothing(base):

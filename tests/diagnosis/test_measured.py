@@ -11,9 +11,9 @@ from made_searches import with_modes
 from bayesplate.commands.fit import fit
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.null_control import null_control
-from bayesplate.diagnosis.search import prepare_search, search
-from bayesplate.diagnosis.sensitivity import draw_constants, varied
-from bayesplate.diagnosis.verdict import decide
+from bayesplate.diagnosis.search import prepare_search, run_search
+from bayesplate.diagnosis.sensitivity import draw_constants, vary_priors
+from bayesplate.diagnosis.verdict import decide_verdict
 
 slow = pytest.mark.slow
 
@@ -52,10 +52,10 @@ def test_the_finnish_board_supports_no_claim_and_no_poisson_ratio(diagnosed, fin
     told = diagnosed("finnish-spruce-cantilever").diagnosis
     assert told.claim is False
     assert "poisson_ratio" not in told.effects
-    found = search(finnish.ground)
-    assert decide(found, null_control(found.ground, np.random.default_rng(9), 200)).effects == told.effects
+    found = run_search(finnish.ground)
+    assert decide_verdict(found, null_control(found.ground, np.random.default_rng(9), 200)).effects == told.effects
     for factor in (2.0, 3.0):
-        wider = varied(found, width=factor)
+        wider = vary_priors(found, width=factor)
         inclusion = {name: wider.inclusion(name) for name in found.ground.candidates}
         assert wider.none >= 0.1 or max(inclusion, key=inclusion.get) != "poisson_ratio"
 
@@ -93,7 +93,7 @@ def test_the_constants_of_the_search_are_those_of_the_sampler_without_effect(nam
     are not weighted are off by more.
     """
     fitted = fit(name, law="exact")
-    found = search(prepare_search(baseline_of(fitted.inference.problem), tried=()))
+    found = run_search(prepare_search(baseline_of(fitted.inference.problem), tried=()))
     base = found.ground.baseline
     every, middle = base.every, base.log_rigidities
     straight = with_modes(base, predict=lambda x: every.log_frequency + (x - middle) @ every.slopes.T)

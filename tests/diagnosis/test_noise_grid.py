@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from made_searches import baseline, table, with_residual
 
-from bayesplate.diagnosis.hypotheses import hypotheses
-from bayesplate.diagnosis.shifts import nothing
-from bayesplate.diagnosis.terms import NoiseGrid, Terms, noise_grid
+from bayesplate.diagnosis.hypotheses import make_hypotheses
+from bayesplate.diagnosis.shifts import no_effect_cells
+from bayesplate.diagnosis.terms import NoiseGrid, NormalTerms, noise_grid
 
 N_SETS = 40
 
@@ -18,7 +18,9 @@ N_SETS = 40
 def log_odds(base, grid, residuals):
     """Of an effect of a few cells against none."""
     some = table(np.random.default_rng(5), base.n_modes)
-    one, none = (Terms(each, base, grid).log_evidence(residuals) for each in (some, nothing(base.n_modes)))
+    one, none = (
+        NormalTerms(each, base, grid).log_evidence(residuals) for each in (some, no_effect_cells(base.n_modes))
+    )
     return one - none
 
 
@@ -79,10 +81,10 @@ def test_a_large_misfit_is_a_large_noise(n_setups, times):
     weights = np.exp(-0.5 * (t**2).sum(axis=1))
     fine = NoiseGrid(0.005 * np.exp(0.5 * t), weights / weights.sum())
     some = {name: table(rng, base.n_modes) for name in "ab"}
-    found = hypotheses(base, some, some, "ab")
+    found = make_hypotheses(base, some, some, "ab")
 
     def off(one, grid):
-        both = (Terms(one.table, base, each).log_evidence(base.residual[None, :])[0] for each in (grid, fine))
+        both = (NormalTerms(one.table, base, each).log_evidence(base.residual[None, :])[0] for each in (grid, fine))
         return abs(next(both) - next(both))
 
     assert off(found[0], found[0].noise) < 0.7

@@ -14,17 +14,17 @@ from scipy.stats import norm
 
 from bayesplate.diagnosis import peaks
 from bayesplate.diagnosis.baseline import Baseline, PossibleModes
-from bayesplate.diagnosis.folds import log_score, log_score_gains, nested
-from bayesplate.diagnosis.hypotheses import Hypothesis, confusable
-from bayesplate.diagnosis.peaks import log_summed, with_own_labels
-from bayesplate.diagnosis.search import search
-from bayesplate.diagnosis.shifts import nothing
+from bayesplate.diagnosis.folds import log_score, log_score_gains, nested_leave_one_out
+from bayesplate.diagnosis.hypotheses import Hypothesis, confusable_labels
+from bayesplate.diagnosis.peaks import log_likelihood_summed, with_own_labels
+from bayesplate.diagnosis.search import run_search
+from bayesplate.diagnosis.shifts import no_effect_cells
 from bayesplate.frequencies.model import OtherMode
 from bayesplate.frequencies.peaks import PeakLikelihood
-from bayesplate.plate.naming import Place
+from bayesplate.plate.naming import ModePlace
 from bayesplate.plate.terms import Parity
 
-PLACE = Place(Parity(0, 0), 0, 1.0)
+PLACE = ModePlace(Parity(0, 0), 0, 1.0)
 N_EVERY = 9
 READ = [0, 1, 2, 4, 5, 7]
 """Modes that left a peak; the last one of the others lies far above the highest."""
@@ -104,7 +104,7 @@ def test_the_evidence_is_summed_over_all_assignments(spoilt, below, above):
     """Whatever the labels on the board say; a search by these alone is off."""
     base = noisy(np.random.default_rng(5), spoilt)
     ground = ground_of(base, with_every(bare(base, one_level(base))))
-    by_labels, found = (search(one).log_evidence[0] for one in (ground, with_own_labels(ground)))
+    by_labels, found = (run_search(one).log_evidence[0] for one in (ground, with_own_labels(ground)))
     expected = enumerated(base)
     assert expected - below < found < expected + above
     assert abs(by_labels - expected) > 4.0  # control
@@ -112,7 +112,7 @@ def test_the_evidence_is_summed_over_all_assignments(spoilt, below, above):
 
 def with_every(none):
     """No effect on any of the nine modes."""
-    return replace(none, table=nothing(N_EVERY))
+    return replace(none, table=no_effect_cells(N_EVERY))
 
 
 def planted():
@@ -156,11 +156,11 @@ def test_labels_are_those_of_the_weighted_draws_whichever_way_estimates_most(mon
     ground, truth = planted()
     one, base = ground.hypotheses[1], ground.baseline
     ways = [one.labelled(base, np.array(truth)), one.labelled(base, base.rows)]
-    honest = peaks._summed(ground, ways)
+    honest = peaks._sum_labellings(ground, ways)
     estimates = iter([0.0, honest.log_labels + 40.0])
     monkeypatch.setattr(peaks, "log_mean", lambda _: next(estimates))
-    monkeypatch.setattr(peaks, "_WORTH", 1e3)
-    assert peaks._summed(ground, ways).own.rows.tolist() == honest.own.rows.tolist() == truth
+    monkeypatch.setattr(peaks, "_LARGEST_DROP", 1e3)
+    assert peaks._sum_labellings(ground, ways).own.rows.tolist() == honest.own.rows.tolist() == truth
 
 
 def test_certain_labels_leave_the_hypotheses_alone():
@@ -175,7 +175,7 @@ def test_a_reading_that_is_no_mode_is_left_out_of_folds():
     rows = np.where(np.arange(6) == 2, -1, base.rows)
     without = replace(with_every(none), members=("a",)).labelled(base, rows)
     ground = ground_of(base, none, without)
-    folded = nested(ground, base.residual[None, :], -np.inf)
+    folded = nested_leave_one_out(ground, base.residual[None, :], -np.inf)
     assert np.isnan(folded.after[0]).tolist() == [False, False, True, False, False, False]
     kept = np.arange(6) != 2
     rms = [np.sqrt(np.mean(part[0, kept] ** 2)) for part in (folded.after, folded.before)]
@@ -191,9 +191,9 @@ def test_a_reading_that_is_no_mode_is_left_out_of_folds():
 def test_labels_are_exchanged_only_where_all_are_certain(confidence):
     """Elsewhere the sum over assignments does it, and two exchanges would be one explanation."""
     near = baseline(np.random.default_rng(3), N_EVERY, spacing=0.05, parities=[(i % 2, 0) for i in range(N_EVERY)])
-    assert len(confusable(near)) > 1
+    assert len(confusable_labels(near)) > 1
     doubted = peaked(np.random.default_rng(3), near.log_frequency[READ], confidence=(confidence,) * 6, spacing=0.05)
-    assert not confusable(doubted)
+    assert not confusable_labels(doubted)
 
 
 def test_the_sum_counts_sure_readings_once():
@@ -204,4 +204,4 @@ def test_the_sum_counts_sure_readings_once():
     sure = norm.logpdf(base.log_readings[0], there[:, 0], NOISE)
     others = base.every.peaks[0].log_likelihood(there, noise[:, 0])
     assert np.abs(sure).min() > 1.0
-    assert log_summed(base, there, noise) == pytest.approx(sure + others)
+    assert log_likelihood_summed(base, there, noise) == pytest.approx(sure + others)

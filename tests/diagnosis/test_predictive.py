@@ -11,7 +11,7 @@ from scipy.stats import chi2, kstest, kstwobign
 
 from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.search import PASSES, predictive_p_value
+from bayesplate.diagnosis.search import LEAST_P_VALUE, predictive_p_value
 from bayesplate.diagnosis.terms import noise_grid
 
 N_SETS = 4000
@@ -51,7 +51,7 @@ def test_the_p_value_is_uniform_under_noise_of_the_prior_and_not_under_three_tim
     assert uniformity(predictive_p_value(nothing_lacks, base, noisy(base, rng))) > CERTAIN
     too_large = predictive_p_value(nothing_lacks, base, noisy(base, rng, 3.0))
     assert uniformity(too_large) < CERTAIN
-    assert np.mean(too_large < PASSES) > 0.3
+    assert np.mean(too_large < LEAST_P_VALUE) > 0.3
 
 
 def test_the_p_value_of_a_known_noise_is_that_of_chi_squared():
@@ -78,11 +78,11 @@ def test_an_effect_that_is_there_passes_as_often_as_it_should_and_its_absence_do
     shift = np.abs(rng.standard_normal((N_SETS, 1))) * direction
     readings = noisy(base, rng) + shift
     n_simulated = N_SIMULATED["with an effect"]
-    bound = PASSES + 4.0 * np.sqrt(PASSES / N_SETS + PASSES / n_simulated)
+    bound = LEAST_P_VALUE + 4.0 * np.sqrt(LEAST_P_VALUE / N_SETS + LEAST_P_VALUE / n_simulated)
 
     assert uniformity(predictive_p_value(there, base, readings), n_simulated) > CERTAIN
-    assert np.mean(predictive_p_value(bare(base, noise_grid(base.board)), base, readings) < PASSES) > bound
-    assert np.mean(predictive_p_value(there, base, readings - 2.0 * shift) < PASSES) > bound
+    assert np.mean(predictive_p_value(bare(base, noise_grid(base.board)), base, readings) < LEAST_P_VALUE) > bound
+    assert np.mean(predictive_p_value(there, base, readings - 2.0 * shift) < LEAST_P_VALUE) > bound
 
 
 def test_sizes_that_the_prior_hardly_allows_count_as_misfit():
@@ -93,7 +93,7 @@ def test_sizes_that_the_prior_hardly_allows_count_as_misfit():
     likely = Hypothesis(("first",), 0.5, cells, noise_grid(base.board), base)
     assert predictive_p_value(likely, base, residual)[0] > 0.5
     hardly = replace(likely, table=replace(cells, weights=np.array([1.0 - 1e-9, 1e-9])))
-    assert predictive_p_value(hardly, base, residual)[0] < PASSES
+    assert predictive_p_value(hardly, base, residual)[0] < LEAST_P_VALUE
     nothing_lacks = bare(base, noise_grid(base.board))
     smallest = 1.0 / (1.0 + N_SIMULATED["bare"])
     assert predictive_p_value(nothing_lacks, base, np.eye(6)[:1])[0] == smallest  # nothing allows these

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from made_boards import setup_of
 
-from bayesplate.board.board import made_board
+from bayesplate.board.board import make_board
 from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.words import relabelled_sentence
 
@@ -16,7 +16,7 @@ INPUTS = {"thickness": Quantity.exact(3e-3)}
 
 
 def board_of(labels, name="free"):
-    return made_board("made", INPUTS, (setup_of(FREE, labels, name=name),))
+    return make_board("made", INPUTS, (setup_of(FREE, labels, name=name),))
 
 
 @pytest.mark.parametrize("where", ["", " in setup free"], ids=["one setup", "several"])

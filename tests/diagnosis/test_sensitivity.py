@@ -10,11 +10,11 @@ from made_searches import baseline, candidate, ground_of, one_level, singles, vi
 from scipy.stats import binom
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.diagnosis.folds import ALWAYS, nested
+from bayesplate.diagnosis.folds import ANY_LOG_ODDS, nested_leave_one_out
 from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.null_control import FALSE_ALARMS, NullControl, _share, made_to_choose, null_control
-from bayesplate.diagnosis.search import SearchResult, noise_of_board, search
-from bayesplate.diagnosis.sensitivity import draw_constants, under_exact_law, variants, varied
+from bayesplate.diagnosis.null_control import FALSE_ALARMS, NullControl, _share_bounds, force_choices, null_control
+from bayesplate.diagnosis.search import SearchResult, run_search, simulate_noise
+from bayesplate.diagnosis.sensitivity import draw_constants, under_exact_law, variant_searches, vary_priors
 from bayesplate.diagnosis.terms import noise_grid
 
 
@@ -70,14 +70,14 @@ def test_simulated_nulls_have_the_noise_of_its_prior_are_rounded_and_have_the_sp
     more = np.diag(1.0 / 12.0 / np.exp(rounded.log_frequency) ** 2) + rounded.input_slopes @ rounded.input_slopes.T
     n_sets = 40_000
     for base, expected in ((plain, without), (rounded, without + more)):
-        simulated = noise_of_board(base, np.random.default_rng(5), n_sets)
+        simulated = simulate_noise(base, np.random.default_rng(5), n_sets)
         assert np.abs(simulated.mean(axis=0)).max() < 4.0 * np.sqrt(expected.max() / n_sets)
         products = np.einsum("ni,nj->nij", simulated, simulated)
         error = products.std(axis=0) / np.sqrt(n_sets)
         assert np.abs((products.mean(axis=0) - expected) / error).max() < 4.5
     assert np.abs((products.mean(axis=0) - without) / error).max() > 15.0  # control: it shows
 
-    squares = np.log(np.mean(noise_of_board(plain, np.random.default_rng(5), n_sets) ** 2, axis=1))
+    squares = np.log(np.mean(simulate_noise(plain, np.random.default_rng(5), n_sets) ** 2, axis=1))
     known = np.log(np.mean(np.random.default_rng(6).standard_normal((n_sets, 6)) ** 2, axis=1))
     variance = known.var() + (2.0 * setup.noise.log_sd) ** 2
     assert squares.var() == pytest.approx(variance, rel=5.0 * np.sqrt(2.0 / n_sets))
@@ -91,7 +91,7 @@ def test_the_null_control_finds_little_where_there_is_nothing_and_sees_what_ther
     assert calm.against.shape == (1000,)
     assert calm.ratio is None
     assert calm.flagged <= FALSE_ALARMS
-    there = search(ground, 1.5 * visible_of(one) + 0.001 * rng.standard_normal(6))
+    there = run_search(ground, 1.5 * visible_of(one) + 0.001 * rng.standard_normal(6))
     assert there.against_none == pytest.approx(np.log(there.probability[1] / there.probability[0]))
     assert calm.percentile_of(there.against_none) > 95.0
     assert calm.percentile_of(-np.inf) == 0.0
@@ -120,12 +120,12 @@ def test_fewer_null_sets_are_made_where_chance_is_certain(small):
 def test_bounds_of_a_share_are_those_of_the_binomial_distribution():
     """Of a hundred sets with seven above, the lower bound of 99 % is beyond the false alarms, and not with six."""
     for n_above in (5, 6, 7):
-        low, high = _share(np.arange(100) < n_above)
+        low, high = _share_bounds(np.arange(100) < n_above)
         assert binom.sf(n_above - 1, 100, low) == pytest.approx(0.01)
         assert binom.cdf(n_above, 100, high) == pytest.approx(0.01)
         assert (low > FALSE_ALARMS) is (n_above == 7)
-    assert _share(np.zeros(100, dtype=bool)) == (0.0, pytest.approx(1.0 - 0.01**0.01))
-    assert _share(np.ones(100, dtype=bool)) == (pytest.approx(0.01**0.01), 1.0)
+    assert _share_bounds(np.zeros(100, dtype=bool)) == (0.0, pytest.approx(1.0 - 0.01**0.01))
+    assert _share_bounds(np.ones(100, dtype=bool)) == (pytest.approx(0.01**0.01), 1.0)
 
 
 @pytest.mark.parametrize(("place", "n"), [(0.0, 100), (0.5, 100), (0.05, 300)])
@@ -133,9 +133,9 @@ def test_fewer_sets_are_made_to_choose_where_the_threshold_is_clearly_passed_or_
     """Below all of them or in their middle a hundred are enough; at the threshold itself all are needed."""
     ground, _ = small
     control = null_control(ground, np.random.default_rng(8), 300)
-    whole = made_to_choose(ground, control)
+    whole = force_choices(ground, control)
     board = np.quantile(whole.ratio, place) if place else 0.9 * whole.ratio.min()
-    found = made_to_choose(ground, control, float(board))
+    found = force_choices(ground, control, float(board))
     np.testing.assert_array_equal(found.ratio, whole.ratio[:n])
     if place != 0.05:
         assert (board < found.ratio_to_beat) == (board < whole.ratio_to_beat) == (place == 0.0)
@@ -144,11 +144,11 @@ def test_fewer_sets_are_made_to_choose_where_the_threshold_is_clearly_passed_or_
 def test_null_sets_are_made_to_choose(small):
     """Else hardly any would, and the ratio of those that choose nothing is one."""
     ground, _ = small
-    residuals = noise_of_board(ground.baseline, np.random.default_rng(7), 100)
-    forced, free = nested(ground, residuals, ALWAYS), nested(ground, residuals)
+    residuals = simulate_noise(ground.baseline, np.random.default_rng(7), 100)
+    forced, free = nested_leave_one_out(ground, residuals, ANY_LOG_ODDS), nested_leave_one_out(ground, residuals)
     assert np.all(forced.chosen == 1)
     assert np.mean(free.chosen == 0) > 0.8
-    control = made_to_choose(ground, null_control(ground, np.random.default_rng(7), 100))
+    control = force_choices(ground, null_control(ground, np.random.default_rng(7), 100))
     np.testing.assert_allclose(control.ratio, forced.ratio)
     assert control.ratio_to_beat < 1.0 < np.quantile(control.ratio, 0.95)
     assert control.ratio_to_beat == pytest.approx(np.quantile(forced.ratio, 0.05))
@@ -166,11 +166,11 @@ def test_a_variant_is_the_search_with_that_prior(change):
         one = candidate(base, "a", direction, Quantity.from_mean(0.0, sd, "normal"), n_cells=99)
         levels = noise_grid(base.board)
         levels = replace(levels, sd=noise * levels.sd)
-        return search(ground_of(base, *singles(base, {"a": one}, levels, 0.4), candidates={"a": one}), residual)
+        return run_search(ground_of(base, *singles(base, {"a": one}, levels, 0.4), candidates={"a": one}), residual)
 
     usual = searched(1.0, 1.0)
     wanted = searched(change.get("width", 1.0), change.get("noise", 1.0))
-    found = varied(usual, **change)
+    found = vary_priors(usual, **change)
     assert found.none == pytest.approx(wanted.none, rel=0.02)
     np.testing.assert_allclose(found.log_evidence, wanted.log_evidence, atol=0.05)
     assert np.abs(found.log_evidence - usual.log_evidence).max() > 0.2  # control: the prior matters
@@ -178,14 +178,15 @@ def test_a_variant_is_the_search_with_that_prior(change):
 
 def test_a_name_has_to_survive_widths_and_noises(small):
     ground, _ = small
-    found = search(ground, 0.01 * np.random.default_rng(3).standard_normal(6))
-    told = list(variants(found))
+    found = run_search(ground, 0.01 * np.random.default_rng(3).standard_normal(6))
+    told = list(variant_searches(found))
     assert [words for words, _ in told] == [
         "with the priors of the sizes halved", "with the priors of the sizes doubled",
         "if the noise is 1.5 times smaller", "if the noise is 1.5 times larger", "under the exact law",
     ]  # fmt: skip
     usual = [
-        varied(found, **change).none for change in ({"width": 0.5}, {"width": 2.0}, {"noise": 2 / 3}, {"noise": 1.5})
+        vary_priors(found, **change).none
+        for change in ({"width": 0.5}, {"width": 2.0}, {"noise": 2 / 3}, {"noise": 1.5})
     ]
     assert [other.none for _, other in told[:-1]] == pytest.approx(usual)
     assert told[-1][1] is under_exact_law(found)

@@ -11,7 +11,7 @@ from made_searches import baseline
 
 from bayesplate.diagnosis import joint
 from bayesplate.diagnosis.laws import FormLaw, form_law
-from bayesplate.diagnosis.search import prepare_search, search
+from bayesplate.diagnosis.search import prepare_search, run_search
 from bayesplate.diagnosis.shifts import tabulate
 from bayesplate.diagnosis.signatures import Signature, signatures
 from bayesplate.frequencies.laws import cents
@@ -70,7 +70,7 @@ def test_an_effect_that_leaves_no_plate_is_not_tried(finnish_few):
 
     pair = ("poisson_ratio", "fluid_loading")
     for tried, left in ((pair, ["fluid_loading"]), (pair[:1], [])):
-        found = search(prepare_search(finnish_few.ground.baseline, solve, tried=tried))
+        found = run_search(prepare_search(finnish_few.ground.baseline, solve, tried=tried))
         assert list(found.ground.candidates) == left
         assert found.probability.sum() == pytest.approx(1.0)
 
@@ -78,8 +78,8 @@ def test_an_effect_that_leaves_no_plate_is_not_tried(finnish_few):
 def test_shear_is_too_dear_to_be_solved_with_another(finnish_few):
     """Each such pair takes minutes to solve on a board with many peaks."""
     laws = {name: one.laws[0] for name, one in finnish_few.ground.candidates.items()}
-    assert not joint._is_cheap(laws["transverse_shear"])
-    assert joint._is_cheap(laws["clamp_translation"])
+    assert not joint._is_thin(laws["transverse_shear"])
+    assert joint._is_thin(laws["clamp_translation"])
 
 
 def test_the_constants_absorb_nothing_of_what_is_tabulated(finnish_few):

@@ -19,7 +19,7 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.commands.problem import Problem
 from bayesplate.diagnosis.known import known_fit, stated_effects
 from bayesplate.diagnosis.known_words import stated_sentence
-from bayesplate.diagnosis.stated import _states_differently, judge_stated, scores_given, stated_claims
+from bayesplate.diagnosis.stated import _states_differently, judge_stated_effects, scores_given, stated_claims
 from bayesplate.posterior.posing import pose
 
 CENTS = np.log(2.0) / 1200.0
@@ -42,7 +42,7 @@ LIMITS = {
 @pytest.mark.parametrize("case", LIMITS)
 def test_a_claim_asks_for_a_fall_by_a_fifth_and_a_score_beyond_two_standard_errors(case):
     fall, gains, holds = LIMITS[case]
-    found = judge_stated(("fluid_loading",), "", BEFORE, (1.0 - fall) * BEFORE, gains)
+    found = judge_stated_effects(("fluid_loading",), "", BEFORE, (1.0 - fall) * BEFORE, gains)
     assert (found.before_rms_cents, found.after_rms_cents) == pytest.approx((10.0, 10.0 * (1.0 - fall)))
     assert (found.log_score_gain, found.standard_error) == pytest.approx((gains.sum(), ERROR))
     assert (found.n_modes, found.holds) == (4, holds)
@@ -50,7 +50,9 @@ def test_a_claim_asks_for_a_fall_by_a_fifth_and_a_score_beyond_two_standard_erro
 
 def test_two_modes_are_too_few_to_judge_by():
     for n_modes, is_judged in [(3, True), (2, False), (0, False)]:
-        assert (judge_stated(("fluid_loading",), "", BEFORE, 0.5 * BEFORE, GAINS[:n_modes]) is not None) is is_judged
+        assert (
+            judge_stated_effects(("fluid_loading",), "", BEFORE, 0.5 * BEFORE, GAINS[:n_modes]) is not None
+        ) is is_judged
 
 
 def test_a_claim_in_words():

@@ -23,9 +23,9 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.hypotheses import RELABELLING, Hypothesis, Swap
 from bayesplate.diagnosis.null_control import NullControl
 from bayesplate.diagnosis.search import SearchResult
-from bayesplate.diagnosis.sizes import at_limit, size_posterior
+from bayesplate.diagnosis.sizes import size_at_limit, size_posterior
 from bayesplate.diagnosis.terms import noise_grid
-from bayesplate.diagnosis.verdict import answers
+from bayesplate.diagnosis.verdict import rank_explanations
 
 PAIR = ("a", "b")
 SWAPPED = (RELABELLING,)
@@ -62,16 +62,16 @@ def test_the_decision_table(case):
     found = found_with(probability, residual=residual)
     verdict = decided(found)
     assert [verdict.word, verdict.effects, verdict.index] == expected
-    assert verdict.best == answers(found)[0]
+    assert verdict.best == rank_explanations(found)[0]
     is_nearest = case == "the best fails the gate"
     assert verdict.nearest == (verdict.best if is_nearest else None)
     assert verdict.fitted_again == ((verdict.best,) if is_nearest else verdict.stands_for)
-    assert sum(one.support for one in answers(found)) == pytest.approx(sum(found.probability[1:]))
+    assert sum(one.support for one in rank_explanations(found)) == pytest.approx(sum(found.probability[1:]))
 
 
 def test_the_reason_of_a_misfit_and_what_a_pair_adds_to_its_better_member():
     assert "p < 0.001" in decided(found_with({("a",): 1.0}, residual=BEYOND_NOISE)).reason
-    best = answers(found_with({("a",): 0.3, ("b",): 0.15, PAIR: 0.55}))[0]
+    best = rank_explanations(found_with({("a",): 0.3, ("b",): 0.15, PAIR: 0.55}))[0]
     assert (best.members, best.index, best.support) == (("a",), 1, pytest.approx(0.85))
 
 
@@ -98,8 +98,8 @@ def test_an_effect_is_seen_from_twice_the_noise_over_root_n_on(base, times, is_s
 def test_a_pair_that_the_card_states_stands_for_itself_however_improbable(monkeypatch):
     monkeypatch.setattr("bayesplate.diagnosis.verdict.are_stated", lambda board, members: members == PAIR)
     found = found_with({("a",): 0.9, ("b",): 0.09, PAIR: 0.01})
-    assert {one.members: round(one.support, 6) for one in answers(found)}[PAIR] == 0.01
-    assert answers(found)[0].support == pytest.approx(0.9)
+    assert {one.members: round(one.support, 6) for one in rank_explanations(found)}[PAIR] == 0.01
+    assert rank_explanations(found)[0].support == pytest.approx(0.9)
 
 
 def test_a_size_at_the_limit_of_its_range_is_never_named():
@@ -111,7 +111,7 @@ def test_a_size_at_the_limit_of_its_range_is_never_named():
         assert (verdict.word, verdict.is_needed) == (word, True)
         assert verdict.reason.startswith("a fits only at the limit of its range: size = 0.7") is (word != "named")
     at_zero = found_with({("a",): 1.0}, size=1.0, residual=QUIET)
-    assert at_limit(at_zero, 1) == ""  # zero is no limit of a size that may be nothing
+    assert size_at_limit(at_zero, 1) == ""  # zero is no limit of a size that may be nothing
 
 
 @pytest.mark.parametrize(
@@ -126,7 +126,7 @@ def test_a_cell_may_be_wider_than_what_counts_as_the_limit(members, index, size,
     prior = Quantity.from_mean(0.0, 1.0, "normal", lower=0.0, upper=2.0)
     found = found_with({members: 1.0}, size=1.0, prior=prior)
     *others, last = (visible_of(found.ground.candidates[name]) for name in members)
-    assert bool(at_limit(replace(found, residual=size * last + sum(others)), index)) is limited
+    assert bool(size_at_limit(replace(found, residual=size * last + sum(others)), index)) is limited
 
 
 @pytest.mark.parametrize("share", [0.55, 0.45])
@@ -156,7 +156,7 @@ def test_a_form_that_is_not_the_likelier_one_may_be_at_its_limit(base, share):
     weights = np.where(table.form == 1, odds, 1.0) * table.weights
     found = found_by(weights / weights.sum())
     assert size_posterior(found, 1, 0, 1, 0)[0].sum() == pytest.approx(share)
-    assert bool(at_limit(found, 1)) is (share > 0.5)
+    assert bool(size_at_limit(found, 1)) is (share > 0.5)
 
 
 def test_without_candidates_there_is_nothing_to_name(base):
@@ -184,7 +184,7 @@ def test_a_name_that_another_assumption_changes_is_a_group_with_what_it_turned_i
     stays = turned({("a",): 0.75, ("b",): 0.25})
     changes = turned({("a",): 0.70, ("b",): 0.28, ("c",): 0.02})
     assert decided(found, others=[stays]).word == "named"
-    assert decided(found, others=[stays]).stands_for == (answers(found)[0],)
+    assert decided(found, others=[stays]).stands_for == (rank_explanations(found)[0],)
     told = decided(found, others=[stays, changes])
     assert (told.word, told.effects, told.index) == ("indistinguishable group", ("a", "b"), 1)
     assert [(one.members, round(one.support, 6)) for one in told.stands_for] == [(("a",), 0.9), (("b",), 0.06)]

@@ -13,7 +13,7 @@ from diagnoses import AFTER, AIR, BEFORE, DIAGNOSES, EXCHANGE, GRAIN, NEXT, TENS
 from read_pages import Read
 
 from bayesplate.commands.shown import show_diagnosis
-from bayesplate.diagnosis.result import Amplitude, Errors, diagnosis_json
+from bayesplate.diagnosis.result import Amplitude, ModelErrors, diagnosis_json
 from bayesplate.diagnosis.tables import (
     answers_table,
     averaged_table,
@@ -23,7 +23,7 @@ from bayesplate.diagnosis.tables import (
     shift_table,
     sizes_table,
 )
-from bayesplate.diagnosis.verdict import Word
+from bayesplate.diagnosis.verdict import VerdictWord
 from bayesplate.diagnosis.words import (
     MERITS,
     VERDICTS,
@@ -31,9 +31,9 @@ from bayesplate.diagnosis.words import (
     claim_sentence,
     headline_sentence,
     known_sentences,
-    meaning,
-    remarks,
-    shown_model,
+    reason_and_notes,
+    shown_model_sentence,
+    verdict_meaning,
     verdict_sentence,
     verdict_sentences,
     warnings,
@@ -107,9 +107,9 @@ def test_the_json_has_the_values_and_nothing_that_json_lacks():
 
 
 def test_every_word_of_the_verdict_and_every_error_has_its_words():
-    assert set(VERDICTS) == set(get_args(Word))
-    read = [one.of(Errors(**{name: i for i, name in enumerate(ERRORS)})) for one in MERITS]
-    assert read == list(range(len(fields(Errors))))
+    assert set(VERDICTS) == set(get_args(VerdictWord))
+    read = [one.of(ModelErrors(**{name: i for i, name in enumerate(ERRORS)})) for one in MERITS]
+    assert read == list(range(len(fields(ModelErrors))))
 
 
 PASSAGES = [
@@ -134,12 +134,14 @@ def test_the_terminal_and_the_page_tell_the_same(word, words):
 
 
 def test_the_page_says_what_its_constants_are():
-    assert remarks(replace(NAMED, notes=("mind this",))) == ["The reason: the reason of it.", "mind this"]
-    assert shown_model(NAMED).endswith("averaged ones; all else below is of the model with membrane tension.")
-    assert "only one of the explanations. Quote the averaged" in shown_model(DIAGNOSES["indistinguishable group"])
+    assert reason_and_notes(replace(NAMED, notes=("mind this",))) == ["The reason: the reason of it.", "mind this"]
+    assert shown_model_sentence(NAMED).endswith("averaged ones; all else below is of the model with membrane tension.")
+    assert "only one of the explanations. Quote the averaged" in shown_model_sentence(
+        DIAGNOSES["indistinguishable group"]
+    )
     # the averaged constants stand beside figures of the fit alone
-    assert shown_model(DIAGNOSES["none needed"]).endswith("below is of the fit without a further effect.")
-    assert shown_model(DIAGNOSES["unexplained"]) == ""
+    assert shown_model_sentence(DIAGNOSES["none needed"]).endswith("below is of the fit without a further effect.")
+    assert shown_model_sentence(DIAGNOSES["unexplained"]) == ""
     for word, one in DIAGNOSES.items():
         assert ("averaged" in headline_sentence(one)) is (word != "unexplained")
         assert ("averaged" in averaged_table(one).title) is (word != "unexplained")
@@ -346,7 +348,9 @@ def test_it_shows_itself():
 
 def test_a_plate_with_declared_effects_is_not_called_ideal():
     calm = DIAGNOSES["none needed"]
-    assert meaning(calm).startswith("The readings differ from those of an ideal plate by no more than their noise")
-    told = meaning(replace(calm, declared=("grain_angle", "fluid_loading")))
+    assert verdict_meaning(calm).startswith(
+        "The readings differ from those of an ideal plate by no more than their noise"
+    )
+    told = verdict_meaning(replace(calm, declared=("grain_angle", "fluid_loading")))
     assert "those of a plate with grain angle and fluid loading by no more than" in told
     assert "No further effect is needed" in told

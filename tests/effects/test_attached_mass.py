@@ -14,7 +14,7 @@ from generator.designs import ALL_FREE
 
 from bayesplate.board.attached import AttachedItem
 from bayesplate.board.quantity import Quantity
-from bayesplate.effects.attached_items import Item, base_diameter
+from bayesplate.effects.attached_items import PlacedItem, base_diameter
 from bayesplate.effects.attached_mass import AttachedMass
 from bayesplate.plate.line import line
 from bayesplate.plate.plate import plate_of
@@ -25,7 +25,7 @@ AS_FREE = replace(ritz.FINNISH, edges=ALL_FREE)
 
 def at(*places, radius=(0.0, 0.0)):
     """A thing at places, fractions of the sides."""
-    return AttachedMass(MADE, (Item(Quantity.exact(1e-3), "", places, radius),))
+    return AttachedMass(MADE, (PlacedItem(Quantity.exact(1e-3), "", places, radius),))
 
 
 def test_rotary_inertia_of_a_compact_solid():

@@ -12,7 +12,7 @@ from generator.known_boards import BEAMS, DRIVEN
 import bayesplate
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Reading
-from bayesplate.effects.drives import Drive, Spot
+from bayesplate.effects.drives import Drive, PlaceRange
 from bayesplate.effects.exciter import Exciter
 from bayesplate.frequencies.model import full_log_frequencies, setup_model
 from bayesplate.frequencies.system import System
@@ -79,13 +79,13 @@ def test_a_place_that_nobody_knows_is_a_weight():
 
 
 def test_shares_are_those_of_lagranges_polynomials():
-    spot = Spot(0.0, 0.5, 7)
+    spot = PlaceRange(0.0, 0.5, 7)
     at = np.array([0.0, 0.11, 0.25, 0.37, 0.5])
     shares = spot.shares(at)
     assert shares.sum(axis=1) == pytest.approx(1.0)
     for degree in range(7):
         assert shares @ spot.nodes**degree == pytest.approx(at**degree, abs=1e-12)
-    assert Spot(0.3, 0.3).shares(at) == pytest.approx(np.ones((5, 1)))
+    assert PlaceRange(0.3, 0.3).shares(at) == pytest.approx(np.ones((5, 1)))
     beyond = spot.shares(np.array([-1e17, 1e17]))  # where a proposal may fall, and the prior is zero
     assert beyond == pytest.approx(spot.shares(np.array([0.0, 0.5])))
 

@@ -9,7 +9,7 @@ import pytest
 
 from bayesplate.board.random_field import Surface
 from bayesplate.commands.prepare import prepare
-from bayesplate.effects.field_components import look
+from bayesplate.effects.field_components import surface_words
 
 PLACES = {
     "towards x0": (0.0, 0.5), "towards x1": (1.0, 0.5), "towards y0": (0.5, 0.0), "towards y1": (0.5, 1.0),
@@ -23,7 +23,7 @@ def test_a_surface_is_high_where_it_is_said_to_be():
     x, y = np.meshgrid(np.linspace(0, 1, 11), np.linspace(0, 1, 11))
     for degrees, size in product([(1, 0), (0, 1), (2, 0), (0, 2), (1, 1)], [0.01, -0.01]):
         surface = Surface((degrees,), (size,))
-        place = look(surface, 3e-3, "thicker").removeprefix("at +1 thicker ").removesuffix(", 0.03 mm rms")
+        place = surface_words(surface, 3e-3, "thicker").removeprefix("at +1 thicker ").removesuffix(", 0.03 mm rms")
         assert float(surface(*(np.array(at) for at in PLACES[place]))) == pytest.approx(surface(x, y).max())
 
 
@@ -39,7 +39,7 @@ def test_a_surface_is_high_where_it_is_said_to_be():
 def test_of_a_mixture_its_largest_parts_are_told(coefficients, words):
     surface = Surface(((2, 0), (0, 2), (3, 0)), tuple(0.005 * one for one in coefficients))
 
-    assert look(surface, 5e-3, "wider").startswith(f"at +1 wider {words}, ")
+    assert surface_words(surface, 5e-3, "wider").startswith(f"at +1 wider {words}, ")
 
 
 def test_every_component_of_a_measured_board_has_a_look():

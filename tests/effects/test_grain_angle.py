@@ -8,7 +8,7 @@ from effect_plates import MADE, SHEAR, hertz, setup_of, values_of
 from generator.known_boards import FINNISH, FREE
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.effects.attached_items import Item
+from bayesplate.effects.attached_items import PlacedItem
 from bayesplate.effects.attached_mass import AttachedMass
 from bayesplate.effects.grain_angle import GrainAngle
 from bayesplate.effects.transverse_shear import TransverseShear
@@ -32,7 +32,7 @@ def test_a_quarter_turn_swaps_the_axes(is_sheared):
 
 
 def test_an_angle_away_from_y_is_the_other_sign():
-    corner = AttachedMass(MADE, (Item(Quantity.exact(3e-3), "", ((0.97, 0.91),)),))
+    corner = AttachedMass(MADE, (PlacedItem(Quantity.exact(3e-3), "", ((0.97, 0.91),)),))
     (away,) = (one.name for one in GrainAngle(sign=-1).parameters())
     angle, mass = np.radians(5.0), {"attached_mass.mass": 3e-3}
     found = hertz(FREE, [GrainAngle(sign=-1), corner], {away: angle} | mass, 8)

@@ -15,11 +15,11 @@ from generator.plate import solve as solve_generator
 from made_boards import board_of
 
 from bayesplate.board.attached import AttachedItem
-from bayesplate.board.board import density, vibrating_lengths
-from bayesplate.board.parameter import BOARD
+from bayesplate.board.board import board_density, vibrating_lengths
+from bayesplate.board.parameter import BOARD_OWNER
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.random_field import Surface
-from bayesplate.effects.attached_items import Item
+from bayesplate.effects.attached_items import PlacedItem
 from bayesplate.effects.attached_mass import AttachedMass
 from bayesplate.effects.field_components import FieldProfile
 from bayesplate.effects.fluid_loading import FluidLoading
@@ -46,7 +46,9 @@ def course(stations, widths):
 
 def outline(plate, stations, widths, components=(), mean=1.0):
     ends = plate.edges["y0"], plate.edges["y1"]
-    return OutlineProfile(BOARD, ends, profile=FieldProfile(course(stations, widths), None, components, mean, 0.0))
+    return OutlineProfile(
+        BOARD_OWNER, ends, profile=FieldProfile(course(stations, widths), None, components, mean, 0.0)
+    )
 
 
 def independent(plate, stations, widths, steps=()):
@@ -177,7 +179,7 @@ def test_a_given_mass_is_kept():
 
     adjusted = effect.adjusted(values)
     area = 0.58 * float(adjusted["length_y"]) * np.mean(high - low)
-    assert density(adjusted) * area * 4.7e-3 == pytest.approx(0.25, rel=1e-4)
+    assert board_density(adjusted) * area * 4.7e-3 == pytest.approx(0.25, rel=1e-4)
     assert (high - low).max() == pytest.approx(1.0, abs=1e-6)
     assert 0.205 < float(values["length_y"]) < float(adjusted["length_y"])
 
@@ -214,7 +216,7 @@ WEDGE = ((0.0, 0.5, 1.0), (1.02, 1.0, 0.84))
 def test_a_thing_stands_where_it_was_measured_from_the_corner():
     """At its rim where the board narrows: on what is left of the rectangle there it would have a mode of its own."""
     place = 0.97, 0.02  # as fractions of the nominal sides
-    mass, item = 3e-3, Item(Quantity.exact(3e-3), "", (place,))
+    mass, item = 3e-3, PlacedItem(Quantity.exact(3e-3), "", (place,))
     effect, planted = outline(FREE, *WEDGE), independent(FREE, *WEDGE)
     widths = np.array(planted.widths)
     widest, at = widths.max(), np.interp(place[0] * FREE.L_x, planted.stations, widths)
@@ -229,7 +231,7 @@ def test_a_thing_stands_where_it_was_measured_from_the_corner():
 def test_a_thing_beside_the_board_tilts_with_its_rim():
     """With a base as wide as what is missing there."""
     narrow, mass = outline(FREE, *WEDGE), {"attached_mass.mass": 3e-3}
-    items = (Item(Quantity.exact(3e-3), "", ((0.97, 0.02),), radius) for radius in ((0.0, 0.0), (0.01, 0.08)))
+    items = (PlacedItem(Quantity.exact(3e-3), "", ((0.97, 0.02),), radius) for radius in ((0.0, 0.0), (0.01, 0.08)))
     point, tilting = (hertz(FREE, [narrow, AttachedMass(MADE, (one,))], mass, 6) for one in items)
     assert np.all(np.abs(1200 * np.log2(tilting / point)) < 10.0)
 

@@ -16,14 +16,14 @@ from generator.known_boards import DRIVEN, FIEMME, FINNISH, FREE, HALF_TOP
 from generator.plate import Plate
 from generator.warp import Warp as PlantedWarp
 
-from bayesplate.board.parameter import BOARD
+from bayesplate.board.parameter import BOARD_OWNER
 from bayesplate.board.quantity import Quantity
 from bayesplate.effects import Effect
-from bayesplate.effects.attached_items import Item, base_diameter
+from bayesplate.effects.attached_items import PlacedItem, base_diameter
 from bayesplate.effects.attached_mass import AttachedMass
-from bayesplate.effects.clamp_rotation import STIFFEST as STIFFEST_TURN
+from bayesplate.effects.clamp_rotation import LEAST_COMPLIANCE as STIFFEST_TURN
 from bayesplate.effects.clamp_rotation import ClampRotation
-from bayesplate.effects.clamp_translation import STIFFEST as STIFFEST_SINK
+from bayesplate.effects.clamp_translation import LEAST_COMPLIANCE as STIFFEST_SINK
 from bayesplate.effects.clamp_translation import ClampTranslation
 from bayesplate.effects.density_gradient import DensityGradient
 from bayesplate.effects.drives import Drive
@@ -31,7 +31,7 @@ from bayesplate.effects.exciter import Exciter
 from bayesplate.effects.fluid_loading import FluidLoading
 from bayesplate.effects.grain_angle import GrainAngle
 from bayesplate.effects.membrane_tension import Axis, MembraneTension
-from bayesplate.effects.part import WHOLE, Part
+from bayesplate.effects.part import WHOLE_SIDE, VibratingPart
 from bayesplate.effects.stiffness_gradient import StiffnessGradient
 from bayesplate.effects.support_mass import SupportMass
 from bayesplate.effects.support_stiffness import SupportStiffness
@@ -41,7 +41,7 @@ from bayesplate.effects.warp import Warp
 PLAIN = replace(FINNISH, nu_xy=0.0)
 """Without a Poisson ratio E_x is in D_x alone, as the package has it."""
 STOUT = replace(FREE, h=0.02)
-COVERED, PART = replace(FINNISH, covered=0.03, whole=0.253), Part(0.03 / 0.253, 0.223 / 0.253)
+COVERED, PART = replace(FINNISH, covered=0.03, whole=0.253), VibratingPart(0.03 / 0.253, 0.223 / 0.253)
 FREE_FINNISH = replace(FINNISH, L_x=0.253, edges=ALL_FREE)
 ALONG_X = replace(FINNISH, edges={"x0": "free", "x1": "free", "y0": "clamped", "y1": "free"})
 LONG_SADDLE = replace(HALF_TOP, edges=CANTILEVER)
@@ -72,12 +72,12 @@ def sinking(plate: Plate, compliance: float) -> Acting:
     return Acting(effect, {"clamp_translation.compliance": compliance}, other)
 
 
-def denser(gradient: float, part: Part = WHOLE) -> Acting:
+def denser(gradient: float, part: VibratingPart = WHOLE_SIDE) -> Acting:
     values = {"density_gradient.gradient": gradient}
     return Acting(DensityGradient(part=part), values, planted.DensityGradient(gradient))
 
 
-def stiffer(gradient: float, part: Part = WHOLE) -> Acting:
+def stiffer(gradient: float, part: VibratingPart = WHOLE_SIDE) -> Acting:
     values = {"stiffness_gradient.gradient": gradient}
     return Acting(StiffnessGradient(part=part), values, planted.StiffnessGradient(gradient))
 
@@ -86,12 +86,12 @@ def turned(angle: float) -> Acting:
     return Acting(GrainAngle(), {"grain_angle.angle": angle}, planted.GrainAngle(angle))
 
 
-def thicker(x: float, y: float, part: Part = WHOLE) -> Acting:
+def thicker(x: float, y: float, part: VibratingPart = WHOLE_SIDE) -> Acting:
     values = {"thickness_profile.taper_x": x, "thickness_profile.taper_y": y}
     return Acting(ThicknessProfile(part_x=part), values, planted.ThicknessProfile(x, y))
 
 
-def read(x: float, y: float, part: Part = WHOLE) -> Acting:
+def read(x: float, y: float, part: VibratingPart = WHOLE_SIDE) -> Acting:
     """Tapers that readings leave no doubt of."""
     return Acting(ThicknessProfile(part_x=part, profile=tapered(x, y)), {}, planted.ThicknessProfile(x, y))
 
@@ -118,14 +118,14 @@ def bedded(stiffness: float) -> Acting:
 def warped(plate: Plate, **rises: float) -> Acting:
     known = tuple((name, Quantity.exact(1.0), "") for name in rises)
     values = {f"warp.{name}": rise for name, rise in rises.items()}
-    return Acting(Warp(BOARD, known, plate.L_x / plate.L_y), values, PlantedWarp(**rises))
+    return Acting(Warp(BOARD_OWNER, known, plate.L_x / plate.L_y), values, PlantedWarp(**rises))
 
 
 def loaded(plate: Plate, place: tuple[float, float], share: float, *, is_turning: bool = False) -> Acting:
     """A thing of a share of the board's mass at a place, fractions of the sides."""
     mass = share * plate.rho * plate.h * plate.L_x * plate.L_y
     diameter = float(base_diameter(mass)) if is_turning else 0.0
-    item = Item(Quantity.exact(1e-3), "", (place,), (0.5 * diameter / plate.L_x, 0.5 * diameter / plate.L_y))
+    item = PlacedItem(Quantity.exact(1e-3), "", (place,), (0.5 * diameter / plate.L_x, 0.5 * diameter / plate.L_y))
     at = ((place[0] * plate.L_x, place[1] * plate.L_y),)
     other = planted.AttachedMass(mass, at, diameter * np.sqrt(1 / 16 + 1 / 3))
     return Acting(AttachedMass(MADE, (item,)), {"attached_mass.mass": mass}, other)
@@ -242,7 +242,7 @@ def test_the_part_of_the_other_modulus_in_the_stiffness_along_the_grain_stays():
 
 @pytest.mark.parametrize(("clamp", "cents"), [(turning, 0.1), (sinking, 0.12)])
 def test_clamps_of_no_compliance_are_ideal(clamp, cents):
-    """What is left by `STIFFEST` is a hundredth of the shift at k_R L / D = 1000, 3.5 cents, or a few times that."""
+    """`LEAST_COMPLIANCE` leaves a hundredth of the shift at k_R L / D = 1000, 3.5 cents, or a few times that."""
     stiff = clamp(FINNISH, 0.0)
     ratio = hertz(FINNISH, [stiff.effect], stiff.values, 6) / hertz(FINNISH, [], {}, 6)
     assert 1200 * np.log2(ratio) == pytest.approx(0.0, abs=cents)

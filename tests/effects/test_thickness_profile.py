@@ -11,7 +11,7 @@ from effect_plates import hertz, setup_of, values_of
 from generator.known_boards import FINNISH, FREE
 from made_boards import board_of
 
-from bayesplate.board.board import density
+from bayesplate.board.board import board_density
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.random_field import Surface
 from bayesplate.commands.prepare import prepare
@@ -34,8 +34,8 @@ def read_as_on_the_measured_boards():
 class FirstOrder(ThicknessProfile):
     """The same without products of components."""
 
-    def _expanded(self, n):
-        return tuple(one for one in super()._expanded(n) if one.order < 2)
+    def _expand_power(self, n):
+        return tuple(one for one in super()._expand_power(n) if one.order < 2)
 
 
 @pytest.mark.parametrize(("kind", "least", "most"), [(ThicknessProfile, 0.0, 0.03), (FirstOrder, 0.5, 3.0)])
@@ -76,7 +76,7 @@ def test_a_given_mass_is_kept():
     middle = (np.arange(200) + 0.5) / 200
     h = values["thickness"] * (1.0 + system.effects[0].profile.expected(middle[:, None], middle))
 
-    assert density(adjusted) * h.mean() * 0.223 * 0.114 == pytest.approx(0.036, rel=1e-4)
+    assert board_density(adjusted) * h.mean() * 0.223 * 0.114 == pytest.approx(0.036, rel=1e-4)
     assert float(values["thickness"]) < 0.00299
     assert ThicknessProfile.is_implied(board)
 

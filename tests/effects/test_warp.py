@@ -7,7 +7,7 @@ import pytest
 from effect_plates import board_with, setup_of, values_of
 from generator.known_boards import HALF_TOP
 
-from bayesplate.board.parameter import BOARD
+from bayesplate.board.parameter import BOARD_OWNER
 from bayesplate.board.quantity import Quantity
 from bayesplate.effects.warp import Warp
 from bayesplate.frequencies.system import System
@@ -16,7 +16,7 @@ from bayesplate.plate.membrane import CURVATURES
 
 def warp(plate, names=CURVATURES):
     """The effect on a plate; its sizes are given with the values."""
-    return Warp(BOARD, tuple((name, Quantity.exact(1.0), "") for name in names), plate.L_x / plate.L_y)
+    return Warp(BOARD_OWNER, tuple((name, Quantity.exact(1.0), "") for name in names), plate.L_x / plate.L_y)
 
 
 def test_halves_stay_alike_unless_a_twist_has_a_curvature_beside_it():

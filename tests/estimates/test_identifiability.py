@@ -15,7 +15,12 @@ from bayesplate.board.prior import load_prior
 from bayesplate.board.setup import Setup
 from bayesplate.commands.prepare import prepare
 from bayesplate.errors import NotIdentifiableError
-from bayesplate.estimates.identifiability import identifiability, remarks, require_identifiable, require_labels
+from bayesplate.estimates.identifiability import (
+    identifiability,
+    identifiability_remarks,
+    require_identifiable,
+    require_labels,
+)
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
@@ -40,7 +45,7 @@ def remarks_of(board):
     """What is said of a board at its estimate, and how well that is known."""
     estimate = weighted_least_squares(board)
     found = identifiability(estimate.sensitivities, estimate.scales)
-    return " ".join(remarks(board, found)), found
+    return " ".join(identifiability_remarks(board, found)), found
 
 
 @pytest.mark.parametrize(
@@ -152,7 +157,7 @@ def test_a_board_with_every_edge_held_is_told_what_it_sees(edges, told):
     values = board.nominal() | dict(zip(RIGIDITIES, np.array([27.0, 3.0, 10.0]), strict=True))
     other = values | {"poisson_xy": np.asarray(0.5), "D_s": np.asarray(10.0 - 2 * (0.5 - 0.2) * 3.0)}
     here, there = ([mode.frequency for mode in spectrum(system, one, 6)[1]] for one in (values, other))
-    sentences = " ".join(remarks(board, identifiability(0.5 * np.eye(5, 3), np.full(5, 0.01))))
+    sentences = " ".join(identifiability_remarks(board, identifiability(0.5 * np.eye(5, 3), np.full(5, 0.01))))
 
     assert (float(np.abs(1200.0 * np.log2(np.divide(there, here))).max()) < 1e-6) == told
     assert ("is held all round: only D_s + 2 nu_xy D_y is seen" in sentences) == told
@@ -166,9 +171,9 @@ def test_a_free_session_tells_what_a_clamped_one_does_not():
     )
     found = identifiability(0.5 * np.eye(6, 3), np.full(6, 0.01))
 
-    assert "G_xy depends on nu_xy" not in " ".join(remarks(board, found))
+    assert "G_xy depends on nu_xy" not in " ".join(identifiability_remarks(board, found))
     alone = replace(board, setups=(clamped,))
-    assert "setup clamped is clamped all round" in " ".join(remarks(alone, found))
+    assert "setup clamped is clamped all round" in " ".join(identifiability_remarks(alone, found))
 
 
 def test_leverages_and_errors_are_those_of_linear_regression():

@@ -18,7 +18,7 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.commands.prepare import prepare
 from bayesplate.estimates import least_squares as estimates
 from bayesplate.estimates.least_squares import has_settled, log_measured, reading_scales, weighted_least_squares
-from bayesplate.plate.naming import Place
+from bayesplate.plate.naming import ModePlace
 from bayesplate.plate.terms import Parity
 
 
@@ -119,7 +119,7 @@ class Jumping:
     def solve(self, system, values):
         self.solved.append(np.log([float(values[name]) for name in RIGIDITIES]) - self.start)
         model = copy(self)
-        model.places = (Place(Parity(0, 0), int(self.solved[-1][0] > 0.0), 1.0),)
+        model.places = (ModePlace(Parity(0, 0), int(self.solved[-1][0] > 0.0), 1.0),)
         return model
 
     def log_frequencies(self, values, law):
@@ -178,7 +178,7 @@ def test_steps_to_and_fro_are_shortened_while_no_names_are_exchanged(monkeypatch
 def test_steps_that_shrink_do_not_go_round(factor, goes_round):
     places = np.cumsum(0.1 * factor ** np.arange(8.0))
     tried = [SimpleNamespace(rigidities=np.exp([place, 0.0, 0.0])) for place in places]
-    found = [bool(estimates._round(tried[:n])) for n in range(1, 9)]
+    found = [bool(estimates._find_cycle(tried[:n])) for n in range(1, 9)]
     assert found == [goes_round and n > 2 for n in range(1, 9)]
 
 

@@ -11,16 +11,16 @@ from bayesplate.commands.prepare import prepare
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.estimates.leave_one_out import (
     CarryingMode,
-    Errors,
     Leverages,
+    PredictionErrors,
     carrying_modes,
     carrying_sentence,
     indices_of,
     leverages_of,
     prediction_errors,
-    united,
+    unite_carrying_modes,
 )
-from bayesplate.estimates.refit import design, deviance_misfit, most_likely, normal_misfit, refit
+from bayesplate.estimates.refit import design_matrix, deviance_misfit, most_likely, normal_misfit, refit
 from bayesplate.frequencies.reading_errors import DEGREES_OF_FREEDOM, ReadingErrors
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.posing import pose
@@ -105,7 +105,7 @@ def test_a_curved_problem_approaches_the_closed_form_as_the_residuals_shrink(pro
     for size in (1.0, 0.1):
         data = 5.0 + size * (target - 5.0)
         fitted = refit(curved, data, scales, np.zeros(4))
-        leverages = np.diagonal(hat_matrix(design(curved, scales, fitted)))[:N_MODES]
+        leverages = np.diagonal(hat_matrix(design_matrix(curved, scales, fitted)))[:N_MODES]
         found = prediction_errors(curved, data, normal_misfit(data, scales), ORIGIN)
         expected = found.in_sample / (1 - leverages)
         apart.append(np.abs(found.left_out - expected).max())
@@ -271,7 +271,7 @@ def test_readings_of_one_mode_carry_together_what_neither_carries_alone():
 
 
 def test_errors_of_some_readings_keep_their_places_among_all():
-    errors = Errors(np.ones(2), np.array([1.0, 300.0]), Leverages(np.array([0.5, 0.95]), np.array([-1, 1])))
+    errors = PredictionErrors(np.ones(2), np.array([1.0, 300.0]), Leverages(np.array([0.5, 0.95]), np.array([-1, 1])))
     spread = errors.at(np.array([0, 2]), 4)
     assert spread.left_out == pytest.approx([1.0, np.nan, 300.0, np.nan], nan_ok=True)
     assert spread.in_sample == pytest.approx([1.0, np.nan, 1.0, np.nan], nan_ok=True)
@@ -291,4 +291,7 @@ def test_modes_that_carry_something_are_named():
     assert "the size of clamp rotation" in carrying_sentence(told)
     assert carrying_sentence(()) == ""
     again = (CarryingMode(setup.name, labels[5], 0.99, "E_x"), CarryingMode(setup.name, labels[0], 0.91, "E_x"))
-    assert [(one.label, one.carries) for one in united(told[1:], again)] == [(labels[5], "E_y"), (labels[0], "E_x")]
+    assert [(one.label, one.carries) for one in unite_carrying_modes(told[1:], again)] == [
+        (labels[5], "E_y"),
+        (labels[0], "E_x"),
+    ]

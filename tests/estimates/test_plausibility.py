@@ -15,8 +15,8 @@ from generator.effects import TransverseShear
 from generator.naming import frequencies
 from generator.plate import Plate
 
-from bayesplate.board.board import Board, density, made_board
-from bayesplate.board.parameter import BOARD
+from bayesplate.board.board import Board, board_density, make_board
+from bayesplate.board.parameter import BOARD_OWNER
 from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Reading
@@ -25,14 +25,14 @@ from bayesplate.commands.problem import Problem
 from bayesplate.errors import InputError, NotIdentifiableError
 from bayesplate.estimates.plausibility import (
     _SLACK,
-    FASTEST,
-    SLOWEST,
+    FASTEST_SOUND,
+    SLOWEST_SOUND,
     PriorPredictive,
     prior_predictive,
     require_plausible,
     speed_and_ratio,
 )
-from bayesplate.estimates.unusual import HEAVIEST_FIBRES, LIGHTEST_WOOD, MOST_ORTHOTROPIC, unusual
+from bayesplate.estimates.unusual import HEAVIEST_FIBRES, LIGHTEST_WOOD, MOST_ORTHOTROPIC, unusual_sentences
 from bayesplate.labels import Label
 
 PRIORS = ("spruce", "weakly-informative")
@@ -47,9 +47,9 @@ def board_of(name: str, prior: str) -> Board:
     board = Board.from_toml(name).assuming(load_prior(prior))
     if "mass" not in board.inputs:
         return board
-    stated = Quantity.exact(float(density(board.nominal())))
-    own = {one.key: one.prior for one in board.parameters if one.owner == BOARD and one.key != "mass"}
-    return made_board(board.name, own | {"density": stated}, board.setups)
+    stated = Quantity.exact(float(board_density(board.nominal())))
+    own = {one.key: one.prior for one in board.parameters if one.owner == BOARD_OWNER and one.key != "mass"}
+    return make_board(board.name, own | {"density": stated}, board.setups)
 
 
 def with_readings(board: Board, change: Callable[[Reading], Reading], **of_setups: Label) -> Board:
@@ -65,7 +65,7 @@ def read_as(board: Board, factor: float) -> Board:
 
 def measured_as(board: Board, factor: float, names: tuple[str, ...]) -> Board:
     """The same with some lengths, and what clamps cover, times a factor."""
-    changed = [one for one in board.parameters if one.name in names or one.owner != BOARD]
+    changed = [one for one in board.parameters if one.name in names or one.owner != BOARD_OWNER]
     return board.with_priors({one.name: one.prior.scaled(factor) for one in changed})
 
 
@@ -101,7 +101,11 @@ def test_units_are_asked_about(name, prior):
 
     for factor in (0.5, 2.0):  # an octave is no unit
         assert asked(read_as(board, factor), prior) == ""
-    for factor in (1.05 * FASTEST / speed, 1000.0, 0.95 * SLOWEST / speed):  # whatever the mistake, no material is so
+    for factor in (
+        1.05 * FASTEST_SOUND / speed,
+        1000.0,
+        0.95 * SLOWEST_SOUND / speed,
+    ):  # whatever the mistake, no material is so
         told = asked(read_as(board, factor), prior)
         assert "wanted those of a material that carries sound at 50 to 15000 m/s" in told, factor
     assert "in rad/s?" in asked(read_as(board, 2 * np.pi), prior)
@@ -146,7 +150,7 @@ def test_materials_from_foam_to_carbon_fibre_are_asked_nothing(E_x, E_y, G_xy, r
 
     assert asked(board, "weakly-informative") == ""
     speed, _ = speed_and_ratio(board)
-    assert SLOWEST < speed < FASTEST
+    assert SLOWEST_SOUND < speed < FASTEST_SOUND
     assert speed == pytest.approx(np.sqrt(E_x * 1e9 / rho), rel=0.1)  # Rayleigh quotients, 1 - nu^2
 
 
@@ -332,7 +336,7 @@ def test_what_is_unusual_is_told_and_what_is_usual_is_not(prior, constants, rho,
     plate, board = of_spruce(**constants)
     if rho is not None:
         board = board.with_priors({"mass": Quantity.exact(rho * plate.L_x * plate.L_y * plate.h)})
-    told = " ".join(unusual(board, load_prior(prior), np.array([plate.D_x, plate.D_y, plate.D_s])))
+    told = " ".join(unusual_sentences(board, load_prior(prior), np.array([plate.D_x, plate.D_y, plate.D_s])))
 
     assert (words in told) is is_told
 
@@ -367,6 +371,6 @@ def test_constants_are_judged_where_the_shear_moduli_have_moved():
     values = posed.parameters.values_at(posed.centre)
     prior = posed.prior
 
-    assert unusual(posed.board, prior, posed.estimate.rigidities) != ()
+    assert unusual_sentences(posed.board, prior, posed.estimate.rigidities) != ()
     assert values["D_x"] == pytest.approx(values["D_y"], rel=0.02)
     assert posed.doubts == ()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesplate.estimates.sheet import Precision, combination, combined_shapes
+from bayesplate.estimates.sheet import Precision, combination_weights, combined_shapes
 
 CLAMPED = np.array(
     [
@@ -18,18 +18,18 @@ CLAMPED = np.array(
 
 def test_three_decoupled_modes_are_their_own_combination():
     """A board with two beam modes and one twisting mode, as the classic methods need: by hand, each over its own."""
-    np.testing.assert_allclose(combination(np.diag([2.0, 4.0, 5.0])), np.diag([0.5, 0.25, 0.2]), atol=1e-15)
+    np.testing.assert_allclose(combination_weights(np.diag([2.0, 4.0, 5.0])), np.diag([0.5, 0.25, 0.2]), atol=1e-15)
 
 
 def test_combination_decouples_the_constants():
     """Combined psi of any plate are its rigidities, and none answers to another one."""
-    np.testing.assert_allclose(combination(CLAMPED) @ CLAMPED, np.eye(3), atol=1e-10)
+    np.testing.assert_allclose(combination_weights(CLAMPED) @ CLAMPED, np.eye(3), atol=1e-10)
 
 
 def test_two_readings_of_one_mode_share_its_weight():
     doubled = np.array([[2.0, 0, 0], [2.0, 0, 0], [0, 4.0, 0], [0, 0, 5.0]])
 
-    np.testing.assert_allclose(combination(doubled)[0], [0.25, 0.25, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(combination_weights(doubled)[0], [0.25, 0.25, 0, 0], atol=1e-15)
 
 
 def test_shapes_are_mixed_with_unit_norm_and_one_sign():
@@ -50,7 +50,7 @@ def test_shapes_are_mixed_with_unit_norm_and_one_sign():
 @pytest.mark.parametrize("rows", [slice(0, 2), [0, 0, 0, 1]], ids=["two modes", "one mode again"])
 def test_modes_that_do_not_tell_the_constants_apart_are_refused(rows):
     with pytest.raises(ValueError, match="wanted modes that tell three constants apart"):
-        combination(CLAMPED[rows])
+        combination_weights(CLAMPED[rows])
 
 
 def test_the_range_foretells_readings_that_were_left_out():

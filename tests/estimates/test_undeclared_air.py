@@ -16,7 +16,7 @@ from bayesplate.board.attached import DeclaredFluid
 from bayesplate.board.material import moduli
 from bayesplate.effects import declare
 from bayesplate.estimates.least_squares import weighted_least_squares
-from bayesplate.estimates.undeclared_air import SMALLEST, air_sentence, rise_with_air
+from bayesplate.estimates.undeclared_air import SMALLEST_RISE, air_sentence, rise_with_air
 
 PLATES = {"clamped": DRIVEN, "half-top": HALF_TOP}
 
@@ -51,7 +51,7 @@ def test_an_isotropic_board_has_one_constant_to_tell_of():
     # Air of 1.2 kg/m3 is a twenty-fifth of what it rang in, and nine millimetres of steel hardly feel it.
     rise = rise_with_air(board, estimate)
     assert rise == pytest.approx([rise[0]] * 3)
-    assert 0.0 < rise[0] < SMALLEST
+    assert 0.0 < rise[0] < SMALLEST_RISE
     assert air_sentence(board, estimate) == ""
 
 

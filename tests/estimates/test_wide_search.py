@@ -33,7 +33,7 @@ def board_with(*sessions):
 def found():
     """Guesses, and the tables on which the last of them rest, of one board in two sessions of slightly other peaks."""
     tables = []
-    made = wide_search._Modes.table
+    made = wide_search._SetupModes.table
 
     def table(self, population, n_nodes):
         tables.append((self, made(self, population, n_nodes), population))
@@ -41,7 +41,7 @@ def found():
 
     board = board_with(HERTZ, [1.003 * one for one in HERTZ])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(wide_search._Modes, "table", table)
+        patch.setattr(wide_search._SetupModes, "table", table)
         guesses = search_widely(board, WIDE, np.random.default_rng(0))
     return board, guesses, tables
 
@@ -77,5 +77,5 @@ def test_tables_err_by_less_than_the_noise(found):
 
 
 def test_a_prior_without_a_plate_leaves_nothing_to_guess(monkeypatch):
-    monkeypatch.setattr(wide_search, "_density", lambda *_: lambda x: np.full(len(x), -np.inf))
+    monkeypatch.setattr(wide_search, "_log_prior_density", lambda *_: lambda x: np.full(len(x), -np.inf))
     assert search_widely(board_with(HERTZ), WIDE, np.random.default_rng(0)) == []

@@ -8,7 +8,7 @@ from itertools import combinations, product
 import numpy as np
 import pytest
 
-from bayesplate.frequencies.assignment import LOG_NOTHING, Assignments, Near
+from bayesplate.frequencies.assignment import LOG_NEGLIGIBLE, Assignments, NearPeaks
 
 SIZES = [((1,), 1), ((1,), 4), ((3,), 3), ((4,), 2), ((4,), 6), ((0,), 3), ((2,), 0)]
 SIZES += [((1, 1), 1), ((2, 2), 3), ((3, 2), 5), ((1, 4), 3), ((0, 2), 3)]
@@ -30,7 +30,7 @@ class Told:
             pair - alone[:, None, None] - np.log(self.missed)
             for pair, alone in zip(self.log_pair, self.log_alone, strict=True)
         ]
-        near = [Near.of((each > LOG_NOTHING).any(axis=2)) for each in logs]
+        near = [NearPeaks.of((each > LOG_NEGLIGIBLE).any(axis=2)) for each in logs]
         ratios = [np.exp(each[one.pairs()]) for each, one in zip(logs, near, strict=True)]
         return Assignments(near, ratios, self.unsigned)
 

@@ -14,13 +14,13 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Peak, Reading
 from bayesplate.board.setup import Setup
 from bayesplate.frequencies.model import OtherMode
-from bayesplate.frequencies.peaks import PeakLikelihood, takes_part
-from bayesplate.frequencies.residues import NODAL_LINE, share_seen, sign_probabilities
-from bayesplate.plate.naming import Place
+from bayesplate.frequencies.peaks import PeakLikelihood, needs_assignment
+from bayesplate.frequencies.residues import NODAL_LINE, detection_share, sign_probabilities
+from bayesplate.plate.naming import ModePlace
 from bayesplate.plate.terms import Parity
 
 NOISE = np.array([0.01, 0.03, 0.002])
-PLACE = Place(Parity(0, 0), 0, 1.0)
+PLACE = ModePlace(Parity(0, 0), 0, 1.0)
 MODES = np.log(
     [[100.0, 130.0, 131.0, 180.0, 240.0], [99.0, 131.0, 129.0, 182.0, 235.0], [101.0, 130.5, 132.0, 178.0, 239.0]]
 )
@@ -156,7 +156,7 @@ def test_signs_keep_peaks_and_modes_apart(signed) -> None:
     likelihood = PeakLikelihood.of(model_of(setup, RESIDUES))
     found = likelihood.log_likelihood(MODES, NOISE)
     assert (likelihood.probabilities(MODES, NOISE).sum(axis=0) <= 1.0 + 1e-12).all()
-    seen = (1.0 - MISSED) * share_seen(RESIDUES)
+    seen = (1.0 - MISSED) * detection_share(RESIDUES)
     positive = norm.cdf(RESIDUES[3] / NODAL_LINE)
     for draw in range(3):
         expected = 0.0
@@ -177,8 +177,8 @@ def test_nodal_lines_hide_modes() -> None:
     drawn = RESIDUES + NODAL_LINE * rng.standard_normal((200_000, RESIDUES.size))
     shares = drawn**2 / (drawn**2 + NODAL_LINE**2)
     error = 4.0 * shares.std(axis=0) / np.sqrt(len(drawn))
-    assert (np.abs(share_seen(RESIDUES) - shares.mean(axis=0)) < error).all()
-    assert share_seen(np.zeros(1))[0] == pytest.approx(0.344, abs=5e-4)
+    assert (np.abs(detection_share(RESIDUES) - shares.mean(axis=0)) < error).all()
+    assert detection_share(np.zeros(1))[0] == pytest.approx(0.344, abs=5e-4)
     assert (np.abs(RESIDUES**2 / (RESIDUES**2 + NODAL_LINE**2) - shares.mean(axis=0)) > error).all()  # control
 
 
@@ -219,10 +219,10 @@ def test_a_rounded_peak_has_the_probability_of_its_interval() -> None:
 
 def test_sure_readings_alone_take_no_part() -> None:
     sure = setup_of([reading((1, 1), 100.0)])
-    assert not takes_part(sure)
+    assert not needs_assignment(sure)
     assert PeakLikelihood.of(model_of(sure)) is None
-    assert takes_part(setup_of([reading((1, 1), 100.0, confidence=0.99)]))
-    assert takes_part(replace(sure, peaks=(Peak(exact(130.0)),)))
+    assert needs_assignment(setup_of([reading((1, 1), 100.0, confidence=0.99)]))
+    assert needs_assignment(replace(sure, peaks=(Peak(exact(130.0)),)))
 
 
 def test_draws_are_judged_a_few_at_a_time_and_say_the_same(monkeypatch):

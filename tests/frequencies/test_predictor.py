@@ -10,7 +10,7 @@ import pytest
 from bayesplate.commands.problem import Problem
 from bayesplate.estimates.refit import sensitivities
 from bayesplate.frequencies.laws import ExactLaw, cents
-from bayesplate.posterior.laplace import every_predictor, law_tolerance, predictor
+from bayesplate.posterior.laplace import all_modes_predictor, law_tolerance, predictor
 
 EFFECTS = {"shear-flexible": ("transverse_shear",), "on a soft clamp": ("clamp_rotation",)}
 
@@ -43,7 +43,7 @@ def test_tangent_has_the_value_and_the_slopes_of_the_exact_law(posed, by):
 
     A clamp without any compliance is a bound, where the differences see one side only: not there.
     """
-    predict = every_predictor(posed.board, posed.posterior.models, "exact", posed.centre)
+    predict = all_modes_predictor(posed.board, posed.posterior.models, "exact", posed.centre)
     at = moved(posed, by)
     whole, near, elsewhere = of_whole_bases(predict), predict.tangent(at), predict.tangent(moved(posed, by + 1.0))
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import pytest
 from made_summaries import SUMMARY
 
-from bayesplate.grading.boards import NUMBERS, WORDS, BoardRow, row_of, with_copies_in_doubt
+from bayesplate.grading.boards import NUMBER_COLUMNS, TEXT_COLUMNS, BoardRow, board_row, mark_copied_readings
 from bayesplate.grading.storage import Journal, write_table
 
 ROW, REFUSED = (
-    row_of(replace(SUMMARY, doubts=("misread?", "scatter"))),
+    board_row(replace(SUMMARY, doubts=("misread?", "scatter"))),
     BoardRow("bad", "refused", "=cmd|' /C calc'!A0"),
 )
 
@@ -36,7 +36,7 @@ def written(path, **rows):
 def test_rows_come_back_to_the_last_bit(path):
     written(path, one=ROW, two=REFUSED)
     assert ROW.doubt == "misread?; scatter"
-    assert len(ROW.cells()) == len(WORDS) + len(NUMBERS) == len(REFUSED.cells())
+    assert len(ROW.cells()) == len(TEXT_COLUMNS) + len(NUMBER_COLUMNS) == len(REFUSED.cells())
 
 
 @pytest.mark.parametrize("cut", [1, 100])
@@ -91,7 +91,7 @@ def test_a_table_in_parquet_has_the_same_cells(tmp_path):
     rows = [ROW, REFUSED] * 700
     found = parquet.read_table(write_table(tmp_path, "parquet", rows))
 
-    assert found.column_names == [*WORDS, *NUMBERS]
+    assert found.column_names == [*TEXT_COLUMNS, *NUMBER_COLUMNS]
     assert [list(one.values()) for one in found.to_pylist()[:2]] == [ROW.cells(), REFUSED.cells()]
     assert found.num_rows == 1400
 
@@ -106,7 +106,7 @@ def test_boards_of_the_same_readings_are_in_doubt():
         BoardRow("f", "fitted"),
         BoardRow("g", "fitted"),
     ]
-    doubts = {row.name: row.doubt for row in with_copies_in_doubt(rows) if row.doubt}
+    doubts = {row.name: row.doubt for row in mark_copied_readings(rows) if row.doubt}
 
     assert doubts["a"] == "every reading is that of d to the last digit: one board twice, or a copy?; misread?"
     assert doubts["d"].startswith("every reading is that of a to")

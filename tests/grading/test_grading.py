@@ -14,7 +14,7 @@ from bayesplate.grading.boards import BoardRow
 from bayesplate.grading.figures import FIGURES, box_probability, target_thickness
 from bayesplate.grading.matching import GradingRequest, grade, proposed_pairs
 from bayesplate.grading.tables import MOST_ON_TERMINAL, doubts_sentence, grading_tables, write_grading
-from bayesplate.results.contract import JOINT, Joint
+from bayesplate.results.contract import JOINT_NAMES, JointMoments
 
 INF = np.inf
 
@@ -32,8 +32,8 @@ def values() -> dict[str, np.ndarray]:
 
 
 def test_the_joint_distribution_is_that_of_the_logarithms(values):
-    joint = Joint.of_values(values)
-    logs = np.log([values[name] for name in JOINT])
+    joint = JointMoments.of_values(values)
+    logs = np.log([values[name] for name in JOINT_NAMES])
 
     np.testing.assert_allclose(joint.log_mean, logs.mean(axis=1), rtol=1e-12)
     np.testing.assert_allclose(joint.log_covariance, np.cov(logs), rtol=1e-9, atol=1e-15)
@@ -41,7 +41,7 @@ def test_the_joint_distribution_is_that_of_the_logarithms(values):
 
 def test_figures_are_what_the_draws_give(values):
     """Mean and sd of each logarithm, exactly: a product of powers is a sum of logarithms."""
-    joint = Joint.of_values(values)
+    joint = JointMoments.of_values(values)
     mean, covariance = np.array([joint.log_mean]), np.array([joint.log_covariance])
     constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], 0.4)
     by_hand = {name: item.values for name, item in derived_quantities(constants, values["density"]).items()} | values
@@ -85,12 +85,12 @@ def test_numbers_that_follow_from_one_another_are_no_obstacle():
 
 def boards(values, factors) -> list[BoardRow]:
     """Boards like one, their moduli multiplied, the third one known ten times less well."""
-    joint = Joint.of_values(values)
+    joint = JointMoments.of_values(values)
     rows = []
     for i, factor in enumerate(factors):
         mean = np.array(joint.log_mean) + np.log([*factor, *factor, 1.0])
         wider = np.array(joint.log_covariance) * (100.0 if i == 2 else 1.0)
-        rows.append(BoardRow(f"b{i}", "fitted", joint=Joint(JOINT, tuple(mean), tuple(map(tuple, wider)))))
+        rows.append(BoardRow(f"b{i}", "fitted", joint=JointMoments(JOINT_NAMES, tuple(mean), tuple(map(tuple, wider)))))
     return [*rows, BoardRow("bad", "refused", "=cmd()")]
 
 
@@ -124,7 +124,7 @@ def test_no_pair_that_may_match_is_passed_over(monkeypatch):
 
     A few are integrated together, which changes none of them.
     """
-    monkeypatch.setattr("bayesplate.grading.figures._AT_ONCE", 3)
+    monkeypatch.setattr("bayesplate.grading.figures._CHUNK_SIZE", 3)
     rng = np.random.default_rng(3)
     width = np.full(2, np.log(1.1))
     least = 1.0
@@ -150,7 +150,7 @@ def test_no_pair_that_may_match_is_passed_over(monkeypatch):
 
 def test_pairs_take_memory_in_proportion_to_the_boards(monkeypatch):
     """All beside all would take the square: 2 MB for each figure of five hundred."""
-    monkeypatch.setattr("bayesplate.grading.figures._AT_ONCE", 8)
+    monkeypatch.setattr("bayesplate.grading.figures._CHUNK_SIZE", 8)
     rng = np.random.default_rng(3)
     mean = 0.1 * rng.standard_normal((500, 7))
     covariance = np.broadcast_to(1e-4 * np.eye(7), (500, 7, 7))

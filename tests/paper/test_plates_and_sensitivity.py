@@ -14,7 +14,7 @@ from paper_rows import COEFFICIENTS, SETUPS, beams_of
 from bayesplate.board.material import rigidities
 from bayesplate.frequencies.terms import shear_term_weights, term_weights
 from bayesplate.plate.mesh import mesh
-from bayesplate.plate.naming import find
+from bayesplate.plate.naming import find_named_modes
 from bayesplate.plate.shear import SHEAR_ELEMENTS_PER_SIDE, shear_flexible_plate
 from bayesplate.plate.thin import thin_plate
 
@@ -65,7 +65,7 @@ def computed(name, plate, is_shear_flexible):
         weights = term_weights(values, setup).at(0)
         matrices = thin_plate(setup.ends_x, setup.ends_y, *mesh(weights))
     beams = {label: beams_of(name, label) for label in COEFFICIENTS[name]}
-    found = find(matrices, weights, beams.values())
+    found = find_named_modes(matrices, weights, beams.values())
     area = values["length_x"] * values["length_y"]
     return {label: found[b].eigenvalue * DENSITY * THICKNESS * area**2 for label, b in beams.items()}
 

@@ -10,7 +10,7 @@ from paper_rows import COEFFICIENTS, SETUPS, beams_of, paper_coefficients
 from bayesplate.board.material import rigidities
 from bayesplate.frequencies.terms import term_weights
 from bayesplate.plate.mesh import mesh
-from bayesplate.plate.naming import find
+from bayesplate.plate.naming import find_named_modes
 from bayesplate.plate.thin import thin_plate
 
 NU = 0.51
@@ -34,7 +34,7 @@ def values_of(board):
 def found_by_label(name, values):
     setup, weights = SETUPS[name], term_weights(values, SETUPS[name]).at(0)
     beams = {label: beams_of(name, label) for label in COEFFICIENTS[name]}
-    found = find(thin_plate(setup.ends_x, setup.ends_y, *mesh(weights)), weights, beams.values())
+    found = find_named_modes(thin_plate(setup.ends_x, setup.ends_y, *mesh(weights)), weights, beams.values())
     return {label: found[product] for label, product in beams.items()}
 
 

@@ -10,9 +10,9 @@ from paper_rows import COEFFICIENTS, SETUPS, beams_of, paper_coefficients
 
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.plate import training
-from bayesplate.plate.naming import find
+from bayesplate.plate.naming import find_named_modes
 from bayesplate.plate.thin import thin_plate
-from bayesplate.plate.training import REFERENCE, TrainingConstants, train, training_weights
+from bayesplate.plate.training import REFERENCE_FACTORS, TrainingConstants, train, training_weights
 
 CANTILEVER = (SETUPS["cantilever"].ends_x, SETUPS["cantilever"].ends_y, 223 / 114, 3 / 223)
 CLAMPED = (SETUPS["clamped"].ends_x, SETUPS["clamped"].ends_y, 150 / 103, 3 / 600)
@@ -33,7 +33,9 @@ def plane(mode):
 def found_in_the_middle(board, products):
     """a, b, c by the energy shares of one solve of the plate in the middle of the set."""
     ends_x, ends_y, aspect_ratio, _ = board
-    found = find(thin_plate(ends_x, ends_y, 16, 16), training_weights(*board[2:], CONSTANTS, "thin"), products)
+    found = find_named_modes(
+        thin_plate(ends_x, ends_y, 16, 16), training_weights(*board[2:], CONSTANTS, "thin"), products
+    )
     stiffness = np.stack([found[product].stiffness for product in products])
     return paper_coefficients(stiffness, aspect_ratio, CONSTANTS.nu_xy)
 
@@ -121,14 +123,14 @@ def test_plates_cover_the_printed_ranges(cantilever):
     assert len({plate.factors for plate in cantilever.plates}) == 25
     assert 4.3 < p.min() < p.max() < 6.6
     assert 0.28 < q.min() < q.max() < 0.45
-    reference = plate_of(cantilever, REFERENCE)
+    reference = plate_of(cantilever, REFERENCE_FACTORS)
     assert (reference.p, reference.q) == pytest.approx((4.36, 0.29), abs=0.005)
     np.testing.assert_allclose(reference.mac[:, :6], np.eye(6), atol=1e-3)  # it recognises itself
 
 
 def test_modes_cross_where_the_figure_says(cantilever):
     """At p = 4.36, q = 0.40 mode (2,1) has come below (1,2); the paper keeps nu_yx fixed, so its p is 0.03 lower."""
-    reference, crossed = plate_of(cantilever, REFERENCE), plate_of(cantilever, (0.8, 1.1))
+    reference, crossed = plate_of(cantilever, REFERENCE_FACTORS), plate_of(cantilever, (0.8, 1.1))
 
     assert (crossed.p, crossed.q) == pytest.approx((4.36, 0.40), abs=0.03)
     assert (reference.matches[beams((1, 2))], reference.matches[beams((2, 1))]) == (3, 4)

@@ -12,13 +12,13 @@ from made_boards import CANTILEVER_LABELS, setup_of
 
 from bayesplate.board.parameter import Owner
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.sessions import shared_share
+from bayesplate.board.sessions import shared_variance_share
 from bayesplate.board.setup import DEFAULT_NOISE
 from bayesplate.frequencies.reading_errors import ReadingErrors
-from bayesplate.planning.beliefs import AtHand, Belief
-from bayesplate.planning.explained import _at_hand
-from bayesplate.planning.gains import Readings
-from bayesplate.planning.modes_read import REPEATED, _expected, given_first
+from bayesplate.planning.beliefs import ExplanationTerms, ReadingsAtHand
+from bayesplate.planning.explained import _readings_at_hand
+from bayesplate.planning.gains import PlannedReadings
+from bayesplate.planning.modes_read import REPEAT_SCATTER, _expected_modes, repeat_readings
 
 HERTZ = dict(zip(CANTILEVER_LABELS, (50.0, 98.0, 310.0, 340.0, 480.0, 700.0), strict=True))
 SETUP = setup_of(ritz.CANTILEVER, HERTZ, resolution=1.0, noise=Quantity.from_median(0.004, 1.6))
@@ -33,13 +33,13 @@ def once_more(setup, share, noise=SECOND):
     """Readings of one term, given the first."""
     station = SimpleNamespace(base=setup, setup=setup, n_old=N)
     own = ReadingErrors.of(setup).own_variance
-    alone = Readings((SHIFT[None],), (SLOPES[None],), ((noise**2 + own)[None],))
-    return given_first(station, range(N), alone, [np.array([FIRST**2])], [np.array([share])])
+    alone = PlannedReadings((SHIFT[None],), (SLOPES[None],), ((noise**2 + own)[None],))
+    return repeat_readings(station, range(N), alone, [np.array([FIRST**2])], [np.array([share])])
 
 
 def test_both_days_tell_what_their_joint_covariance_says():
     """Normal equations of all readings, their covariance written out, against the second day given the first."""
-    share, own = shared_share(SETUP), ReadingErrors.of(SETUP).own_variance
+    share, own = shared_variance_share(SETUP), ReadingErrors.of(SETUP).own_variance
     assert share == pytest.approx(9.0 / 25.0)
     common = share * FIRST**2
     one, other = FIRST**2 + own, common + (1.0 - share) * SECOND**2 + own
@@ -63,7 +63,7 @@ def test_both_days_tell_what_their_joint_covariance_says():
 
 def test_where_sessions_share_their_discrepancies_already_another_one_is_as_new_as_they_were():
     setup = replace(SETUP, group=Owner("group", "monday to friday"))
-    assert shared_share(setup) == 0.0
+    assert shared_variance_share(setup) == 0.0
     given = once_more(setup, 0.0)
     assert given.slopes[0][0] == pytest.approx(SLOPES)
     assert given.shift[0][0] == pytest.approx(SHIFT)
@@ -71,17 +71,17 @@ def test_where_sessions_share_their_discrepancies_already_another_one_is_as_new_
 
 
 def test_a_free_board_finds_half_of_its_noise_again():
-    assert shared_share(replace(SETUP, noise=DEFAULT_NOISE)) == pytest.approx(0.5)
+    assert shared_variance_share(replace(SETUP, noise=DEFAULT_NOISE)) == pytest.approx(0.5)
 
 
 def test_the_same_day_once_more_tells_of_the_constants_no_more_than_better_reading_would():
     """Board and clamp are off by the same again: what is left is the rounding of two readings in place of one."""
-    given = once_more(SETUP, 1.0 - (REPEATED / FIRST) ** 2, FIRST)
+    given = once_more(SETUP, 1.0 - (REPEAT_SCATTER / FIRST) ** 2, FIRST)
     own = ReadingErrors.of(SETUP).own_variance
     slopes, variance = given.slopes[0][0], given.variance[0][0]
     before = SLOPES.T @ (SLOPES / (FIRST**2 + own)[:, None])
     after = before + slopes.T @ (slopes / variance[:, None])
-    of_mean = SLOPES.T @ (SLOPES / (FIRST**2 + 0.5 * (own - REPEATED**2))[:, None])
+    of_mean = SLOPES.T @ (SLOPES / (FIRST**2 + 0.5 * (own - REPEAT_SCATTER**2))[:, None])
 
     assert (np.diagonal(before) < np.diagonal(after)).all()
     assert (np.diagonal(after) < 1.001 * np.diagonal(of_mean)).all()
@@ -94,15 +94,15 @@ def read_as(taken):
     at_hand = None
     if taken is not None:
         every = np.r_[0, 1, taken]
-        at_hand = AtHand(100.0 + every[None], 0.5 * every[None, :, None], every)
-    one = Belief(
+        at_hand = ReadingsAtHand(100.0 + every[None], 0.5 * every[None, :, None], every)
+    one = ExplanationTerms(
         members=(), words="", probability=1.0, mean=np.zeros((1, 1)), covariance=np.eye(1)[None],
         noise=np.full((1, 2), FIRST), middle=np.zeros((1, 0)), wanted=np.zeros((1, 0, 1)), again=at_hand,
     )  # fmt: skip
     solved = np.arange(2.0 * (N + 1)).reshape(2, -1)
     station = SimpleNamespace(base=SETUP, n_old=N)
     law = SimpleNamespace(station=station, middle=solved[0], solved=solved, slopes=np.arange(N + 1.0)[None, :, None])
-    return _expected(one, known, law)
+    return _expected_modes(one, known, law)
 
 
 @pytest.mark.parametrize(
@@ -140,7 +140,7 @@ def test_what_an_explanation_with_other_labels_takes_each_reading_for(rows, take
     of_label, own_rows = np.arange(2, 10), np.asarray(rows)
     base = SimpleNamespace(rows=of_label)
     own = SimpleNamespace(n_modes=8, rows=own_rows, is_mode=own_rows >= 0)
-    found = _at_hand(own, base, 10.0 + np.arange(8.0)[None], np.arange(8.0)[None, :, None])
+    found = _readings_at_hand(own, base, 10.0 + np.arange(8.0)[None], np.arange(8.0)[None, :, None])
 
     expected = np.where(np.isin(np.arange(8), none), np.nan, 10.0 + np.arange(8.0))
     assert found.taken.tolist() == taken

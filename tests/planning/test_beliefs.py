@@ -11,11 +11,11 @@ import pytest
 
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.search import search
+from bayesplate.diagnosis.search import run_search
 from bayesplate.diagnosis.terms import noise_grid
 from bayesplate.planning.beliefs import Beliefs
-from bayesplate.planning.explained import asked, explanations_of, survivors
-from bayesplate.planning.gains import Readings, probabilities_after
+from bayesplate.planning.explained import explanation_terms, explanations_of_effects, surviving_explanations
+from bayesplate.planning.gains import PlannedReadings, probabilities_after
 
 N_READ, N_MODES = 6, 9
 NAMES = ("first", "second")
@@ -47,7 +47,7 @@ def found_of(whole, directions, residual, n):
     levels = noise_grid(base.board)
     tables = [(name, one.fine) for name, one in candidates.items()]
     hypotheses = (made.bare(base, levels), *(Hypothesis((name,), 0.25, table, levels, base) for name, table in tables))
-    return search(made.ground_of(base, *hypotheses, candidates=candidates))
+    return run_search(made.ground_of(base, *hypotheses, candidates=candidates))
 
 
 def unmoved(one, direction):
@@ -65,7 +65,7 @@ def unmoved(one, direction):
 
 def believed(found, effects):
     """What the search leaves to be believed of some effects."""
-    explanations = explanations_of(found, asked(found, effects), np.random.default_rng(1))
+    explanations = explanation_terms(found, explanations_of_effects(found, effects), np.random.default_rng(1))
     return Beliefs((SimpleNamespace(board=found.ground.baseline.board),), explanations)
 
 
@@ -86,7 +86,7 @@ def further(beliefs, whole, directions):
         shift.append(moved)
         slopes.append(along)
         variance.append(np.tile(one.noise**2, (1, N_MODES - N_READ)))
-    return Readings(tuple(shift), tuple(slopes), tuple(variance))
+    return PlannedReadings(tuple(shift), tuple(slopes), tuple(variance))
 
 
 def test_probabilities_now_are_those_of_the_search(boards):
@@ -132,7 +132,7 @@ def test_survivors_are_those_within_a_factor_ten_and_no_effect(boards):
     def left(none, first, second, rivals=()):
         share = np.array([none, first, second])
         made_up = replace(found, probability=share / share.sum())
-        return {one.members for one in survivors(made_up, rivals)}
+        return {one.members for one in surviving_explanations(made_up, rivals)}
 
     assert left(0.5, 0.4, 0.05) == {(), ("first",), ("second",)}
     assert left(0.5, 0.4, 0.03) == {(), ("first",)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesplate.planning.bench import placing
+from bayesplate.planning.bench import choose_places
 
 GRID = np.linspace(0.0, 1.0, 25)
 
@@ -16,7 +16,7 @@ def shape(m, n):
 
 
 def test_one_mode_is_sensed_at_its_antinode_and_struck_at_another():
-    found = placing(shape(2, 1)[None], GRID)
+    found = choose_places(shape(2, 1)[None], GRID)
 
     assert found.sensor[0] in (pytest.approx(0.25), pytest.approx(0.75))
     assert found.sensor[1] == pytest.approx(0.5)
@@ -27,7 +27,7 @@ def test_one_mode_is_sensed_at_its_antinode_and_struck_at_another():
 def test_no_nodal_line_runs_through_sensor_or_hammer():
     shapes = np.stack([shape(1, 1), shape(2, 1), shape(1, 2), shape(2, 2), shape(3, 1)])
 
-    found = placing(shapes, GRID)
+    found = choose_places(shapes, GRID)
 
     assert min(found.seen) > 0.2
     for x, y in (found.sensor, found.hammer):
@@ -36,7 +36,7 @@ def test_no_nodal_line_runs_through_sensor_or_hammer():
 
 
 def test_a_sensor_that_stands_on_a_nodal_line_is_told():
-    found = placing(np.stack([shape(1, 1), shape(4, 1)]), GRID, sensor=(0.5, 0.5))
+    found = choose_places(np.stack([shape(1, 1), shape(4, 1)]), GRID, sensor=(0.5, 0.5))
 
     assert found.sensor == (pytest.approx(0.5), pytest.approx(0.5))
     assert found.seen[0] > 0.6  # the hammer goes where it helps those that can be seen
@@ -46,7 +46,7 @@ def test_a_sensor_that_stands_on_a_nodal_line_is_told():
 def test_taps_tell_all_figures_apart():
     shapes = np.stack([shape(1, 1), shape(2, 1), shape(1, 2)])
 
-    found = placing(shapes, GRID)
+    found = choose_places(shapes, GRID)
 
     at = [[np.sin(m * np.pi * x) * np.sin(n * np.pi * y) for m, n in ((1, 1), (2, 1), (1, 2))] for x, y in found.taps]
     assert len(found.taps) == 3

@@ -10,8 +10,8 @@ import pytest
 from scipy.stats import norm
 
 from bayesplate.board.material import MODULI, ORTHOTROPIC
-from bayesplate.planning.beliefs import Belief, Beliefs
-from bayesplate.planning.gains import GOALS, Readings, expected_gain, probabilities_after, together
+from bayesplate.planning.beliefs import Beliefs, ExplanationTerms
+from bayesplate.planning.gains import GOALS, PlannedReadings, expected_gain, join_readings, probabilities_after
 
 SIGMA = 0.3
 
@@ -20,7 +20,7 @@ def explanation(mean=0.0, probability=1.0, variance=(4.0, 1.0, 0.25), n_terms=1,
     """The three constants themselves, normal about a mean of the first one."""
     means = np.zeros((n_terms, 3))
     means[:, 0] = mean
-    return Belief(
+    return ExplanationTerms(
         members=(words,), words=words, probability=probability, mean=means,
         covariance=np.tile(np.diag(variance), (n_terms, 1, 1)), noise=np.full((n_terms, 1), SIGMA),
         middle=np.zeros((n_terms, 3)), wanted=np.tile(np.eye(3), (n_terms, 1, 1)),
@@ -33,7 +33,7 @@ def beliefs(*explanations):
 
 def reading(of, row, variance=SIGMA**2, shift=0.0):
     """One reading that sees the constants along a row."""
-    return Readings(
+    return PlannedReadings(
         tuple(np.full((one.n_terms, 1), shift) for one in of.explanations),
         tuple(np.tile(np.array([row], dtype=float), (one.n_terms, 1, 1)) for one in of.explanations),
         tuple(np.full((one.n_terms, 1), variance) for one in of.explanations),
@@ -58,7 +58,7 @@ def test_readings_together_have_half_the_log_determinant_of_what_all_say():
     now = beliefs(explanation())
     rows = np.array([[1.0, 0.5, 0.0], [0.2, 1.0, 0.3], [0.4, 0.0, 1.0]])
 
-    gain = expected_gain(now, together([reading(now, row) for row in rows]), np.random.default_rng(1))
+    gain = expected_gain(now, join_readings([reading(now, row) for row in rows]), np.random.default_rng(1))
 
     prior = np.diag([1 / 4.0, 1.0, 4.0])
     told = prior + rows.T @ rows / SIGMA**2

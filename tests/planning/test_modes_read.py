@@ -9,7 +9,7 @@ import pytest
 
 from bayesplate.board.quantity import Quantity
 from bayesplate.planning import modes_read as home
-from bayesplate.planning.beliefs import Belief, FormTerms
+from bayesplate.planning.beliefs import ExplanationTerms, FormTerms
 
 N_TERMS = 12
 LINEAR, SQUARE = np.array([[0.02, -0.01], [0.003, 0.004]]), np.array([[0.001, 0.002], [-0.001, 0.0]])
@@ -27,12 +27,12 @@ def with_effect(monkeypatch, mean, solved):
     prior = Quantity.from_mean(0.0, 1.0, "normal")
     parameters = tuple(SimpleNamespace(name=f"size {i}", prior=prior) for i in range(1, n_u))
     form = FormTerms(np.arange(n_terms), None, ("made",) * (n_u - 1), parameters, np.arange(1, n_u))
-    one = Belief(
+    one = ExplanationTerms(
         members=("made",), words="", probability=1.0, mean=mean, noise=np.ones((n_terms, 1)),
         covariance=np.tile(0.01 * np.eye(n_u), (n_terms, 1, 1)), middle=np.zeros((n_terms, 0)),
         wanted=np.zeros((n_terms, 0, n_u)), forms=(form,),
     )  # fmt: skip
-    monkeypatch.setattr(home, "_beside", solved)
+    monkeypatch.setattr(home, "_form_shift", solved)
     known = SimpleNamespace(board=SimpleNamespace(symmetry=SimpleNamespace(n=1)))
     return one, known, np.zeros((n_terms, 2)), np.zeros((n_terms, 2, n_u))
 

@@ -8,12 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 
 from bayesplate.board.material import ORTHOTROPIC
-from bayesplate.planning.beliefs import Belief, Beliefs
-from bayesplate.planning.gains import Readings
+from bayesplate.planning.beliefs import Beliefs, ExplanationTerms
+from bayesplate.planning.gains import PlannedReadings
 from bayesplate.planning.plan import ProposalEntry
 from bayesplate.planning.proposals import Planner, Proposal
 
-NOW = Belief(
+NOW = ExplanationTerms(
     members=(), words="made", probability=1.0, mean=np.zeros((1, 3)), covariance=np.eye(3)[None],
     noise=np.full((1, 1), 0.1), middle=np.zeros((1, 3)), wanted=np.eye(3)[None],
 )  # fmt: skip
@@ -22,7 +22,7 @@ PLANNER = Planner(Beliefs((SimpleNamespace(board=SimpleNamespace(symmetry=ORTHOT
 
 def proposal(what, constant, variance):
     """A reading of one of the constants."""
-    readings = Readings((np.zeros((1, 1)),), (np.eye(3)[None, [constant]],), (np.full((1, 1), variance),))
+    readings = PlannedReadings((np.zeros((1, 1)),), (np.eye(3)[None, [constant]],), (np.full((1, 1), variance),))
     return Proposal(ProposalEntry(what, "", "", what, 1.0, (), PLANNER.gain(readings)), readings, what)
 
 

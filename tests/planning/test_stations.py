@@ -12,14 +12,14 @@ from generator.plate import Plate
 from made_boards import setup_of
 
 from bayesplate.board.attached import AttachedItem
-from bayesplate.board.board import made_board
+from bayesplate.board.board import make_board
 from bayesplate.board.material import rigidities
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.sessions import unknown_discrepancies, with_discrepancies
+from bayesplate.board.sessions import unknown_discrepancy_variance, with_discrepancies
 from bayesplate.planning.beliefs import KnownBoard, prior_beliefs
-from bayesplate.planning.bench import bench_of
-from bayesplate.planning.laws import PLACED, SolvedStation, bare_law, known_mass
+from bayesplate.planning.bench import make_bench
+from bayesplate.planning.laws import PLACING_SD, SolvedStation, bare_law, known_mass
 from bayesplate.planning.modes_read import station_readings
 from bayesplate.planning.stations import new_stations, old_stations
 
@@ -32,7 +32,7 @@ MODULI = {"E_x": 11.5e9, "E_y": 0.9e9, "G_xy": 0.7e9}
 def board(edges, beams=READ):
     """A board of the generator's constants, whose readings hardly matter here."""
     setup = setup_of(edges, {one: 50.0 * (i + 1) for i, one in enumerate(beams)})
-    return made_board("made", {name: Quantity.exact(value) for name, value in SIZES.items()}, (setup,))
+    return make_board("made", {name: Quantity.exact(value) for name, value in SIZES.items()}, (setup,))
 
 
 VALUES = {name: np.asarray(value) for name, value in SIZES.items()}
@@ -113,10 +113,10 @@ def test_a_mode_that_no_session_read_departs_from_the_plate_as_one_that_was_read
     slopes = bare_law(read, next(one for one in old_stations(read, at) if one.goes_on(read)), at).slopes[0]
     column = 3 + [one.key for one in read.uncertain].index(f"discrepancy {new.label}")
 
-    unknown = unknown_discrepancies(held, station.setup)
+    unknown = unknown_discrepancy_variance(held, station.setup)
     assert unknown[: station.n_old + 1] == pytest.approx([0.0] * station.n_old + [slopes[station.n_old, column] ** 2])
     assert unknown[-1] > 0.003**2
-    assert not unknown_discrepancies(made, made.setups[0]).any()
+    assert not unknown_discrepancy_variance(made, made.setups[0]).any()
 
 
 def test_planned_readings_carry_it(monkeypatch):
@@ -129,7 +129,7 @@ def test_planned_readings_carry_it(monkeypatch):
     noise = believed.explanations[0].noise[:, 1] ** 2
 
     assert further.variance[0] - noise[:, None] == pytest.approx(
-        np.tile(unknown_discrepancies(held, last.setup)[last.n_old :], (noise.size, 1))
+        np.tile(unknown_discrepancy_variance(held, last.setup)[last.n_old :], (noise.size, 1))
     )
 
 
@@ -162,7 +162,7 @@ def test_a_known_mass_off_its_place_adds_as_much_more_or_less_as_the_independent
     """Near a nodal line a millimetre changes much of a small shift, in a belly hardly any of a large one."""
     made, (station, _) = board(FREE), free
     x, y = station.places(made)[-1]
-    wide = 3.0 * PLACED
+    wide = 3.0 * PLACING_SD
     along = loaded(made, (x + wide, y)) - loaded(made, (x - wide, y))
     across = loaded(made, (x, y + wide)) - loaded(made, (x, y - wide))
 
@@ -197,7 +197,7 @@ def test_the_sheet_shows_every_mode_that_is_to_be_found_and_the_sensor_alone_as_
     rows = range(station.n_old, len(station.setup.readings))
     law = bare_law(read, station, VALUES)
     ends = law.solved[0, list(rows), None] + np.array([-0.01, 0.0, 0.01])
-    bench = bench_of(KnownBoard(read, VALUES, (law,), np.eye(3)), law, rows, ends, "").entry
+    bench = make_bench(KnownBoard(read, VALUES, (law,), np.eye(3)), law, rows, ends, "").entry
 
     assert len(beams) == 20
     assert {one.label for one in bench.modes} == {str(station.setup.labels[i]) for i in rows}

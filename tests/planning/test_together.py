@@ -10,8 +10,8 @@ import pytest
 from bayesplate.board.material import ORTHOTROPIC
 from bayesplate.planning import together as home
 from bayesplate.planning.beliefs import KnownBoard
-from bayesplate.planning.gains import Readings, expected_gain
-from bayesplate.planning.together import _further, _joined, _Linear
+from bayesplate.planning.gains import PlannedReadings, expected_gain
+from bayesplate.planning.together import _further_board, _join_boards, _LinearBoard
 
 SD = 0.5
 NAMES = ("one", "two")
@@ -32,11 +32,11 @@ def linear(design):
     pull = precision[3:, 3:] - across.T @ np.linalg.solve(precision[:3, :3], across)
     symmetry = SimpleNamespace(free_of=lambda values: np.ones(3), n=ORTHOTROPIC.n)
     board = SimpleNamespace(symmetry=symmetry, name="made")
-    return _Linear(KnownBoard(board, {}, (), np.eye(3, 5), pull=pull), np.array([SD]), precision)
+    return _LinearBoard(KnownBoard(board, {}, (), np.eye(3, 5), pull=pull), np.array([SD]), precision)
 
 
 def together(*designs):
-    return _joined([linear(one) for one in designs], NAMES)
+    return _join_boards([linear(one) for one in designs], NAMES)
 
 
 def by_hand(*designs):
@@ -51,7 +51,7 @@ def by_hand(*designs):
 
 
 def gain_of(beliefs, rows, variance):
-    readings = Readings((np.zeros((1, len(rows))),), (rows[None],), (np.full((1, len(rows)), variance),))
+    readings = PlannedReadings((np.zeros((1, len(rows))),), (rows[None],), (np.full((1, len(rows)), variance),))
     return expected_gain(beliefs, readings, np.random.default_rng(1))
 
 
@@ -79,7 +79,7 @@ def test_one_more_reading_shrinks_what_it_sees():
 def test_another_board_is_what_it_says_of_the_shared_parameters():
     """A third board like the first: by its integrated precision, and by all its readings with constants of its own."""
     beliefs = together(*DESIGNS)
-    readings = _further(beliefs, beliefs.boards[0], "", ()).readings
+    readings = _further_board(beliefs, beliefs.boards[0], "", ()).readings
 
     found = expected_gain(beliefs, readings, np.random.default_rng(1))
 

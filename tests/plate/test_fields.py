@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from bayesplate.plate.fields import EdgeStrip, Fabric, layout, weights_within
+from bayesplate.plate.fields import EdgeStrip, Fabric, term_field_pairs, weights_within
 from bayesplate.plate.line import N_POINTS_CUT, line
 
 FREE = ("free", "free")
@@ -81,6 +81,6 @@ def test_a_strip_is_what_a_narrower_outline_leaves():
 
 def test_terms_take_their_first_fields_first():
     """Two terms of three fields and one of one: as the weights of a system are laid out."""
-    own = layout(("along", "bending", "bending"), {"along": 1, "bending": 3})
+    own = term_field_pairs(("along", "bending", "bending"), {"along": 1, "bending": 3})
 
     assert own == [(0, 0), (1, 0), (2, 0), (1, 1), (2, 1), (1, 2), (2, 2)]

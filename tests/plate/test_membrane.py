@@ -64,8 +64,8 @@ def test_converged_in_its_elements(monkeypatch):
     ]
     w = deflections(beams.side, beams.side, shapes)
     coarse = membrane_terms(w, ASPECT, SPRUCE)
-    monkeypatch.setattr(membrane, "_ELEMENTS", 2 * membrane._ELEMENTS)
-    for name in ("_matrices", "_factors"):  # without what they hold of the coarse mesh, which stays in place
+    monkeypatch.setattr(membrane, "_MOST_ELEMENTS", 2 * membrane._MOST_ELEMENTS)
+    for name in ("_matrices", "_stiffness_factors"):  # without what they hold of the coarse mesh, which stays in place
         monkeypatch.setattr(membrane, name, lru_cache(getattr(membrane, name).__wrapped__))
     fine = membrane_terms(w, ASPECT, SPRUCE)
     for curvatures in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)):

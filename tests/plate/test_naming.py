@@ -25,7 +25,7 @@ from bayesplate.effects.fluid_loading import FluidLoading
 from bayesplate.labels import HIGHEST_ORDER
 from bayesplate.plate.beams import is_rigid, product_coefficients
 from bayesplate.plate.mesh import mesh
-from bayesplate.plate.naming import CERTAIN, beam_parts, find, fits, name_modes
+from bayesplate.plate.naming import CERTAIN_CORRELATION, beam_parts, find_named_modes, name_modes, product_fits
 from bayesplate.plate.solve import solve
 from bayesplate.plate.terms import Weights
 from bayesplate.plate.thin import thin_plate
@@ -54,8 +54,8 @@ def test_modes_of_known_boards_have_their_names_in_order_and_the_frequencies_of_
     names = name_modes(solve(plate, weights, len(order)))
 
     assert [beams for beams, _ in names] == order
-    assert all(correlation >= CERTAIN for _, correlation in names)
-    assert hertz(find(plate, weights, order)) == pytest.approx(ritz.simulate(board, order), rel=2e-4)
+    assert all(correlation >= CERTAIN_CORRELATION for _, correlation in names)
+    assert hertz(find_named_modes(plate, weights, order)) == pytest.approx(ritz.simulate(board, order), rel=2e-4)
 
 
 def test_every_label_is_found_however_many_modes_lie_below_it():
@@ -64,7 +64,7 @@ def test_every_label_is_found_however_many_modes_lie_below_it():
     plate = thin_plate(("supported", "supported"), ("supported", "supported"), 18, 18)
     wanted = list(product(range(2, 9), repeat=2))
 
-    found = find(plate, weights, wanted)
+    found = find_named_modes(plate, weights, wanted)
 
     for i, j in wanted:
         m, n = i + 1, j + 1
@@ -83,7 +83,8 @@ def test_the_production_mesh_resolves_the_highest_labels(end, ratio, cents):
     shape = mesh(weights)
     wanted = [(HIGHEST_ORDER, 2), (2, HIGHEST_ORDER), (HIGHEST_ORDER, 5), (5, HIGHEST_ORDER)]
     coarse, fine = (
-        hertz(find(thin_plate((end, end), (end, end), n * shape[0], n * shape[1]), weights, wanted)) for n in (1, 2)
+        hertz(find_named_modes(thin_plate((end, end), (end, end), n * shape[0], n * shape[1]), weights, wanted))
+        for n in (1, 2)
     )
 
     errors = [1200 * np.log2(coarse[beams] / fine[beams]) for beams in wanted]
@@ -97,7 +98,7 @@ def test_places_lead_to_the_modes_they_name():
     modes = solve(plate, weights, 12)
     rows = {where: i for i, where in enumerate(zip(modes.parities, modes.ranks, strict=True))}
 
-    for mode in find(plate, weights, order).values():
+    for mode in find_named_modes(plate, weights, order).values():
         i = rows[mode.place.parity, mode.place.rank]
         assert mode.eigenvalue == pytest.approx(modes.eigenvalues[i], rel=1e-9)
         np.testing.assert_allclose(mode.stiffness, modes.coefficients[i], atol=1e-7 * modes.coefficients[i].max())
@@ -113,7 +114,7 @@ def test_names_are_marked_as_uncertain_where_two_modes_veer():
     ranks, certain = [], []
     for factor in (1.0, 1.11, 1.3):
         board = replace(ritz.FINNISH, D_x=factor * ritz.FINNISH.D_x)
-        found = find(*prepared(board), names)
+        found = find_named_modes(*prepared(board), names)
         expected = dict(ritz.solve(ritz.Ritz(board)).names())
         assert {n: found[n].place.correlation for n in names} == pytest.approx(
             {n: expected[n] for n in names}, abs=0.002
@@ -135,7 +136,7 @@ def test_no_two_names_share_a_mode(seed):
     weights = Weights(np.array([d_x / side_ratio**2, d_y * side_ratio**2, 0.4 * d_y, 1.0]), np.ones(1))
     names = [beams for beams in product(range(3), range(3)) if not is_rigid(beams, ends_x, ends_y)]
 
-    found = find(thin_plate(ends_x, ends_y, 12, 12), weights, names)
+    found = find_named_modes(thin_plate(ends_x, ends_y, 12, 12), weights, names)
 
     assert list(found) == names
     places = [(mode.place.parity, mode.place.rank) for mode in found.values()]
@@ -154,7 +155,7 @@ def test_no_two_names_share_a_mode(seed):
 )
 def test_a_name_that_no_resolved_mode_has_is_refused(board, known, beams):
     with pytest.raises(KeyError, match=rf"\({beams[0]}, {beams[1]}\)"):
-        find(*prepared(board, (8, 8)), [known, beams])
+        find_named_modes(*prepared(board, (8, 8)), [known, beams])
 
 
 def test_beam_products_bound_the_lowest_mode_from_above():
@@ -162,7 +163,7 @@ def test_beam_products_bound_the_lowest_mode_from_above():
     board, order = ORDER["clamped"]
     plate, weights = prepared(board)
     quotients = np.tensordot(weights.stiffness, product_coefficients(*board.ends), axes=1)
-    lowest = find(plate, weights, order[:1])[order[0]].eigenvalue
+    lowest = find_named_modes(plate, weights, order[:1])[order[0]].eigenvalue
 
     assert lowest <= quotients[order[0]] < 1.2 * lowest
 
@@ -197,7 +198,9 @@ def test_a_magnet_that_bounces_takes_no_name_from_the_board():
     both = modes.by_class[parity].of([0, 1])
     parts, squares = beam_parts(both.own, both.vectors)
     column = both.own.plate.elastic_products[parity].index((0, 0))
-    own, whole = (fits(parts[:, [column]], np.diagonal(squares), share) for share in (both.on_plate, np.ones(2)))
+    own, whole = (
+        product_fits(parts[:, [column]], np.diagonal(squares), share) for share in (both.on_plate, np.ones(2))
+    )
 
     # A point force converges slowly on the generator's polynomials.
     assert np.abs(own[:, 0]) == pytest.approx(table, abs=0.01)

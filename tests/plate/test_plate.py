@@ -12,7 +12,7 @@ from bayesplate.plate.fields import Fabric
 from bayesplate.plate.line import N_POINTS_CUT, line
 from bayesplate.plate.plate import plate_of
 from bayesplate.plate.shear import SHEAR_FLEXIBLE
-from bayesplate.plate.terms import AlongEdges, Amount, AtPlaces, OnDeflections, OverPlate, Parity, Weights
+from bayesplate.plate.terms import EdgeTerm, Parity, PlateTerm, PointMotion, PointTerm, ProjectedTerms, Weights
 from bayesplate.plate.thin import THIN, thin_plate
 
 WORDS = {"c": "clamped", "s": "supported", "f": "free"}
@@ -108,14 +108,14 @@ def bump(x, y):
     return np.exp(x * y) + 0.3 * np.sin(3.0 * x + y)
 
 
-PLACE, BESIDE = Amount(((1.0, 0.3, 0.8), (-2.0, 0.9, 0.1))), Amount(((-1.0, 0.2, 0.2),), beside=1)
+PLACE, BESIDE = PointMotion(((1.0, 0.3, 0.8), (-2.0, 0.9, 0.1))), PointMotion(((-1.0, 0.2, 0.2),), beside=1)
 FURTHER = (
-    OverPlate(("slope_x", "slope_x")),
-    AlongEdges(0, (True, True), "w"),
-    AlongEdges(1, (True, True), "turn_y"),
-    AtPlaces(((1.0, BESIDE, BESIDE), (0.5, PLACE, Amount(beside=0)))),
+    PlateTerm(("slope_x", "slope_x")),
+    EdgeTerm(0, (True, True), "w"),
+    EdgeTerm(1, (True, True), "turn_y"),
+    PointTerm(((1.0, BESIDE, BESIDE), (0.5, PLACE, PointMotion(beside=0)))),
 )
-HEAVY = (AtPlaces(((0.3, PLACE, PLACE), (1.0, Amount(beside=0), Amount(beside=0)), (1.0, BESIDE, BESIDE))),)
+HEAVY = (PointTerm(((0.3, PLACE, PLACE), (1.0, PointMotion(beside=0), PointMotion(beside=0)), (1.0, BESIDE, BESIDE))),)
 
 
 def varied(kinematics, is_split):
@@ -146,7 +146,7 @@ def test_the_pencil_of_a_class_is_its_terms_on_every_unknown(kinematics, is_spli
 
 def test_energies_and_pencils_on_given_deflections_are_those_of_the_terms():
     """Terms that exist on deflections only among them: energies are the diagonals, a pencil the sum for each draw."""
-    mean = [OnDeflections(mean_square)]
+    mean = [ProjectedTerms(mean_square)]
     plate = varied(SHEAR_FLEXIBLE, is_split=True).with_terms(mean, mean)
     own = plate.classes[0]
     draws = [some_weights(plate, seed) for seed in range(3)]

@@ -15,7 +15,7 @@ from limits import meets
 
 from bayesplate.plate import reduction
 from bayesplate.plate.mesh import mesh
-from bayesplate.plate.naming import find
+from bayesplate.plate.naming import find_named_modes
 from bayesplate.plate.reduction import reduced_order_model
 from bayesplate.plate.shear import shear_flexible_plate
 from bayesplate.plate.solve import solve_classes
@@ -48,7 +48,7 @@ def named(name):
     board, names = WANTED[name]
     centre = weights_at(board, np.zeros(3))
     plate = thin_plate(*board.ends, *mesh(centre, 12))
-    return plate, find(plate, centre, names)
+    return plate, find_named_modes(plate, centre, names)
 
 
 @cache
@@ -140,9 +140,9 @@ def test_further_points_are_solved_where_the_first_ones_will_not_do(tolerance, n
         checked.append((len(snapshots), len(checks)))
         return _reduced(own, middle, snapshots, checks, *further)
 
-    _reduced = reduction._reduced
+    _reduced = reduction._reduce_class
     monkeypatch.setattr(reduction, "solve_classes", counted)
-    monkeypatch.setattr(reduction, "_reduced", watched)
+    monkeypatch.setattr(reduction, "_reduce_class", watched)
     places = [one.place for one in found.values()]
     reduced_order_model(plate, places, weights_at(board, np.zeros(3)), around, held_out, tolerance)
 
@@ -162,7 +162,7 @@ def test_modes_of_draws_are_named_as_those_of_full_solves():
     assert all(of_draws[-1] == -1 for of_draws in ranks.values())
     n_named = 0
     for i, point in enumerate(points):
-        places = {beams: one.place for beams, one in find(plate, point, names).items()}
+        places = {beams: one.place for beams, one in find_named_modes(plate, point, names).items()}
         for beams, place in places.items():
             own = [one.place.rank for one in found.values() if one.place.parity == place.parity]
             if place.is_certain and place.rank <= max(own):
@@ -220,7 +220,7 @@ def test_a_shear_flexible_plate_is_held_within_its_tolerance_too():
         )
 
     names = [(1, 1), (2, 0), (0, 2), (2, 1)]
-    places = [one.place for one in find(plate, at(np.zeros(6)), names).values()]
+    places = [one.place for one in find_named_modes(plate, at(np.zeros(6)), names).values()]
     around, held_out, unseen = ([at(s) for s in rng.uniform(-1.0, 1.0, (n, 6))] for n in (16, 6, 10))
 
     reduced = reduced_order_model(plate, places, at(np.zeros(6)), around, held_out, 1.0)

@@ -16,7 +16,7 @@ from bayesplate.plate.line import line
 from bayesplate.plate.plate import plate_of
 from bayesplate.plate.shear import SHEAR_FLEXIBLE, shear_flexible_plate
 from bayesplate.plate.solve import solve, solve_classes, solve_up_to
-from bayesplate.plate.terms import Amount, AtPlaces, OnDeflections, Weights
+from bayesplate.plate.terms import PointMotion, PointTerm, ProjectedTerms, Weights
 from bayesplate.plate.thin import THIN, thin_plate
 
 THEORIES = pytest.mark.parametrize("shear_moduli", [None, G_SPRUCE], ids=["thin", "shear-flexible"])
@@ -142,7 +142,7 @@ def stiffer_middle(deflections):
 def test_terms_that_exist_on_deflections_are_on_the_span_of_the_plates_own_modes():
     """Against a dense solver with these terms on all unknowns: modes that the solver took without them lose little."""
     board = ritz.FREE_SPRUCE
-    plate = thin_plate(*board.ends, 6, 6).with_terms([OnDeflections(stiffer_middle)], [OnDeflections(mean_products)])
+    plate = thin_plate(*board.ends, 6, 6).with_terms([ProjectedTerms(stiffer_middle)], [ProjectedTerms(mean_products)])
     bare = weights_of(board)
     weights = Weights(np.array([*bare.stiffness, 0.2 * bare.stiffness[0]]), np.array([*bare.mass, 0.3]))
     dense = {own.parity: eigh(*whole(own, weights), eigvals_only=True)[own.n_rigid :] for own in plate.classes}
@@ -168,7 +168,7 @@ def test_weights_of_no_plate_are_told(assemble):
         solve_classes(plate, nothing, {plate.classes[0].parity: 3})
 
 
-@pytest.mark.parametrize("projected", [(), (OnDeflections(mean_products),)], ids=["board alone", "projected mass"])
+@pytest.mark.parametrize("projected", [(), (ProjectedTerms(mean_products),)], ids=["board alone", "projected mass"])
 def test_free_plate_answers_for_its_rounding_alone(projected):
     """Rigid motions make the factorised matrix nearly singular; no eigenvalue may carry that.
 
@@ -201,8 +201,8 @@ def test_a_mass_below_zero_at_a_place_takes_no_mode_with_it():
     What is left out for the solver comes back on the span of its vectors: an error below half of that mass.
     """
     x, y = (line(("clamped", "clamped"), n, is_split=False) for n in (10, 8))
-    here, there = (Amount(((1.0, at, 0.37),)) for at in (0.31, 0.44))
-    places = [AtPlaces(((1.0, one, one),)) for one in (here, there)]
+    here, there = (PointMotion(((1.0, at, 0.37),)) for at in (0.31, 0.44))
+    places = [PointTerm(((1.0, one, one),)) for one in (here, there)]
     plate = plate_of(THIN, x, y).with_terms([], places)
     weights = Weights(np.array([3e4, 1e4, 3e3, 1e4]), np.array([1.0, 0.02, -0.01]))
     (own,) = plate.classes

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from bayesplate.plate.fields import Fabric, layout
+from bayesplate.plate.fields import Fabric, term_field_pairs
 from bayesplate.plate.line import N_POINTS_CUT, line
 from bayesplate.plate.plate import plate_of
 from bayesplate.plate.shear import SHEAR_FLEXIBLE
 from bayesplate.plate.solve import solve
-from bayesplate.plate.terms import AlongEdges, Amount, AtPlaces, OverPlate, Weights
+from bayesplate.plate.terms import EdgeTerm, PlateTerm, PointMotion, PointTerm, Weights
 from bayesplate.plate.thin import THIN
 
 FREE = ("free", "free")
@@ -113,14 +113,14 @@ def test_terms_are_sums_over_points(kinematics, outline):
     x, y = (line(FREE, n, is_sheared, is_split=False, n_points=N_POINTS_CUT) for n in (3, 4))
     fields = {group: [None, bump] for group in GROUPS} | {"mass": [None, bump, ripple]}
     # A mass at one place, and one that goes with how far two places move apart.
-    places = Amount(((1.0, 0.3, 0.8), (-1.0, 0.3, 0.1)))
+    places = PointMotion(((1.0, 0.3, 0.8), (-1.0, 0.3, 0.1)))
     further = (
-        OverPlate(("slope_x", "slope_y"), outline),
-        AlongEdges(0, (True, False), "turn_x"),
-        AlongEdges(1, (True, True), "turn_y"),
+        PlateTerm(("slope_x", "slope_y"), outline),
+        EdgeTerm(0, (True, False), "turn_x"),
+        EdgeTerm(1, (True, True), "turn_y"),
     )
     plate = plate_of(kinematics, x, y, Fabric(fields, outline, is_turned=True)).with_terms(
-        further, [AtPlaces(((1.0, places, places),))]
+        further, [PointTerm(((1.0, places, places),))]
     )
     (own,) = plate.classes
 
@@ -138,14 +138,14 @@ def test_terms_are_sums_over_points(kinematics, outline):
     terms = [*BENDING, *SHEARS, *COUPLING, (2, SHEAR_X, SHEAR_Y)] if is_sheared else [*BENDING, *COUPLING]
     groups = kinematics.groups(True)
     counts = {group: len(one) for group, one in fields.items()}
-    expected = [own_term(terms[i], fields[groups[0][i]][k], 1e-5) for i, k in layout(groups[0], counts)]
+    expected = [own_term(terms[i], fields[groups[0][i]][k], 1e-5) for i, k in term_field_pairs(groups[0], counts)]
     slopes = ((1.0, "w", 1, 0),), ((1.0, "w", 0, 1),)
     expected.append(sums.integral(2, *slopes, at_x, at_y, weights))
     (along, in_x), (across, in_y) = ([one.ravel() for one in gauss(s[:-1], np.diff(s), 6)] for s in (x.nodes, y.nodes))
     expected.append(sums.integral(1, TURN_X, TURN_X, np.zeros_like(across), across, in_y))
     expected.append(sum(sums.integral(1, TURN_Y, TURN_Y, along, np.full_like(along, end), in_x) for end in (0.0, 1.0)))
     masses = [MASS, *(ROTARY if is_sheared else [])]
-    inert = [own_term(masses[i], fields[groups[1][i]][k], 1e-8) for i, k in layout(groups[1], counts)]
+    inert = [own_term(masses[i], fields[groups[1][i]][k], 1e-8) for i, k in term_field_pairs(groups[1], counts)]
     at_places = sums.strain(DEFLECTION, np.array([0.3, 0.3]), np.array([0.8, 0.1]))
     inert.append(np.outer(*2 * [at_places[0] - at_places[1]]))
 
@@ -163,8 +163,8 @@ N_ALONG = 20
 
 def square(*places, beside=-1):
     """A term: the square of deflections at places, or of how far a coordinate moves against them."""
-    amount = Amount(places, beside)
-    return AtPlaces(((1.0, amount, amount),))
+    amount = PointMotion(places, beside)
+    return PointTerm(((1.0, amount, amount),))
 
 
 def bent(b):
@@ -188,10 +188,10 @@ BEAMS = {
         lambda b: (1 - b**4 * 0.1 / 100.0) * bent(b) + 0.1 * b * pulled(b),
     ),
     "a spring along the free edge": (
-        CANTILEVER, [(AlongEdges(0, (False, True), "w"), 100.0)], [], lambda b: b**3 * bent(b) - 100.0 * pulled(b),
+        CANTILEVER, [(EdgeTerm(0, (False, True), "w"), 100.0)], [], lambda b: b**3 * bent(b) - 100.0 * pulled(b),
     ),
     "a rotational spring along a supported edge": (
-        ("supported", "supported"), [(AlongEdges(0, (True, False), "slope_x"), 1.0)], [],
+        ("supported", "supported"), [(EdgeTerm(0, (True, False), "slope_x"), 1.0)], [],
         lambda b: 2 * b * np.sin(b) * np.sinh(b) - pulled(b),
     ),
 }  # fmt: skip
@@ -219,9 +219,9 @@ def test_a_loaded_or_sprung_beam_has_the_wavenumbers_of_its_equation(ends, stiff
 
 def test_products_of_two_amounts_are_the_square_of_their_sum():
     """(z - w)^2 as one square, and as z^2 - 2 z w + w^2: a spring either way."""
-    rise, place = Amount(beside=0), Amount(((1.0, 0.7, 0.2),))
+    rise, place = PointMotion(beside=0), PointMotion(((1.0, 0.7, 0.2),))
     stretched = square((-1.0, 0.7, 0.2), beside=0)
-    apart = AtPlaces(((1.0, rise, rise), (-2.0, rise, place), (1.0, place, place)))
+    apart = PointTerm(((1.0, rise, rise), (-2.0, rise, place), (1.0, place, place)))
     (own,) = plate_of(THIN, line(FREE, 3), line(FREE, 3)).with_terms([stretched, apart], []).classes
 
     one, other = own.project_stiffness(np.eye(own.n_dof))[-2:]
@@ -235,7 +235,7 @@ def test_springs_along_both_edges_are_those_along_each():
     found = []
     for is_split in (True, False):
         x, y = (line(FREE, 6, is_split=is_split) for _ in "xy")
-        both = [AlongEdges(0, (True, True), "w"), AlongEdges(1, (True, True), "slope_y")]
+        both = [EdgeTerm(0, (True, True), "w"), EdgeTerm(1, (True, True), "slope_y")]
         weights = Weights(np.array([1.0, 0.7, 0.2, 0.9, 30.0, 2.0]), np.ones(1))
         found.append(solve(plate_of(THIN, x, y).with_terms(both, []), weights, 10).eigenvalues)
 

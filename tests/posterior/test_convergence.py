@@ -8,9 +8,9 @@ from scipy.optimize import brentq
 
 from bayesplate.posterior.convergence import (
     Gate,
-    assess,
     autocorrelation_times,
     burn_in_steps,
+    judge_convergence,
     length_in_taus,
 )
 from bayesplate.posterior.statistics import rhat
@@ -30,7 +30,7 @@ def renewal_draws(n_steps=1000, n_ensembles=4, n_walkers=16, n_dim=2, seed=0):
 
 
 def test_good_draws_pass_with_the_known_autocorrelation_time():
-    convergence = assess(renewal_draws())
+    convergence = judge_convergence(renewal_draws())
     assert convergence.passed
     assert convergence.reasons == ()
     assert convergence.tau == pytest.approx(TAU, rel=0.2)
@@ -57,7 +57,7 @@ def test_a_walker_that_stays_apart_does_not_pass():
     """Its mean is another one than that of the others, at any length: the effective size sees it."""
     draws = renewal_draws()
     draws[:, :, 0] += 20.0
-    found = assess(draws)
+    found = judge_convergence(draws)
     assert not found.passed
     assert found.ess_min < Gate().ess_min
 
@@ -65,7 +65,7 @@ def test_a_walker_that_stays_apart_does_not_pass():
 def test_a_stuck_ensemble_fails():
     draws = renewal_draws()
     draws[2] += 3.0
-    convergence = assess(draws, names=("D_x", "D_y"))
+    convergence = judge_convergence(draws, names=("D_x", "D_y"))
     assert not convergence.passed
     assert "disagree about D_" in convergence.reasons[0]
     assert "The effective sample size" in convergence.reasons[1]
@@ -74,31 +74,31 @@ def test_a_stuck_ensemble_fails():
 def test_ensembles_of_unlike_width_fail_rhat():
     draws = renewal_draws()
     draws[1] *= 2.0
-    assert assess(draws).rhat_max > 1.01
+    assert judge_convergence(draws).rhat_max > 1.01
 
 
 def test_a_drift_fails_rhat():
     draws = renewal_draws() + np.linspace(0, 1, 1000)[:, None, None]
-    assert assess(draws).rhat.min() > 1.01
+    assert judge_convergence(draws).rhat.min() > 1.01
 
 
 def test_rhat_is_not_taken_over_single_walkers():
     draws = renewal_draws(n_steps=650)
     assert rhat(np.moveaxis(draws, 2, 1).reshape(-1, 650, 2)).max() > 1.01
-    convergence = assess(draws)
+    convergence = judge_convergence(draws)
     assert convergence.passed, convergence.reasons
     assert convergence.rhat_max < 1.005
 
 
 def test_a_short_run_is_told_how_long_it_should_be():
-    convergence = assess(renewal_draws(n_steps=200))
+    convergence = judge_convergence(renewal_draws(n_steps=200))
     assert not convergence.passed
     assert convergence.suggested_steps == pytest.approx(100 * TAU, rel=0.3)
     assert f"{convergence.suggested_steps} steps after burn-in would do" in convergence.reasons[0]
 
 
 def test_the_effective_size_can_be_asked_for():
-    convergence = assess(renewal_draws(), Gate(ess_min=50_000))
+    convergence = judge_convergence(renewal_draws(), Gate(ess_min=50_000))
     assert len(convergence.reasons) == 1
     assert "50000 is wanted" in convergence.reasons[0]
 
@@ -106,7 +106,7 @@ def test_the_effective_size_can_be_asked_for():
 def test_a_parameter_that_never_moves_is_named():
     draws = renewal_draws()
     draws[..., 1] = 7.0
-    convergence = assess(draws, names=("D_x", "tension"))
+    convergence = judge_convergence(draws, names=("D_x", "tension"))
     assert not convergence.passed
     assert convergence.reasons[0].startswith("tension never moves")
     assert np.isinf(convergence.tau[1])
@@ -117,7 +117,7 @@ def test_a_number_that_is_none_never_passes():
     draws = renewal_draws()
     draws[0, 10, 3, 0] = np.nan
     with np.errstate(invalid="ignore"):
-        assert not assess(draws).passed
+        assert not judge_convergence(draws).passed
 
 
 @pytest.mark.parametrize("n_steps", [1, 50, 200, 600, 3000, 20_000])
@@ -143,12 +143,14 @@ def apart(rhat_max):
     """Draws whose ensembles disagree so much that the split R-hat has this value."""
     draws = renewal_draws(n_dim=1)
     shift = np.array([0.0, 0.0, 1.0, 0.0])[:, None, None, None]
-    return draws + shift * brentq(lambda s: assess(draws + s * shift).rhat_max - rhat_max, 0.0, 1.0, xtol=1e-9)
+    return draws + shift * brentq(
+        lambda s: judge_convergence(draws + s * shift).rhat_max - rhat_max, 0.0, 1.0, xtol=1e-9
+    )
 
 
 def cut_where(name, limit, draws):
     """The draws cut short: just below a limit of a figure of theirs that grows with the steps, and just above it."""
-    values = {n: getattr(assess(draws[:, :n]), name) for n in range(300, draws.shape[1], 10)}
+    values = {n: getattr(judge_convergence(draws[:, :n]), name) for n in range(300, draws.shape[1], 10)}
     below = max(n for n, value in values.items() if 0.96 * limit < value < limit)
     above = min(n for n, value in values.items() if limit < value < 1.04 * limit)
     return draws[:, :below], draws[:, :above]
@@ -189,5 +191,5 @@ def test_each_limit_of_the_default_gate(rule):
     sentence, make = RULES[rule]
     failing, passing = make()
 
-    assert sum(sentence in reason for reason in assess(failing).reasons) == 1
-    assert not any(sentence in reason for reason in assess(passing).reasons)
+    assert sum(sentence in reason for reason in judge_convergence(failing).reasons) == 1
+    assert not any(sentence in reason for reason in judge_convergence(passing).reasons)

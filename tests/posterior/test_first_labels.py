@@ -19,7 +19,7 @@ from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.wide_search import Guess
 from bayesplate.labels import Label
 from bayesplate.posterior import first_labels
-from bayesplate.posterior.first_labels import Way, only_way, probable_ways, propose_labels
+from bayesplate.posterior.first_labels import Labelling, choose_labelling, probable_labellings, propose_labels
 
 LABELS = ((1, 1), (2, 0), (2, 1), (0, 2), (1, 2), (3, 0), (3, 1), (2, 2), (3, 2), (4, 0))
 HERTZ = ritz.simulate(ritz.FREE_SPRUCE, LABELS)
@@ -57,7 +57,7 @@ def test_bare_peaks_of_which_one_is_missing_are_labelled_with_probabilities():
     """Seven of the lowest eight modes, with noise, in no order, under the prior of the wood."""
     read = {beams: HERTZ[beams] for beams in LABELS[:8] if beams != (0, 2)}
     hertz = with_noise(read, 0.003, np.random.default_rng(5))
-    ways = probable_ways(board_with((), hertz.values()), PRIOR)
+    ways = probable_labellings(board_with((), hertz.values()), PRIOR)
     (best, share), *others = ways
 
     assert labels_of(best.board) == {round(each, 3): beams for beams, each in hertz.items()}
@@ -70,8 +70,8 @@ def test_bare_peaks_of_which_one_is_missing_are_labelled_with_probabilities():
 def test_sure_labels_and_too_few_peaks_are_left_as_they_are():
     for board in (board_with(LABELS, ()), board_with((), ALL[:2])):
         assert propose_labels(board, PRIOR).board is board
-    assert probable_ways(board_with((), ALL[:3]), PRIOR) == []
-    assert probable_ways(board_with([(1, 1)], ALL[1:8]), PRIOR) == []
+    assert probable_labellings(board_with((), ALL[:3]), PRIOR) == []
+    assert probable_labellings(board_with([(1, 1)], ALL[1:8]), PRIOR) == []
 
 
 def test_a_doubtful_label_that_is_wrong_is_corrected_and_remembered():
@@ -119,7 +119,7 @@ def way(beams, log_rigidities, log_density, log_density_unlike):
     (setup,) = board_with([(2, 0)], ()).setups
     reading = replace(setup.readings[0], label=Label(*beams))
     board = board_of(ritz.FREE_SPRUCE, [replace(setup, readings=(reading,))])
-    return Way(board, np.array(log_rigidities), log_density, log_density_unlike)
+    return Labelling(board, np.array(log_rigidities), log_density, log_density_unlike)
 
 
 HERE = way((2, 0), [4.6, 2.2, 3.2], 10.0, 5.0)
@@ -138,18 +138,18 @@ HERE = way((2, 0), [4.6, 2.2, 3.2], 10.0, 5.0)
 )
 def test_answers_far_apart_are_refused_where_both_are_possible(other, is_refused):
     if not is_refused:
-        assert only_way([other, HERE]) is (HERE if other.is_far_from(HERE) else other)
+        assert choose_labelling([other, HERE]) is (HERE if other.is_far_from(HERE) else other)
         return
     with pytest.raises(NotIdentifiableError, match=r"is \((2,0|0,2)\) in the first and"):
-        only_way([HERE, other])
+        choose_labelling([HERE, other])
 
 
 def test_a_fit_begins_with_the_way_that_is_probable_whatever_the_plate_lacks(monkeypatch):
     """Not with one far off that a small noise would favour."""
     ways = iter([HERE, way((0, 2), [6.1, 0.7, 3.2], 100.0, -10.0)])
-    monkeypatch.setattr(first_labels, "_guesses", lambda *_: [None, None])
-    monkeypatch.setattr(first_labels, "_judged", lambda *_: [*ways])
-    monkeypatch.setattr(first_labels, "_settled", lambda board, *_: (board, np.ones(3)))
+    monkeypatch.setattr(first_labels, "_first_guesses", lambda *_: [None, None])
+    monkeypatch.setattr(first_labels, "_assess_labellings", lambda *_: [*ways])
+    monkeypatch.setattr(first_labels, "_settle_labels", lambda board, *_: (board, np.ones(3)))
     proposed = propose_labels(board_with([(2, 0)], ALL[3:]), PRIOR)
 
     assert proposed.rigidities == pytest.approx(np.exp(HERE.log_rigidities))
@@ -160,10 +160,10 @@ def test_a_fit_begins_with_the_way_that_is_probable_whatever_the_plate_lacks(mon
 def test_a_plate_stiffer_across_its_grain_is_an_unlikely_way(monkeypatch):
     """Peaks that fit a plate either way round, under a prior of any solid: all probable unless cards mean the grain."""
     board = board_with((), ALL[:7])
-    shares = {way.is_usual: share for way, share in reversed(probable_ways(board, WIDE))}
+    shares = {way.is_usual: share for way, share in reversed(probable_labellings(board, WIDE))}
     assert shares[True] > 0.9 > 10 * shares[False]
-    monkeypatch.setattr(first_labels, "_UNUSUAL", 1.0)
-    assert {way.is_usual: share for way, share in reversed(probable_ways(board, WIDE))}[False] > 0.1
+    monkeypatch.setattr(first_labels, "_UNUSUAL_PROBABILITY", 1.0)
+    assert {way.is_usual: share for way, share in reversed(probable_labellings(board, WIDE))}[False] > 0.1
 
 
 FALSE = {49.51: 0.17, 401.91: 0.18, 441.52: 0.46}
@@ -184,7 +184,7 @@ def test_the_right_plate_is_found_though_another_fits_the_peaks_of_a_real_board_
     (setup,) = prepared.board.setups
     known = {float(one.frequency.mean): one.label for one in setup.readings}
 
-    (best, share), *_ = probable_ways(heard(prepared.board, FALSE), load_prior("weakly-informative"))
+    (best, share), *_ = probable_labellings(heard(prepared.board, FALSE), load_prior("weakly-informative"))
 
     found = {float(one.frequency.mean): one.label for one in best.board.setups[0].readings}
     assert share > 0.9

@@ -11,22 +11,22 @@ from made_boards import CANTILEVER_LABELS, NARROW, board_of, models_at, peaks_of
 from normal_case import NormalCase, differences, draws_of
 
 from bayesplate.board.attached import AttachedItem, DeclaredFluid
-from bayesplate.board.board import Board, made_board
-from bayesplate.board.parameter import BOARD
+from bayesplate.board.board import Board, make_board
+from bayesplate.board.parameter import BOARD_OWNER
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.sessions import discrepancy_names, sessions, with_discrepancies
+from bayesplate.board.sessions import discrepancy_names, session_groups, with_discrepancies
 from bayesplate.board.setup import DEFAULT_NOISE
 from bayesplate.diagnosis import baseline as home
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.forms import forms
 from bayesplate.diagnosis.laws import form_law
-from bayesplate.diagnosis.search import prepare_search, search
+from bayesplate.diagnosis.search import prepare_search, run_search
 from bayesplate.diagnosis.signatures import signatures
 from bayesplate.effects import declare
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import OtherMode
-from bayesplate.plate.naming import Place
+from bayesplate.plate.naming import ModePlace
 from bayesplate.plate.terms import Parity
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import PosedProblem, pose
@@ -67,7 +67,7 @@ def test_setups_that_hold_and_load_the_board_alike_are_sessions():
     ]
     made = board_of(ritz.FINNISH, [one, *others])
 
-    assert [[setup.name for setup in group] for group in sessions(made)] == [["one", "another day", "third day"]]
+    assert [[setup.name for setup in group] for group in session_groups(made)] == [["one", "another day", "third day"]]
     found = with_discrepancies(made)
     assert [one.name for one in found.setups if one.group is not None] == ["one", "another day", "third day"]
     assert found.inputs["discrepancy[one to third day]"] == DEFAULT_NOISE
@@ -118,7 +118,7 @@ def test_a_peak_that_may_be_the_mode_is_moved_too():
     setup = replace(made.setups[0], readings=made.setups[0].readings[:3], peaks=peaks_of(300.0))
     beams, values = CANTILEVER_LABELS[3], {**made.nominal(), "discrepancy (0,2)[day 1 to day 2]": np.array([2.0, -1.0])}
     (model,) = models_at(replace(made, setups=(setup,)), [30.0, 1.6, 6.0])
-    model = replace(model, others=(OtherMode(Place(Parity(0, 1), 1, 0.9), beams), OtherMode(model.places[0], None)))
+    model = replace(model, others=(OtherMode(ModePlace(Parity(0, 1), 1, 0.9), beams), OtherMode(model.places[0], None)))
 
     assert model.discrepancies(values) == pytest.approx(DISCREPANCY * np.outer([2.0, -1.0], [0, 0, 0, 1, 0]))
 
@@ -146,9 +146,9 @@ def test_a_search_begins_where_the_board_is_and_not_where_its_plate_would_be(rou
 def test_a_scale_that_has_followed_the_residual_does_not_excuse_it(judge, rough, monkeypatch):
     """By the prior of the discrepancies the residual is too large for chance, by the scale of the fit it is not."""
     if judge == "fit":
-        monkeypatch.setattr(home, "under_prior_scales", lambda board, values, slopes, inputs: (slopes, inputs))
+        monkeypatch.setattr(home, "rescale_discrepancies", lambda board, values, slopes, inputs: (slopes, inputs))
     baseline = baseline_of(rough)
-    found = search(prepare_search(baseline, tried=()))
+    found = run_search(prepare_search(baseline, tried=()))
 
     assert rough.parameters.values(rough.centre[None])[SCALE][0] > 2.0 * DEFAULT_NOISE.median
     of_plate = baseline.log_frequency - baseline.every.discrepancy
@@ -160,8 +160,8 @@ def test_a_scale_that_has_followed_the_residual_does_not_excuse_it(judge, rough,
 def test_sessions_that_are_one_plate_have_one_law_and_others_each(effects):
     """A clamp that gives way differently on each day makes them different plates."""
     days = board(None)
-    sizes = {q.name: q.prior for q in days.parameters if q.owner == BOARD}
-    made = declare(made_board("made", sizes, [replace(one, group=None) for one in days.setups], effects=effects))
+    sizes = {q.name: q.prior for q in days.parameters if q.owner == BOARD_OWNER}
+    made = declare(make_board("made", sizes, [replace(one, group=None) for one in days.setups], effects=effects))
     problem = pose(made, load_prior("weakly-informative"), law="exact")
     theta = np.random.default_rng(4).multivariate_normal(problem.centre, problem.covariance, 20)
 

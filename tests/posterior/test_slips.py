@@ -15,10 +15,10 @@ from bayesplate.board.board import Board
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.estimates.least_squares import log_measured
-from bayesplate.estimates.unusual import unusual
+from bayesplate.estimates.unusual import unusual_sentences
 from bayesplate.posterior import slips
 from bayesplate.posterior.posing import PosedProblem, pose
-from bayesplate.posterior.slips import LARGE_NOISE, RARITY, Readings, Slip, noise_remarks, reading_remarks
+from bayesplate.posterior.slips import LARGE_NOISE, RARITY, Slip, SlipSearch, noise_remarks, reading_remarks
 
 PLATE = ritz.Plate.from_moduli(11e9, 0.95e9, 0.67e9, 0.4, rho=406.0, h=2.8e-3, L_x=0.55, L_y=0.2, edges=ritz.ALL_FREE)
 NOISE = 0.003
@@ -71,14 +71,14 @@ def test_one_wrong_reading_is_named_with_what_the_others_expect(case):
     assert "do not trust the constants" in found
     assert "in the other order" not in found
     if case.endswith("another plate"):  # from there mending the slip alone leads nowhere
-        best = Readings(problem.posterior, problem.centre).likeliest()
+        best = SlipSearch(problem.posterior, problem.centre).likeliest()
         assert best is None or best.readings != (made_boards.FREE_LABELS.index((m, n)),)
 
 
 @pytest.mark.parametrize(("factor", "kind"), [(10.0, "a decimal place"), (0.5, "an octave"), (1.0, "misread")])
 def test_what_a_factor_may_be_is_asked(factor, kind):
-    readings = Readings(as_read().posterior, as_read().centre)
-    sentence = slips._stray(readings, Slip((0,), factor, 9.0, np.log(1.25)))
+    readings = SlipSearch(as_read().posterior, as_read().centre)
+    sentence = slips._stray_sentence(readings, Slip((0,), factor, 9.0, np.log(1.25)))
     assert "386 cents above" in sentence
     assert f": {kind}, or another mode?" in sentence
 
@@ -116,13 +116,13 @@ def test_a_board_without_a_slip_is_told_nothing():
 def test_a_reading_is_told_from_the_stated_rarity_on(monkeypatch):
     changed = {(3, 1): 1.08 * HERTZ[3, 1]}
     problem = posed(changed)
-    slip = Readings(problem.posterior, problem.centre).likeliest()
+    slip = SlipSearch(problem.posterior, problem.centre).likeliest()
 
     assert slip is not None
     assert slip.readings == (made_boards.FREE_LABELS.index((3, 1)),)
     assert slip.log_odds > np.log(RARITY)
     monkeypatch.setattr(slips, "RARITY", 1.01 * np.exp(slip.log_odds))
-    assert Readings(problem.posterior, problem.centre).likeliest() is None
+    assert SlipSearch(problem.posterior, problem.centre).likeliest() is None
 
 
 def test_what_an_effect_may_do_to_all_readings_is_no_slip_however_well_the_noise_is_known(monkeypatch):
@@ -131,9 +131,9 @@ def test_what_an_effect_may_do_to_all_readings_is_no_slip_however_well_the_noise
     changed = {label: hertz * factor for (label, hertz), factor in zip(HERTZ.items(), off, strict=True)}
     problem = posed(changed, noise=Quantity.from_median(0.003, 1.05))
 
-    assert Readings(problem.posterior, problem.centre).likeliest() is None
+    assert SlipSearch(problem.posterior, problem.centre).likeliest() is None
     monkeypatch.setattr(slips, "_READINGS_OF_PRIOR", 200.0)
-    assert Readings(problem.posterior, problem.centre).likeliest() is not None
+    assert SlipSearch(problem.posterior, problem.centre).likeliest() is not None
 
 
 def test_too_few_readings_show_no_slip():
@@ -142,7 +142,7 @@ def test_too_few_readings_show_no_slip():
     board = made_boards.board_of(PLATE, [made_boards.setup_of(ritz.ALL_FREE, hertz)])
     problem = pose(board, load_prior("weakly-informative"))
 
-    assert Readings(problem.posterior, problem.centre).likeliest() is None
+    assert SlipSearch(problem.posterior, problem.centre).likeliest() is None
 
 
 @pytest.mark.parametrize(
@@ -182,7 +182,7 @@ def test_the_noise_of_the_residuals_is_the_root_of_their_mean_square_over_its_me
     z = (log_measured(problem.board) - predicted) / problem.board.setups[0].noise.median
     expected = 0.5 * np.log((z @ z + 1.0) / (z.size - 3 + 1))
 
-    assert Readings(posterior, problem.centre).log_widening == pytest.approx(expected, abs=1e-6)
+    assert SlipSearch(posterior, problem.centre).log_widening == pytest.approx(expected, abs=1e-6)
     assert expected > 2.0  # an octave apart is far beyond the noise
 
 
@@ -191,7 +191,7 @@ def test_constants_are_judged_at_the_centre_and_not_where_least_squares_begin():
     problem = as_read()
     other = replace(problem.estimate, rigidities=problem.estimate.rigidities * [1.0, 20.0, 1.0])
 
-    assert "is x along the grain?" in unusual(problem.board, problem.prior, other.rigidities)[0]
+    assert "is x along the grain?" in unusual_sentences(problem.board, problem.prior, other.rigidities)[0]
     assert replace(problem, estimate=other).doubts == ()
 
 
@@ -211,7 +211,7 @@ def test_a_robust_problem_is_posed_where_most_readings_agree():
     assert "an octave, or another mode?" in said
     assert "--robust" not in said
     assert "do not trust" not in said
-    residuals = [Readings(one.posterior, one.centre)._whole.residuals for one in (robust, normal)]
+    residuals = [SlipSearch(one.posterior, one.centre)._full_fit.residuals for one in (robust, normal)]
     assert residuals[0] == pytest.approx(residuals[1], abs=0.05)  # slips are weighed from where normal errors would be
 
 

@@ -7,12 +7,12 @@ import pytest
 from scipy import stats
 
 from bayesplate.posterior.statistics import (
-    LARGEST_K,
+    LARGEST_PARETO_K,
     effective_share,
-    may_stand,
-    resampled,
-    smoothed,
+    resample,
+    smooth_weights,
     thin_walker_major,
+    weights_suffice,
 )
 
 RNG = np.random.default_rng(2)
@@ -26,27 +26,27 @@ def pareto(k, n=4000, seed=1):
 @pytest.mark.parametrize("k", [0.2, 0.5])
 def test_k_hat_is_the_shape_of_the_tail(k):
     """To its scatter at 4000 draws."""
-    assert smoothed(pareto(k))[1] == pytest.approx(k, abs=0.2)
+    assert smooth_weights(pareto(k))[1] == pytest.approx(k, abs=0.2)
 
 
 def test_a_tail_without_a_mean_is_beyond_the_limit():
-    assert smoothed(pareto(1.0))[1] > LARGEST_K
+    assert smooth_weights(pareto(1.0))[1] > LARGEST_PARETO_K
 
 
 def test_weights_sum_to_one_and_a_draw_without_a_density_has_none():
     log_weights = np.append(pareto(0.2), -np.inf)
-    weights, _ = smoothed(log_weights)
+    weights, _ = smooth_weights(log_weights)
     assert weights.sum() == pytest.approx(1.0)
     assert weights[-1] == 0.0
 
 
 def test_draws_stand_for_others_up_to_the_limit_of_k_hat_or_where_all_weights_are_alike():
-    weights, alike = smoothed(pareto(0.5))[0], np.full(4, 0.25)
-    assert may_stand(weights, LARGEST_K)
-    assert not may_stand(weights, LARGEST_K + 1e-6)
-    assert may_stand(alike, 3.0)
-    assert may_stand(np.array([0.5, 0.25, 0.125, 0.125]), 3.0)
-    assert not may_stand(np.array([0.51, 0.25, 0.12, 0.12]), 3.0)
+    weights, alike = smooth_weights(pareto(0.5))[0], np.full(4, 0.25)
+    assert weights_suffice(weights, LARGEST_PARETO_K)
+    assert not weights_suffice(weights, LARGEST_PARETO_K + 1e-6)
+    assert weights_suffice(alike, 3.0)
+    assert weights_suffice(np.array([0.5, 0.25, 0.125, 0.125]), 3.0)
+    assert not weights_suffice(np.array([0.51, 0.25, 0.12, 0.12]), 3.0)
 
 
 def test_the_share_that_counts():
@@ -56,7 +56,7 @@ def test_the_share_that_counts():
 
 def test_each_draw_comes_as_often_as_its_weight_says_to_one():
     weights = RNG.dirichlet(np.ones(50))
-    counts = np.bincount(resampled(weights, 1000, RNG), minlength=50)
+    counts = np.bincount(resample(weights, 1000, RNG), minlength=50)
     assert np.all(np.abs(counts - 1000 * weights) < 1.0)
 
 

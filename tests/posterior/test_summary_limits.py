@@ -12,13 +12,13 @@ import bayesplate.frequencies.spectrum
 import bayesplate.posterior.assessment
 from bayesplate.board.prior import load_prior
 from bayesplate.commands.prepare import prepare
-from bayesplate.estimates.identifiability import Identifiability, remarks
+from bayesplate.estimates.identifiability import Identifiability, identifiability_remarks
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.spectrum import sign_conflicts, spectrum
 from bayesplate.frequencies.system import system_of
 from bayesplate.labels import Label
 from bayesplate.posterior.assessment import assess as assessed
-from bayesplate.posterior.convergence import assess
+from bayesplate.posterior.convergence import judge_convergence
 from bayesplate.posterior.draws import named_draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.posing import pose
@@ -38,7 +38,9 @@ def inference():
     rng = np.random.default_rng(1)
     theta = rng.multivariate_normal(problem.centre, problem.covariance, (4, 60, 10))
     log_prob = problem.posterior(theta.reshape(-1, theta.shape[-1])).reshape(theta.shape[:-1])
-    return Inference(problem, Chains(theta, log_prob, 0), assess(theta), walker_major(theta), walker_major(log_prob))
+    return Inference(
+        problem, Chains(theta, log_prob, 0), judge_convergence(theta), walker_major(theta), walker_major(log_prob)
+    )
 
 
 def summary_of(inference, errors=0.0):
@@ -118,13 +120,15 @@ def names_prior(width, inference, patch):
 
 def says_what_carries(leverage, inference, patch):
     found = Identifiability(10.0, 1e-4 * np.eye(3), np.array([leverage, *[0.4] * 5]), np.full((6, 3), 1 / 3))
-    return any("mode (0,0) alone carries a constant" in one for one in remarks(inference.problem.board, found))
+    return any(
+        "mode (0,0) alone carries a constant" in one for one in identifiability_remarks(inference.problem.board, found)
+    )
 
 
 def gives_low_share_as_reason(share, inference, patch):
     shares = np.tile([share, 1.0 - share, 0.0], (6, 1))
     found = Identifiability(10.0, np.diag([4e-4, 1e-4, 1e-4]), np.full(6, 0.5), shares)
-    (sentence, *_) = remarks(inference.problem.board, found)
+    (sentence, *_) = identifiability_remarks(inference.problem.board, found)
     assert sentence.startswith("the modes tell E_x least well")
     return "because no mode has more than 60 % of its energy in it" in sentence
 
@@ -169,6 +173,6 @@ def test_each_limit_of_what_is_told(limit, inference, monkeypatch):
 def test_the_sentence_has_the_digits_of_the_table(inference, sd, told):
     """Two significant ones, as the table of where the uncertainty comes from."""
     found = Identifiability(10.0, np.diag([sd**2, 1e-8, 1e-8]), np.full(6, 0.5), np.eye(6, 3))
-    (sentence, *_) = remarks(inference.problem.board, found)
+    (sentence, *_) = identifiability_remarks(inference.problem.board, found)
 
     assert sentence == f"the modes tell E_x least well: the expected noise alone leaves it {told} uncertain"

@@ -20,10 +20,10 @@ from bayesplate.posterior.posing import pose
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.posterior.statistics import thin_walker_major
 from bayesplate.posterior.surrogate import (
-    Solved,
+    LawPoints,
     Surrogate,
+    missing_probability,
     n_terms,
-    share_lacking,
     with_surrogate,
 )
 from bayesplate.posterior.target import LINEAR_SHARE
@@ -78,8 +78,8 @@ def test_points_that_are_no_plate_are_left_out_of_the_fit(problem):
     theta = rng.multivariate_normal(problem.centre, problem.covariance, 80)
     log_frequency = np.concatenate(problem.posterior.log_frequencies(theta), axis=1)
     columns = problem.parameters.fitted_columns
-    whole = Solved(theta, log_frequency, problem.posterior(theta))
-    holed = Solved(theta, log_frequency.copy(), whole.log_density.copy())
+    whole = LawPoints(theta, log_frequency, problem.posterior(theta))
+    holed = LawPoints(theta, log_frequency.copy(), whole.log_density.copy())
     holed.log_frequency[3], holed.log_density[3] = np.nan, -np.inf
     expected = Surrogate.fitted(whole.where(np.arange(80) != 3), columns)
     assert np.array_equal(Surrogate.fitted(holed, columns).coefficients, expected.coefficients)
@@ -91,7 +91,7 @@ def bowl(n_points, seed=3):
     theta = rng.standard_normal((n_points, 6))
     along = theta @ np.array([0.6, 0.0, 0.8, 0.0, 0.0, 0.0])
     log_frequency = np.stack([0.1 * theta[:, 1] + 0.02 * along**2 + 1e-3 * along**5, 0.05 * theta[:, 3]], axis=1)
-    return Solved(theta, log_frequency, -0.5 * (theta**2).sum(axis=1))
+    return LawPoints(theta, log_frequency, -0.5 * (theta**2).sum(axis=1))
 
 
 def test_it_is_of_fifth_order_along_the_direction_in_which_the_law_is_bent():
@@ -197,7 +197,7 @@ def test_the_weights_undo_the_error_of_a_surrogate(problem, exact, monkeypatch):
     assert furthest_apart(replace(weighted, theta=theta), exact) > FURTHEST
 
 
-@pytest.mark.parametrize(("limit", "value"), [("may_stand", False), ("effective_share", 1e-4)])
+@pytest.mark.parametrize(("limit", "value"), [("weights_suffice", False), ("effective_share", 1e-4)])
 def test_where_too_few_draws_count_the_law_itself_is_sampled(problem, monkeypatch, limit, value):
     """By their k-hat, or by the effective size that is left. The walks are as short as a loose gate lets them be."""
     monkeypatch.setattr(f"bayesplate.posterior.inference.{limit}", lambda *_: value)
@@ -213,7 +213,7 @@ def test_a_surrogate_whose_weights_do_not_stand_is_taught_at_its_draws_and_walke
     problem, inference, exact, monkeypatch
 ):
     answers = iter([False, True])
-    monkeypatch.setattr("bayesplate.posterior.inference.may_stand", lambda *_: next(answers))
+    monkeypatch.setattr("bayesplate.posterior.inference.weights_suffice", lambda *_: next(answers))
     taught = infer(problem, SamplerSettings(seed=6))
     assert list(answers) == []
     assert len(taught.surrogate.points.theta) > len(inference.surrogate.points.theta) + 1000
@@ -232,7 +232,7 @@ def test_a_part_of_the_posterior_that_a_surrogate_lacks_is_seen():
         y = points.points(600, np.random.default_rng(seed))
         main, beside = np.log(1.0 - lacking) - 0.5 * y[:, 0] ** 2, np.log(lacking) - 0.5 * (y[:, 0] - 5.0) ** 2
         law = np.logaddexp(main, beside) - 0.5 * y[:, 1] ** 2
-        return share_lacking(law, -0.5 * np.sum(y**2, axis=1), points.log_density(y))
+        return missing_probability(law, -0.5 * np.sum(y**2, axis=1), points.log_density(y))
 
     assert sum(share(0.1, seed) > 0.02 for seed in range(10)) >= 7
     assert all(share(1e-4, seed) <= 0.02 for seed in range(10))

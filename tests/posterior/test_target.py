@@ -10,7 +10,7 @@ import ritz
 from made_boards import CANTILEVER_LABELS, FREE_LABELS, board_of, models_at, setup_of, swapped, with_noise
 from scipy import stats
 
-from bayesplate.board.parameter import BOARD
+from bayesplate.board.parameter import BOARD_OWNER
 from bayesplate.board.prior import StatedPrior, load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.estimates.identifiability import identifiability
@@ -117,7 +117,7 @@ def test_the_likelihood_is_a_sum_over_setups(problem, prior):
     both = problem.posterior
     for i, part in enumerate((slice(0, 6), slice(6, None))):
         setup = both.board.setups[i]
-        kept = tuple(one for one in both.board.parameters if one.owner in (BOARD, setup.owner))
+        kept = tuple(one for one in both.board.parameters if one.owner in (BOARD_OWNER, setup.owner))
         alone = Posterior(replace(both.board, setups=(setup,), parameters=kept), prior, (both.models[i],), "exact")
         columns = [0, 1, 2, 3 + i]
         assert alone.log_likelihood(theta[:, columns]) == pytest.approx(both.log_likelihood(theta)[:, part], rel=EXACT)

@@ -18,7 +18,7 @@ from validation.calibration.truths import Design, draw_truth, make_problem
 from bayesplate.board.prior import load_prior
 from bayesplate.posterior.assessment import labels_contradicted
 from bayesplate.posterior.posing import PosedProblem, pose
-from bayesplate.posterior.veerings import contradicted_labels, with_doubts
+from bayesplate.posterior.veerings import contradicted_labels, with_veering_doubts
 
 AT_THE_VEERING, BESIDE_IT = 0.0632, 0.08
 """E_y / E_x at which (2,0) and (0,2), of one class, have half of each other's shape; and where they have little."""
@@ -98,7 +98,7 @@ def test_a_truth_on_the_other_side_of_the_veering_is_as_likely_as_it_should_be(m
     design = Design(edges="both")
     truth = draw_truth(design, random_lines(design.base_seed, EXCHANGED)[0])
     doubted = make_problem(design, truth)
-    monkeypatch.setattr("bayesplate.posterior.posing.with_doubts", lambda board, *_: (board, ()))
+    monkeypatch.setattr("bayesplate.posterior.posing.with_veering_doubts", lambda board, *_: (board, ()))
     sure = make_problem(design, truth)
 
     def distance(problem: PosedProblem, stiffer: float = 0.0) -> float:
@@ -130,7 +130,7 @@ def named_apart(ranks: dict[tuple[int, int], list[int]], hertz: dict[tuple[int, 
         exact=SimpleNamespace(reduced=SimpleNamespace(ranks=lambda *_: every)),
         system=SimpleNamespace(weights=lambda _: None),
     )
-    found, _ = with_doubts(board, [model], {})
+    found, _ = with_veering_doubts(board, [model], {})
     return {one.beams: one.confidence for one in found.setups[0].readings if not one.is_sure}
 
 

@@ -11,10 +11,10 @@ from generator.ringing import Blow, Ringing, recorded, ringing, with_noise
 from made_recordings import accelerance, likely_below, truth_below, with_complex_noise
 
 from bayesplate.errors import InputError
-from bayesplate.recordings.agreement import agreeing
-from bayesplate.recordings.picking import Picked, pick_modes
+from bayesplate.recordings.agreement import agreeing_records
+from bayesplate.recordings.picking import PickedModes, pick_modes
 from bayesplate.recordings.signals import FrequencyResponse, Recording
-from bayesplate.recordings.taking import take
+from bayesplate.recordings.taking import take_spectra
 
 RATE, HIGHEST = 4000.0, 310.0
 SURE = 0.98 * HIGHEST
@@ -51,9 +51,9 @@ def tapped(rng, board, name, hammer, n_taps=4, damping_sd=0.0) -> Recording:
     return Recording(name, RATE, with_noise(rng, np.concatenate(parts), 45.0, RATE))
 
 
-def picked(*recordings: Recording) -> Picked:
+def picked(*recordings: Recording) -> PickedModes:
     """Modes of recordings."""
-    return pick_modes(take([[one] for one in recordings], HIGHEST).spectra, 20.0, HIGHEST)
+    return pick_modes(take_spectra([[one] for one in recordings], HIGHEST).spectra, 20.0, HIGHEST)
 
 
 @pytest.mark.parametrize(("shift", "damping"), [(0.991, 1.0), (1.0, 1.15), (0.96, 1.0)])
@@ -84,7 +84,7 @@ def test_recordings_that_show_the_same_modes_are_searched_together():
     for seed, boards in ((12, [BOARD, scaled(BOARD, 1.0002)]), (13, [pair] * 4)):
         rng = np.random.default_rng(seed)
         files = [[tapped(rng, board, f"{k}.wav", HAMMERS[k])] for k, board in enumerate(boards)]
-        assert len(agreeing(take(files, HIGHEST).spectra, 20.0, HIGHEST)) == 1, len(boards)
+        assert len(agreeing_records(take_spectra(files, HIGHEST).spectra, 20.0, HIGHEST)) == 1, len(boards)
 
 
 def test_damping_that_scatters_from_tap_to_tap_costs_no_mode_and_makes_none():
@@ -136,7 +136,7 @@ def test_responses_of_a_roving_sensor_give_each_mode_once():
     for board, place in zip(boards, places, strict=True):
         values = with_complex_noise(rng, accelerance(hertz, place, board, SENSOR), 2e-4)
         responses.append(FrequencyResponse(f"{place}.csv", hertz, values))
-    found = pick_modes(take([responses], HIGHEST).spectra, 20.0, HIGHEST)
+    found = pick_modes(take_spectra([responses], HIGHEST).spectra, 20.0, HIGHEST)
 
     each = np.array([board.damped for board in boards])[:, : TRUTH.size]
     likely = likely_below(found, SURE)

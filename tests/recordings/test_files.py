@@ -21,8 +21,8 @@ from scipy.io import wavfile
 
 from bayesplate.recordings.reading import read_recordings
 from bayesplate.recordings.signals import Recording
-from bayesplate.recordings.sweeps import Sweep, band_of, impulse_response, read_sweep
-from bayesplate.recordings.taking import take
+from bayesplate.recordings.sweeps import Sweep, impulse_response, read_sweep, sweep_band
+from bayesplate.recordings.taking import take_spectra
 
 RATE = 6000
 FORCE, HEARD = hits(np.random.default_rng(31), [0.2], (0.03, 0.02), rate=float(RATE), seconds=1.8, decibels=60.0)
@@ -54,7 +54,7 @@ REFUSED = [
 def test_a_data_set_that_cannot_be_honoured_is_refused(tmp_path):
     path = tmp_path / "a.uff"
     for one, said in REFUSED:
-        assert said in refusal(lambda one=one: take([[only(path, uff([one]))]], 400.0))
+        assert said in refusal(lambda one=one: take_spectra([[only(path, uff([one]))]], 400.0))
     content = uff([TIME])
     cut_off = refusal(only, path, content[: len(content) // 2])
     assert cut_off.startswith("a.uff: wanted data sets ")
@@ -105,11 +105,11 @@ def test_a_response_follows_its_force_whatever_its_motion_and_polarity_or_is_ref
     for name, values in NO_PHASE.items():
         path = write_table(tmp_path / f"{name}.csv", f_hz=HERTZ, re=values.real, im=values.imag)
         said = f"{name}.csv: wanted a response with its phase, got one that answers before"
-        assert said in refusal(take, [[only(path)]], 400.0)
+        assert said in refusal(take_spectra, [[only(path)]], 400.0)
     for motion in (-1.0, 1j):
         values = with_complex_noise(np.random.default_rng(1), motion * ACCELERANCE, 3e-3)[40:]
         path = write_table(tmp_path / "a.csv", f_hz=HERTZ[40:], re=values.real, im=values.imag)
-        assert take([[only(path)]], 400.0).remarks == (), motion
+        assert take_spectra([[only(path)]], 400.0).remarks == (), motion
 
 
 def wav(signal: np.ndarray, bits: int = 16) -> bytes:
@@ -174,7 +174,7 @@ def test_a_channel_of_noise_beside_a_response_is_left_out(tmp_path):
     columns = np.stack([HEARD, noise], axis=1)
     wavfile.write(tmp_path / "a b.wav", RATE, np.round(2.0**14 * columns / np.abs(HEARD).max()).astype(np.int16))
 
-    taken = take(read_recordings([tmp_path / "a b.wav"], channels="response,response"), 400.0)
+    taken = take_spectra(read_recordings([tmp_path / "a b.wav"], channels="response,response"), 400.0)
 
     assert len(taken.spectra.names) == 1
     assert taken.remarks == ("a b.wav channel 2 left out: no hit stands out of its noise (is it connected?)",)
@@ -193,12 +193,12 @@ def test_a_force_in_the_place_of_a_response_is_set_aside_or_refused_where_nothin
     heard = Recording("heard", float(RATE), HEARD)
     for signal in (FORCE, np.where(np.abs(FORCE) > 0.05 * np.abs(FORCE).max(), FORCE, 0.0)):
         struck = Recording("force", float(RATE), signal)
-        taken = take([[struck], [heard]], 400.0)
+        taken = take_spectra([[struck], [heard]], 400.0)
 
         assert taken.spectra.names == ("heard hit 1",)
         assert taken.remarks == ("force left out: it is silent after its pulse: is it the force?",)
         said = "force: wanted a response, which rings, got it is silent after its pulse"
-        assert said in refusal(take, [[struck]], 400.0)
+        assert said in refusal(take_spectra, [[struck]], 400.0)
 
 
 SWEPT = Sweep(25.0, 900.0, 3.0)
@@ -245,7 +245,7 @@ def test_a_sweep_that_hardly_raises_high_modes_is_known_in_noise():
 
 
 def test_nothing_is_looked_for_where_a_sweep_did_not_go():
-    first, last = band_of(Sweep(45.0, 600.0, 3.0).signal(3000.0), 3000.0)
+    first, last = sweep_band(Sweep(45.0, 600.0, 3.0).signal(3000.0), 3000.0)
 
     assert 42.0 < first < 48.0
     assert 560.0 < last < 600.0

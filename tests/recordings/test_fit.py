@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bayesplate.recordings.local_fit import Window, fitted, refined, search
+from bayesplate.recordings.local_fit import Window, fit_at_poles, refine_poles, search_modes
 
 RATE, N = 4000.0, 6000
 LINES = np.arange(N // 2) * RATE / N
@@ -38,7 +38,7 @@ def window(values: np.ndarray) -> Window:
 def test_without_noise_the_modes_are_exact_however_short_the_record():
     """Two slow decays, cut off when much of them is left: leakage is part of the rational form."""
     slow = PAIR * [1.0, 0.1]
-    fit = refined(window(decays(np.random.default_rng(1), slow, 3, 0.0)), slow + np.array([0.3, 0.05]))
+    fit = refine_poles(window(decays(np.random.default_rng(1), slow, 3, 0.0)), slow + np.array([0.3, 0.05]))
 
     np.testing.assert_allclose(fit.poles, slow, rtol=0.0, atol=2e-6)
 
@@ -48,7 +48,7 @@ def test_errors_are_those_of_the_noise():
     rng = np.random.default_rng(2)
     off, sds = [], []
     for _ in range(40):
-        fit = refined(window(decays(rng, PAIR, 4, 0.1)), PAIR)
+        fit = refine_poles(window(decays(rng, PAIR, 4, 0.1)), PAIR)
         inverse = np.linalg.inv(fit.information()[1].sum(axis=0))
         off.append((fit.poles - PAIR).T.ravel())
         sds.append(np.sqrt(np.diagonal(inverse)))
@@ -64,8 +64,8 @@ def test_a_close_pair_is_told_apart_and_a_single_mode_is_left_single():
     noisy = decays(rng, PAIR, 4, 0.02)
     single = decays(rng, PAIR[:1], 4, 0.02)
 
-    both = search(replace(window(noisy / _level(noisy)), least_variance=1.0), 45.0)[-1]
-    one = search(replace(window(single / _level(single)), least_variance=1.0), 45.0)[-1]
+    both = search_modes(replace(window(noisy / _level(noisy)), least_variance=1.0), 45.0)[-1]
+    one = search_modes(replace(window(single / _level(single)), least_variance=1.0), 45.0)[-1]
 
     np.testing.assert_allclose(np.sort(both[:, 0]), PAIR[:, 0], atol=0.05)
     assert one.shape == (1, 2)
@@ -79,11 +79,11 @@ def _level(values: np.ndarray) -> np.ndarray:
 def test_the_jacobian_is_the_derivative():
     """Against differences: what a step in each parameter does to what is left, other shapes free."""
     values = decays(np.random.default_rng(4), PAIR, 2, 0.05)
-    at = fitted(window(values), PAIR)
+    at = fit_at_poles(window(values), PAIR)
     scores, _ = at.information()
     for k, (mode, which) in enumerate([(0, 0), (1, 0), (0, 1), (1, 1)]):
         step = np.zeros((2, 2))
         step[mode, which] = 1e-4
-        sums = [np.sum(np.abs(fitted(window(values), PAIR + sign * step).rest) ** 2, axis=0) for sign in (1, -1)]
+        sums = [np.sum(np.abs(fit_at_poles(window(values), PAIR + sign * step).rest) ** 2, axis=0) for sign in (1, -1)]
         slope = -(sums[0] - sums[1]) / 2e-4 / at.variance
         assert scores[:, k] == pytest.approx(slope, rel=1e-3)

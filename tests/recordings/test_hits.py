@@ -10,7 +10,7 @@ from made_recordings import hits, refusal
 
 from bayesplate.recordings.hits import find_hits
 from bayesplate.recordings.signals import FrequencyResponse, Recording
-from bayesplate.recordings.taking import take
+from bayesplate.recordings.taking import take_spectra
 
 RATE = 4000.0
 HAMMER = (0.03, 0.02)
@@ -42,7 +42,7 @@ def test_a_bounce_is_a_double_hit_and_the_others_are_used(has_force):
         first = round(at * RATE)
         clicks[first : first + 8] = np.random.default_rng(first).standard_normal(8) * np.abs(one.response).max()
     clicked = replace(one, response=one.response + clicks)
-    taken = take([[clicked]], 500.0)
+    taken = take_spectra([[clicked]], 500.0)
 
     assert [hit.fault[:12] for hit in find_hits(clicked)] == ["a double hit", "a double hit", "", ""]
     assert len(taken.spectra.names) == 2
@@ -76,12 +76,12 @@ def test_a_soft_tap_is_found_in_the_hiss_of_a_wide_band_and_a_softer_one_is_told
 
     np.testing.assert_allclose([hit.onset / 44_100.0 for hit in found], TIMES, atol=0.004)
 
-    softer = take([[with_hiss(0.08)]], 500.0)
+    softer = take_spectra([[with_hiss(0.08)]], 500.0)
 
     assert len(softer.spectra.names) == 3
     (told,) = softer.remarks
     assert told.startswith("tap.wav: the sound rises again within a ring-down, at 1.90 s: a soft tap or a noise")
-    assert take([[with_hiss(0.4)]], 500.0).remarks == ()
+    assert take_spectra([[with_hiss(0.4)]], 500.0).remarks == ()
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -98,7 +98,7 @@ def test_a_ringing_board_is_not_heard_as_a_second_hit(seed):
 def test_files_are_repeats_only_where_both_places_are_known_and_the_same():
     for sensor, n_pairs in (((0.5, 0.2), 1), (None, 2)):
         files = [[replace(recording(TIMES, name=name), hammer=HAMMER, sensor=sensor)] for name in ("a.wav", "b.wav")]
-        spectra = take(files, 500.0).spectra
+        spectra = take_spectra(files, 500.0).spectra
 
         assert len(spectra.between) == len(set(spectra.places)) == n_pairs
 
@@ -111,7 +111,7 @@ def test_what_cannot_be_used_is_refused_with_every_hit_and_every_file():
     early = Recording("early.wav", RATE, bell, np.sum(np.abs(since) < 5e-4, axis=0, dtype=float))
     slow = Recording("slow.wav", 1000.0, np.zeros(3000), np.zeros(3000))
 
-    message = refusal(take, [[quiet], [close], [early], [slow]], 500.0)
+    message = refusal(take_spectra, [[quiet], [close], [early], [slow]], 500.0)
 
     for said in (
         "quiet.wav: wanted a hit that stands out of the quiet, got none",
@@ -129,8 +129,8 @@ def test_a_force_that_rings_or_is_the_response_is_none_and_told_once_for_each_fi
     exchanged = replace(one, name="exchanged.wav", force=one.response, response=one.force)
     stereo = replace(one, name="stereo.wav", force=-0.8 * one.response + hiss)
 
-    assert len(take([[one]], 500.0).spectra.names) == 4
-    first, second = refusal(take, [[one], [exchanged], [stereo]], 500.0).split("\n")
+    assert len(take_spectra([[one]], 500.0).spectra.names) == 4
+    first, second = refusal(take_spectra, [[one], [exchanged], [stereo]], 500.0).split("\n")
 
     assert first.startswith("exchanged.wav force: wanted a channel with a pulse for each hit, got one that rings on")
     assert second.startswith("stereo.wav force: wanted a channel with a pulse for each hit, got nearly the same as the")
@@ -143,6 +143,8 @@ def test_what_does_not_go_together_is_refused():
     other = FrequencyResponse("b.csv", 2.0 * hertz, np.ones(200) + 0j)
     heard, deaf = recording(TIMES), recording(TIMES, has_force=False, name="b.wav")
 
-    assert "FILES: wanted recordings or frequency responses, got both" in refusal(take, [[heard], [response]], 500.0)
-    assert "b.csv frequencies: wanted those of a.csv, got others" in refusal(take, [[response], [other]], 150.0)
-    assert "b.wav: wanted the channels of a.wav, got without a force" in refusal(take, [[heard], [deaf]], 500.0)
+    assert "FILES: wanted recordings or frequency responses, got both" in refusal(
+        take_spectra, [[heard], [response]], 500.0
+    )
+    assert "b.csv frequencies: wanted those of a.csv, got others" in refusal(take_spectra, [[response], [other]], 150.0)
+    assert "b.wav: wanted the channels of a.wav, got without a force" in refusal(take_spectra, [[heard], [deaf]], 500.0)

@@ -9,9 +9,9 @@ import pytest
 from made_recordings import board, hits, likely_below, truth_below
 
 from bayesplate.errors import InputError
-from bayesplate.recordings.picking import Picked, pick_modes
+from bayesplate.recordings.picking import PickedModes, pick_modes
 from bayesplate.recordings.signals import Recording
-from bayesplate.recordings.taking import take
+from bayesplate.recordings.taking import take_spectra
 
 RATE, SECONDS, HIGHEST = 8000.0, 7.5, 300.0
 SURE = 0.98 * HIGHEST
@@ -33,9 +33,9 @@ def tone(hertz: float, share: float) -> np.ndarray:
     return share * np.sin(2.0 * np.pi * hertz * AT + hertz)
 
 
-def picked(added: np.ndarray, decibels: float = 45.0) -> Picked:
+def picked(added: np.ndarray, decibels: float = 45.0) -> PickedModes:
     """Modes of the taps with something added, from all five of them."""
-    taken = take([[Recording("tap.wav", RATE, taps(decibels) + added)]], HIGHEST)
+    taken = take_spectra([[Recording("tap.wav", RATE, taps(decibels) + added)]], HIGHEST)
     assert (len(taken.spectra.names), taken.remarks) == (5, ())
     return pick_modes(taken.spectra, 20.0, HIGHEST)
 
@@ -77,7 +77,7 @@ def gated(heard: np.ndarray, threshold: float, fade: float) -> np.ndarray:
 
 @pytest.mark.parametrize(("threshold", "fade"), [(0.008, 0.05), (0.02, 0.02)])
 def test_what_a_noise_gate_cuts_off_is_not_used_and_it_is_named(threshold, fade):
-    taken = take([[Recording("gate.wav", RATE, gated(taps(), threshold, fade))]], HIGHEST)
+    taken = take_spectra([[Recording("gate.wav", RATE, gated(taps(), threshold, fade))]], HIGHEST)
     found = pick_modes(taken.spectra, 20.0, HIGHEST)
 
     np.testing.assert_allclose(likely_below(found, SURE), truth_below(SURE), rtol=2e-3)
@@ -90,11 +90,11 @@ def test_a_gate_that_leaves_too_little_is_named_in_the_refusal():
     heard = np.where((AT - 0.5) % 1.4 < 0.15, taps(), 0.0)
 
     with pytest.raises(InputError, match=r"time to ring down, .*digital silence between: switch off the noise gate"):
-        take([[Recording("gate.wav", RATE, heard)]], HIGHEST)
+        take_spectra([[Recording("gate.wav", RATE, heard)]], HIGHEST)
 
 
 def test_rounding_to_nothing_is_no_gate():
     """A soft recording of 16 bits whose end is smaller than the last of them."""
     heard = np.round(200.0 * taps()) / 2.0**15
 
-    assert take([[Recording("soft.wav", RATE, heard)]], HIGHEST).remarks == ()
+    assert take_spectra([[Recording("soft.wav", RATE, heard)]], HIGHEST).remarks == ()

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from made_recordings import accelerance, hits, with_complex_noise
 
-from bayesplate.recordings.padding import common_padding, padding_of
+from bayesplate.recordings.padding import common_padding, padding_factor
 from bayesplate.recordings.picking import pick_modes
 from bayesplate.recordings.signals import FrequencyResponse
-from bayesplate.recordings.taking import take
+from bayesplate.recordings.taking import take_spectra
 
 RATE, HAMMER, HIGHEST = 4000.0, (0.02, 0.02), 420.0
 N_SAMPLES, N_HITS, AFTER_PULSE = 4000, 5, 100
@@ -32,8 +32,8 @@ def response(padded: int) -> FrequencyResponse:
 
 def test_a_padded_record_is_told_from_a_long_one():
     """And from a response without noise that was never cut off."""
-    assert [padding_of(response(padded).values) for padded in (1, 2, 3, 8)] == [1, 2, 3, 8]
-    assert padding_of(accelerance(np.arange(10.0, 900.0, 0.25), HAMMER)) == 1
+    assert [padding_factor(response(padded).values) for padded in (1, 2, 3, 8)] == [1, 2, 3, 8]
+    assert padding_factor(accelerance(np.arange(10.0, 900.0, 0.25), HAMMER)) == 1
 
 
 def test_what_one_response_of_several_knows_is_not_left_out():
@@ -47,7 +47,7 @@ def test_what_one_response_of_several_knows_is_not_left_out():
 
 def picked_of(padded: int) -> tuple[np.ndarray, tuple[str, ...]]:
     """Frequency and its error of the likely modes of a response, and what was told of it."""
-    heard = take([[response(padded)]], HIGHEST)
+    heard = take_spectra([[response(padded)]], HIGHEST)
     likely = pick_modes(heard.spectra, 20.0, HIGHEST).likely
     return np.array([(mode.hz, mode.sd_hz) for mode in likely]), heard.remarks
 

@@ -9,12 +9,12 @@ import pytest
 from made_recordings import SENSOR, accelerance, board, hits, likely_below, truth_below, with_complex_noise
 from scipy.signal import fftconvolve
 
-from bayesplate.recordings.picking import Picked, pick_modes
+from bayesplate.recordings.picking import PickedModes, pick_modes
 from bayesplate.recordings.signals import FrequencyResponse, Recording
 from bayesplate.recordings.spectra import response_spectra
 from bayesplate.recordings.sweeps import Sweep, impulse_response, read_sweep
-from bayesplate.recordings.taking import Heard, take, take_impulses
-from bayesplate.report.recordings import averaged
+from bayesplate.recordings.taking import TakenSpectra, take_impulses, take_spectra
+from bayesplate.report.recordings import averaged_responses
 
 RATE = 4000.0
 HAMMERS = ((0.02, 0.02), (0.15, 0.19), (0.29, 0.03))
@@ -22,7 +22,7 @@ LOWEST, HIGHEST = 20.0, 420.0
 
 
 @pytest.fixture(scope="module")
-def heard() -> Heard:
+def heard() -> TakenSpectra:
     """Three places, three hits each, with hum."""
     rng = np.random.default_rng(8)
     files = []
@@ -30,11 +30,11 @@ def heard() -> Heard:
         for hit in range(3):
             force, response = hits(rng, [0.02], hammer, rate=RATE, decibels=45.0, hum=0.01)
             files.append([Recording(f"{place}-{hit}", RATE, response, force, hammer=hammer, sensor=SENSOR)])
-    return take(files, HIGHEST)
+    return take_spectra(files, HIGHEST)
 
 
 @pytest.fixture(scope="module")
-def picked(heard) -> Picked:
+def picked(heard) -> PickedModes:
     """Its modes below 420 Hz."""
     return pick_modes(heard.spectra, LOWEST, HIGHEST)
 
@@ -77,7 +77,7 @@ def test_residues_between_the_places_have_the_signs_and_sizes_of_the_shapes(pick
 
 def test_the_averaged_response_is_the_board_and_its_coherence_falls_in_the_noise(heard):
     """H1 near resonances against the modal sum; the coherence of three hits is near one there."""
-    one = averaged(heard.spectra)[0]
+    one = averaged_responses(heard.spectra)[0]
     truth = board().damped[1:8]
     at = [int(np.argmin(np.abs(one.frequency - hertz))) for hertz in truth]
 

@@ -7,17 +7,17 @@ import pytest
 
 from bayesplate.recordings import picking
 from bayesplate.recordings.modes_found import Mode
-from bayesplate.recordings.picking import whole_peaks
-from bayesplate.recordings.plausibility import Peak, Verdict, broad_odds, verdicts
+from bayesplate.recordings.picking import parts_of_peaks
+from bayesplate.recordings.plausibility import JudgedMode, ModeVerdict, broad_odds, mode_verdicts
 from bayesplate.recordings.spectra import Spectra
-from bayesplate.recordings.strength import Answer
+from bayesplate.recordings.strength import ModeMobility
 
 
-def part(of: int, spurious: float = 0.8) -> Verdict:
-    return Verdict(spurious, "part of a peak", of)
+def part(of: int, spurious: float = 0.8) -> ModeVerdict:
+    return ModeVerdict(spurious, "part of a peak", of)
 
 
-MODE = Verdict(0.02, "")
+MODE = ModeVerdict(0.02, "")
 
 
 def mode(frequency: float, damping: float = 0.007) -> Mode:
@@ -26,15 +26,15 @@ def mode(frequency: float, damping: float = 0.007) -> Mode:
     return Mode(frequency, damping * frequency, noise, none, none, one, np.ones(1), 0.0, 1.0)
 
 
-def answer(strength: float = 1.0) -> Answer:
-    return Answer(np.full(1, strength, dtype=complex), np.full(1, 0.01), 1.0)
+def answer(strength: float = 1.0) -> ModeMobility:
+    return ModeMobility(np.full(1, strength, dtype=complex), np.full(1, 0.01), 1.0)
 
 
 def test_parts_of_a_peak_leave_it_and_a_part_of_a_part_and_what_is_rather_a_mode_stay():
     """Two modes with something between them that both are confused with: one of the two was a part of that."""
-    assert whole_peaks([MODE, part(0), part(1)]) == {1: 0}
-    assert whole_peaks([MODE, part(0, spurious=0.45), Verdict(0.9, "faint")]) == {}
-    assert whole_peaks([part(1), Verdict(0.9, "faint")]) == {0: 1}
+    assert parts_of_peaks([MODE, part(0), part(1)]) == {1: 0}
+    assert parts_of_peaks([MODE, part(0, spurious=0.45), ModeVerdict(0.9, "faint")]) == {}
+    assert parts_of_peaks([part(1), ModeVerdict(0.9, "faint")]) == {0: 1}
 
 
 def test_what_is_four_times_as_broad_as_all_others_is_rather_no_mode():
@@ -58,9 +58,9 @@ SPECTRA = Spectra(HERTZ, ONES, ONES, ("frf",), FIRST, FIRST, ((None, None),), "a
 def test_a_weak_mode_is_a_part_of_a_peak_nearby_and_of_nothing_broad():
     modes = [*(mode(100.0 * i) for i in range(1, 9)), mode(950.0, damping=0.035)]
     answered = [answer()] * len(modes)
-    alone = verdicts(SPECTRA, modes, answered)
-    beside_a_peak = verdicts(SPECTRA, [*modes, mode(810.0)], [*answered, answer(0.05)])
-    beside_the_ground = verdicts(SPECTRA, [*modes, mode(910.0)], [*answered, answer(0.05)])
+    alone = mode_verdicts(SPECTRA, modes, answered)
+    beside_a_peak = mode_verdicts(SPECTRA, [*modes, mode(810.0)], [*answered, answer(0.05)])
+    beside_the_ground = mode_verdicts(SPECTRA, [*modes, mode(910.0)], [*answered, answer(0.05)])
 
     assert max(one.spurious for one in alone[:-1]) < 0.1
     assert (alone[-1].kind, alone[-1].spurious > 0.5) == ("something broad", True)
@@ -71,7 +71,7 @@ def test_a_weak_mode_is_a_part_of_a_peak_nearby_and_of_nothing_broad():
 
 def test_beside_loud_lines_that_do_not_decay_no_mode_is_faint_and_they_are_named():
     modes = [*(mode(100.0 * i) for i in range(1, 6)), *(mode(hertz, damping=1e-6) for hertz in (83.1, 130.7, 220.3))]
-    found = verdicts(SPECTRA, modes, [*[answer()] * 5, *[answer(300.0)] * 3])
+    found = mode_verdicts(SPECTRA, modes, [*[answer()] * 5, *[answer(300.0)] * 3])
 
     assert max(one.spurious for one in found[:5]) < 0.1
     assert {one.kind for one in found[5:]} == {"a steady line"}
@@ -88,11 +88,11 @@ def test_modes_beside_a_part_are_those_of_a_fit_without_it_and_others_stay(monke
     words = {404.65: part(2)}
 
     def judged(_, modes):
-        return [Peak(one, answer(), words.get(one.frequency, MODE), one) for one in modes]
+        return [JudgedMode(one, answer(), words.get(one.frequency, MODE), one) for one in modes]
 
-    monkeypatch.setattr(picking, "judged", judged)
+    monkeypatch.setattr(picking, "judge_modes", judged)
     monkeypatch.setattr(picking, "fit_modes", lambda *_: again)
-    kept, (left_out,) = picking._without_parts(None, before, [], (20.0, 1000.0))
+    kept, (left_out,) = picking._fit_without_parts(None, before, [], (20.0, 1000.0))
 
     assert [peak.mode.frequency for peak in kept] == [375.0, 401.73, 404.22, 430.0]
     assert (left_out.mode.frequency, left_out.verdict.kind) == (404.65, f"part of {kept[2].pole[0]:.1f} Hz")
@@ -102,7 +102,7 @@ def test_modes_beside_a_part_are_those_of_a_fit_without_it_and_others_stay(monke
 def test_damping_is_averaged_as_the_frequency_is_and_its_error_holds_both_fits():
     as_whole, beside_part = mode(400.0, damping=0.005), mode(401.0, damping=0.007)
 
-    one = picking._row(Peak(as_whole, answer(), MODE, beside_part, doubt=0.8), 1.0)
+    one = picking._picked_row(JudgedMode(as_whole, answer(), MODE, beside_part, doubt=0.8), 1.0)
 
     decay, other = as_whole.decay, beside_part.decay
     assert one.hz == pytest.approx(400.2)

@@ -12,7 +12,7 @@ from PIL import Image
 from bayesplate.commands.prepare import prepare
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
-from bayesplate.recordings.sand import read_picture, sand_evidence, straightened
+from bayesplate.recordings.sand import read_picture, sand_evidence, straighten_picture
 
 GRID = np.linspace(0.0, 1.0, 61)
 MODES = {"finnish-spruce-cantilever": (ritz.FINNISH, (1, 5)), "fiemme-spruce-clamped": (ritz.FIEMME, (2, 5))}
@@ -39,11 +39,11 @@ def test_the_mode_is_told_from_all_others_and_a_picture_of_nothing_from_none(nam
     rng = np.random.default_rng(3)
     for mode in shown:
         picture = photograph(rng, solved.shape(mode), (plate.L_x, plate.L_y))
-        evidence = sand_evidence(straightened(picture), shapes)
+        evidence = sand_evidence(straighten_picture(picture), shapes)
         assert int(np.argmax(evidence)) == mode
         assert np.exp(evidence[mode]) / np.exp(evidence).sum() > 0.5
-    np.testing.assert_allclose(sand_evidence(straightened(1.0 - picture), shapes), evidence, atol=1e-6)
-    nothing = sand_evidence(straightened(np.clip(0.5 + 0.2 * rng.standard_normal((120, 240)), 0.0, 1.0)), shapes)
+    np.testing.assert_allclose(sand_evidence(straighten_picture(1.0 - picture), shapes), evidence, atol=1e-6)
+    nothing = sand_evidence(straighten_picture(np.clip(0.5 + 0.2 * rng.standard_normal((120, 240)), 0.0, 1.0)), shapes)
     assert np.exp(nothing).max() / np.exp(nothing).sum() < 0.5
 
 

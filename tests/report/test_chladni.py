@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bayesplate.estimates.sheet import CombinedMode, Sheet, SheetMode, points
-from bayesplate.report.chladni import A4, chladni_sheet, layout
+from bayesplate.estimates.sheet import CombinedMode, Sheet, SheetMode, grid_points
+from bayesplate.report.chladni import A4, chladni_sheet, sheet_layout
 
 EDGES = {"x0": "clamped", "x1": "free", "y0": "supported", "y1": "free"}
 
 
 def shape(m, n):
     """A plate's mode by hand: m and n nodal lines across."""
-    return np.outer(np.cos(m * np.pi * points()), np.cos(n * np.pi * points()))
+    return np.outer(np.cos(m * np.pi * grid_points()), np.cos(n * np.pi * grid_points()))
 
 
 def made(aspect_ratio=2.0, title="A board", *, n_modes=12, measured=50.0):
@@ -106,11 +106,11 @@ def test_nothing_overlaps_or_leaves_the_page(aspect_ratio):
 
 def test_few_figures_fill_the_sheet_and_panels_keep_the_boards_proportions():
     """Two columns where no mixtures, three in a row, set the width: a sheet for the bench is read from afar."""
-    few = layout(6, 2.2, has_combined=False)
+    few = sheet_layout(6, 2.2, has_combined=False)
     assert (few.n_columns, few.n_rows) == (2, 3)
     assert few.panel[0] == pytest.approx((8.27 - 2 * 0.55) / 2 - 0.30)  # half of A4 between its margins, less a gap
-    assert layout(6, 2.2, has_combined=True).n_columns == 3
+    assert sheet_layout(6, 2.2, has_combined=True).n_columns == 3
     for aspect_ratio in (0.4, 1.0, 2.2):
-        plan = layout(12, aspect_ratio, has_combined=True)
+        plan = sheet_layout(12, aspect_ratio, has_combined=True)
         assert plan.panel[0] / plan.panel[1] == pytest.approx(aspect_ratio)
         assert plan.n_columns * plan.n_rows >= 12

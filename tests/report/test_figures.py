@@ -26,15 +26,15 @@ from bayesplate.report.content import inputs_table
 from bayesplate.report.corner_plot import axis_label
 from bayesplate.report.diagnosis import null_picture
 from bayesplate.report.modes import modes_pictures, predictive_picture
-from bayesplate.report.page import pictures
-from bayesplate.report.posterior import Compared, compared, health_picture
-from bayesplate.report.style import NO_GLYPH, drawable, in_figure
+from bayesplate.report.page import fit_pictures
+from bayesplate.report.posterior import SampledQuantity, health_picture, sampled_quantities
+from bayesplate.report.style import NO_GLYPH, drawable_text, mathtext
 from bayesplate.results.words import MISSING
 
 
 @pytest.fixture(scope="module")
 def drawn(clamped):
-    groups = pictures(clamped.inference, clamped.draws, clamped.summary, DIAGNOSES["named"])
+    groups = fit_pictures(clamped.inference, clamped.draws, clamped.summary, DIAGNOSES["named"])
     return {one.name: one for found in groups.values() for one in found}
 
 
@@ -289,9 +289,9 @@ def test_no_word_is_cut_off_or_too_small(drawn, clamped):
 
 
 def test_signs_that_the_font_lacks_are_shown_as_such_and_symbols_as_mathematics():
-    assert drawable("violin \U0001f3bb") == f"violin {NO_GLYPH}"
-    assert drawable("Ø $x$ é") == "Ø $x$ é"
-    assert in_figure("E_x, nu_xy, GPa") == r"$E_{x}$, $\nu_{xy}$, GPa"
+    assert drawable_text("violin \U0001f3bb") == f"violin {NO_GLYPH}"
+    assert drawable_text("Ø $x$ é") == "Ø $x$ é"
+    assert mathtext("E_x, nu_xy, GPa") == r"$E_{x}$, $\nu_{xy}$, GPa"
 
 
 def test_what_the_readings_made_of_each_prior(clamped):
@@ -299,13 +299,13 @@ def test_what_the_readings_made_of_each_prior(clamped):
 
     def told(mean, sd):
         draws = np.exp(mean + sd * np.array([-1.0, 1.0]))
-        return Compared("x", "", draws, Quantity.from_median(np.e, np.exp(0.5))).told
+        return SampledQuantity("x", "", draws, Quantity.from_median(np.e, np.exp(0.5))).told
 
     assert told(1.0, 0.005) == "100 times narrower"
     assert told(1.0, 0.2) == "2.5 times narrower"
     assert told(1.0, 0.5) == "as before: nothing was learned"
     assert told(1.2, 0.5) == "moved, as wide as before"
-    found = {one.name: one for one in compared(clamped.inference.problem, clamped.draws)}
+    found = {one.name: one for one in sampled_quantities(clamped.inference.problem, clamped.draws)}
     assert np.log(found["E_x"].prior.median) == pytest.approx(np.log(3))
     mean = clamped.summary.elastic.E_x.mean / 1e9
     assert np.log(found["E_x"].draws).mean() == pytest.approx(np.log(mean), rel=1e-3)

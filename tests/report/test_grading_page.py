@@ -9,10 +9,10 @@ import pytest
 from payloads import EVERY
 from read_pages import Read, faults, not_as_text
 
-from bayesplate.grading.boards import BatchSummary, BoardRow, Failure
+from bayesplate.grading.boards import BatchSummary, BoardRow, FailedBoard
 from bayesplate.grading.matching import GradingRequest, grade
-from bayesplate.report.grading import MOST_NAMED, speed_picture, write_grading_page
-from bayesplate.results.contract import JOINT, Joint
+from bayesplate.report.grading import MOST_NAMED_ROWS, speed_picture, write_grading_page
+from bayesplate.results.contract import JOINT_NAMES, JointMoments
 
 LOG = np.log([12e9, 0.9e9, 0.7e9, 25.0, 2.0, 5.0, 440.0])
 EVIL = "<script>alert(1)</script>"
@@ -22,7 +22,7 @@ def rows_of(n: int, name: str = "top", spread: float = 0.05, doubt: str = "") ->
     """Boards made by hand, whose densities differ by a spread; of the second there may be a doubt."""
     mean = LOG + np.random.default_rng(7).standard_normal((n, 7)) * np.r_[np.full(6, 0.05), spread]
     covariance = tuple(map(tuple, 4e-4 * np.eye(7)))
-    joints = [Joint(JOINT, tuple(one), covariance) for one in mean]
+    joints = [JointMoments(JOINT_NAMES, tuple(one), covariance) for one in mean]
     doubts = [doubt if i == 1 else "" for i in range(n)]
     return [BoardRow(f"{name}-{i}", "fitted", doubt=doubts[i], joint=one) for i, one in enumerate(joints)]
 
@@ -30,7 +30,7 @@ def rows_of(n: int, name: str = "top", spread: float = 0.05, doubt: str = "") ->
 def page_of(folder, n: int, request: GradingRequest, said: str = EVIL, doubt: str = ""):
     """The page of boards made by hand, and its text."""
     rows = rows_of(n, doubt=doubt)
-    failed = (Failure("<b>" if said == EVIL else said, "refused", said),)
+    failed = (FailedBoard("<b>" if said == EVIL else said, "refused", said),)
     summary = BatchSummary(1, 1, {}, n + 1, n, 1, failed, (), ())
     graded = grade(rows, request)
     path = write_grading_page(folder, graded, summary, has_pages=True)
@@ -97,7 +97,7 @@ def test_names_and_messages_stay_texts(tmp_path):
 
 
 def test_many_boards_are_drawn_without_names_and_none_at_all_is_a_page_too(tmp_path):
-    n = MOST_NAMED + 80
+    n = MOST_NAMED_ROWS + 80
     _, page = page_of(tmp_path / "many", n, GradingRequest())
     assert f"the first 100 of {n}" in page
     _, page = page_of(tmp_path / "none", 0, GradingRequest(limits={"E_x": (1e9, None)}))

@@ -15,7 +15,7 @@ from made_reports import FIGURES
 from payloads import EVERY, PAYLOADS
 from read_pages import Read, faults, not_as_text
 
-from bayesplate.report.page import _of_diagnosis
+from bayesplate.report.page import _diagnosis_pictures
 
 LARGEST = 3_000_000
 """Bytes."""
@@ -172,10 +172,10 @@ def test_a_diagnosis_brings_its_figures_tables_and_constants(clamped, tmp_path, 
     """Without the fit's own figures, whose drawing takes most of the time."""
     places = dict.fromkeys(("constants", "board", "modes", "errors", "folded"), ())
     monkeypatch.setattr(
-        "bayesplate.report.page.pictures",
+        "bayesplate.report.page.fit_pictures",
         lambda inference, draws, summary, diagnosis: {
             **places,
-            **dict(zip(("diagnosis_first", "diagnosis_more"), _of_diagnosis(diagnosis), strict=True)),
+            **dict(zip(("diagnosis_first", "diagnosis_more"), _diagnosis_pictures(diagnosis), strict=True)),
         },
     )
     always = {"null-control", "signatures"}

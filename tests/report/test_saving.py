@@ -22,7 +22,7 @@ def two_pictures(inference, draws, summary, diagnosis):
 
 
 def test_a_style_of_the_user_and_another_thread_change_no_file(clamped, clamped_folder, tmp_path, monkeypatch):
-    monkeypatch.setattr("bayesplate.report.page.pictures", two_pictures)
+    monkeypatch.setattr("bayesplate.report.page.fit_pictures", two_pictures)
     with rc_context(STYLE), ThreadPoolExecutor(2) as threads:
         for done in [threads.submit(clamped.write, tmp_path / name) for name in ("one", "two")]:
             done.result()

@@ -19,7 +19,7 @@ from read_pages import Read, faults, not_as_text
 from bayesplate.cli import main
 from bayesplate.recordings.contract import LabelChance, PickedRow, PickReport
 from bayesplate.report import recordings as home
-from bayesplate.report.style import Picture, stacked
+from bayesplate.report.style import Picture, stacked_panels
 
 UNMEASURED = Path(__file__).parents[2] / "docs" / "cards" / "half-top-unmeasured.toml"
 STEERS = ("\x1b[2J\x1b]0;owned\x07.wav", "a\nb.wav", "a\rb.wav", "\x9b31m.wav", "\u202egnp.wav", "=cmd()|' '!A0.wav")
@@ -98,9 +98,9 @@ def test_a_text_stays_a_text_on_the_page_of_recordings(tmp_path, monkeypatch):
     """Names of files, of the board, remarks, labels, and the fragment."""
     payload = EVERY
     for name in ("spectra", "errors", "stability"):
-        picture = Picture(name, payload, payload, payload, stacked([0.3])[0])
+        picture = Picture(name, payload, payload, payload, stacked_panels([0.3])[0])
         monkeypatch.setattr(home, f"{name}_picture", lambda *_, picture=picture: picture)
-    monkeypatch.setattr(home, "averaged", lambda _: ())
+    monkeypatch.setattr(home, "averaged_responses", lambda _: ())
     peaks = (ROW, PickedRow(**{**vars(ROW), "labels": (LabelChance(payload, 0.9),)}))
     report = PickReport(1, (payload, payload), 1, 1, 1.5, 20.0, 200.0, peaks, "same", payload, payload, (payload,))
     (tmp_path / "figures").mkdir()

@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from bayesplate.results.archive import DRAWN, GROUPS, to_arviz, tree_of, write_tree
+from bayesplate.results.archive import DRAW_DIMENSIONS, GROUPS, build_tree, to_arviz, write_tree
 
 LABELS = ["(1,0)", "(1,1)", "(2,0)"]
 
@@ -19,10 +19,13 @@ def content():
     sampled = rng.standard_normal
     return {
         "groups": {
-            "posterior": {"E_x": (DRAWN, sampled((4, 50))), "tension": ((*DRAWN, "edge"), sampled((4, 50, 2)))},
-            "log_prior": {"tension": (DRAWN, sampled((4, 50)))},
-            "log_likelihood": {"frequency": ((*DRAWN, "mode"), sampled((4, 50, 3)))},
-            "sample_stats": {"lp": (DRAWN, sampled((4, 50))), "tau": (["parameter"], np.array([20.0, 21.0]))},
+            "posterior": {
+                "E_x": (DRAW_DIMENSIONS, sampled((4, 50))),
+                "tension": ((*DRAW_DIMENSIONS, "edge"), sampled((4, 50, 2))),
+            },
+            "log_prior": {"tension": (DRAW_DIMENSIONS, sampled((4, 50)))},
+            "log_likelihood": {"frequency": ((*DRAW_DIMENSIONS, "mode"), sampled((4, 50, 3)))},
+            "sample_stats": {"lp": (DRAW_DIMENSIONS, sampled((4, 50))), "tau": (["parameter"], np.array([20.0, 21.0]))},
             "observed_data": {"frequency": (["mode"], np.array([52.0, 98.0, 310.0]))},
         },
         "labels": {"mode": LABELS, "edge": ["x0", "y0"], "parameter": ["E_x", "größe"]},
@@ -33,7 +36,7 @@ def content():
 @pytest.fixture
 def path(tmp_path):
     path = tmp_path / "posterior.nc"
-    write_tree(path, tree_of(**content()))
+    write_tree(path, build_tree(**content()))
     return path
 
 
@@ -41,7 +44,7 @@ def test_arviz_reads_from_the_file_what_it_gets_without_one(path):
     import arviz
 
     given = content()
-    for found in (arviz.from_netcdf(str(path), engine="h5netcdf"), to_arviz(tree_of(**given))):
+    for found in (arviz.from_netcdf(str(path), engine="h5netcdf"), to_arviz(build_tree(**given))):
         for group, variables in given["groups"].items():
             assert set(found[group].data_vars) == set(variables)
             for name, (dims, values) in variables.items():
@@ -60,7 +63,7 @@ def test_where_arviz_works_with_trees_it_gets_one(monkeypatch):
 
     monkeypatch.delitem(vars(arviz), "InferenceData", raising=False)
     monkeypatch.setitem(vars(arviz), "__getattr__", {"InferenceData": xarray.DataTree}.__getitem__)
-    tree = to_arviz(tree_of(**content()))
+    tree = to_arviz(build_tree(**content()))
 
     assert isinstance(tree, xarray.DataTree)
     assert tuple(tree.children) == GROUPS
@@ -69,11 +72,11 @@ def test_where_arviz_works_with_trees_it_gets_one(monkeypatch):
 
 def test_the_same_draws_give_the_same_bytes(path, tmp_path):
     again = tmp_path / "elsewhere.nc"
-    write_tree(again, tree_of(**content()))
+    write_tree(again, build_tree(**content()))
     assert again.read_bytes() == path.read_bytes()
     changed = content()
     changed["groups"]["posterior"]["E_x"][1][0, 0] += 1e-12
-    write_tree(again, tree_of(**changed))
+    write_tree(again, build_tree(**changed))
     assert again.read_bytes() != path.read_bytes()
 
 
@@ -87,11 +90,11 @@ def test_a_cache_and_a_disk_that_cannot_be_written_end_no_process(tmp_path):
         "import resource, sys, pathlib, numpy as np\n"
         "from bayesplate.errors import UnwritableError\n"
         "from bayesplate.libraries import load_arviz\n"
-        "from bayesplate.results.archive import DRAWN, tree_of, write_tree\n"
+        "from bayesplate.results.archive import DRAW_DIMENSIONS, build_tree, write_tree\n"
         "load_arviz().ess\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))\n"
         "values = np.random.default_rng(1).normal(size=(4, 30_000))\n"
-        "tree = tree_of({'posterior': {'a': (DRAWN, values)}}, {}, {})\n"
+        "tree = build_tree({'posterior': {'a': (DRAW_DIMENSIONS, values)}}, {}, {})\n"
         "try:\n"
         "    write_tree(pathlib.Path(sys.argv[1]), tree)\n"
         "except UnwritableError:\n"

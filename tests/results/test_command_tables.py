@@ -11,10 +11,10 @@ from bayesplate.results.command_tables import check_tables, forward_table, metho
 from bayesplate.results.comparison import (
     SAME_CENTS,
     ComparedMode,
-    Estimated,
-    Forward,
+    ForwardPrediction,
     LeastSquaresErrors,
     MethodRow,
+    ModulusEstimate,
     TheoryRow,
     better_theory,
 )
@@ -41,14 +41,14 @@ REPORT = CheckReport(
     n_doubts=0,
 )
 
-NOTHING = Estimated(None, None, None, None, "Pa")
-PAPER = Estimated(12.721e9, None, None, None, "Pa")
-WEIGHTED = Estimated(13.05e9, 0.25e9, None, None, "Pa")
+NOTHING = ModulusEstimate(None, None, None, None, "Pa")
+PAPER = ModulusEstimate(12.721e9, None, None, None, "Pa")
+WEIGHTED = ModulusEstimate(13.05e9, 0.25e9, None, None, "Pa")
 METHODS = (
     MethodRow("paper_least_squares", Elastic(PAPER, NOTHING, PAPER), 4.0, None,
-              (Forward("bench", "(1,0)", None, None),), None),
+              (ForwardPrediction("bench", "(1,0)", None, None),), None),
     MethodRow("percentile", Elastic(WEIGHTED, WEIGHTED, WEIGHTED), None, 42,
-              (Forward("bench", "(1,0)", 51.4, -20.5),), 20.5),
+              (ForwardPrediction("bench", "(1,0)", 51.4, -20.5),), 20.5),
 )  # fmt: skip
 THIN = TheoryRow(
     "thin", (), {}, (), METHODS, (ComparedMode("bench", "(1,0)", 52.0, 20.5, 55.2),), LeastSquaresErrors(18.0, 38.0)

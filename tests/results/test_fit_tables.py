@@ -16,15 +16,24 @@ from bayesplate.report import content
 from bayesplate.results.contract import Elastic
 from bayesplate.results.fit_tables import (
     compared_constants,
-    every_number,
+    deciding_rounding,
+    exported_constants,
     fitted_constants,
     modes_table,
     peaks_table,
-    rounding_that_decides,
     write_constants,
 )
 from bayesplate.results.tables import render
-from bayesplate.results.words import decimals, interval, is_isotropic, number, percent, plus_minus, rounded, two_digits
+from bayesplate.results.words import (
+    decimals,
+    interval,
+    is_isotropic,
+    number,
+    percent,
+    plus_minus,
+    rounded_texts,
+    two_digits,
+)
 
 
 def column(table, name):
@@ -72,8 +81,8 @@ def test_rounding_is_shown_where_it_is_wider_than_the_noise():
     """A hertz at 52 Hz is 33.3 cents wide; noise of 0.5 % is 8.66 cents, and a hertz at 400 Hz only 4.3."""
     assert column(modes_table(SUMMARY), "rounding") == ["± 16.6", "–", "–"]
     wide, narrow, unrounded = SUMMARY.modes
-    assert rounding_that_decides(SUMMARY, wide) == pytest.approx(600 * np.log2(52.5 / 51.5))
-    assert rounding_that_decides(SUMMARY, narrow) is rounding_that_decides(SUMMARY, unrounded) is None
+    assert deciding_rounding(SUMMARY, wide) == pytest.approx(600 * np.log2(52.5 / 51.5))
+    assert deciding_rounding(SUMMARY, narrow) is deciding_rounding(SUMMARY, unrounded) is None
 
     width = np.log(52.5 / 51.5)
     for noise, shown in ((0.99 * width, True), (1.01 * width, False)):
@@ -177,7 +186,7 @@ def test_one_rule_rounds_every_mean_and_its_sd():
     """Two significant digits of the sd, the mean to the same decimal place: by hand."""
     for mean, sd, printed in ROUNDED:
         assert str(plus_minus(spread(mean, sd, "1"))) == printed
-        assert " ± ".join(text for text in rounded(mean, sd) if text) == printed
+        assert " ± ".join(text for text in rounded_texts(mean, sd) if text) == printed
 
 
 def test_numbers_as_people_read_them():
@@ -199,7 +208,7 @@ def read(text):
 
 
 def test_constants_keep_their_numbers():
-    rows = read(render(every_number(SUMMARY), "csv"))
+    rows = read(render(exported_constants(SUMMARY), "csv"))
 
     assert list(rows) == ["E_x", "E_y", "G_xy", "D_x", "D_y", "D_s"]
     assert {key: float(rows["E_x"][key]) for key in SPREAD} == pytest.approx(SPREAD)
@@ -208,7 +217,7 @@ def test_constants_keep_their_numbers():
     assert float(rows["E_x"]["least_squares"]) == pytest.approx(10.25)
     assert float(rows["E_x"]["percentile_sd_percent"]) == 2.0
     assert rows["E_y"]["least_squares"] == rows["E_y"]["percentile_mean"] == rows["D_x"]["percentile_mean"] == ""
-    without = read(render(every_number(replace(SUMMARY, percentile=None)), "csv"))
+    without = read(render(exported_constants(replace(SUMMARY, percentile=None)), "csv"))
     assert without["E_x"]["percentile_mean"] == ""
 
 

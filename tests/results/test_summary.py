@@ -11,9 +11,9 @@ import pytest
 from made_summaries import SUMMARY
 
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
-from bayesplate.results.contract import Elastic, Spread, finite, json_text, rms
-from bayesplate.results.summarise import HIGH_EXACT_ERROR, doubts_of, law_means, warnings_of
-from bayesplate.results.summary import ModelHeader, SamplerHealth, Unconverged
+from bayesplate.results.contract import Elastic, Spread, finite_or_none, json_text, rms
+from bayesplate.results.summarise import HIGH_EXACT_ERROR, fit_doubts, fit_warnings, law_means
+from bayesplate.results.summary import ModelHeader, SamplerHealth, UnconvergedSummary
 
 SPREAD = ["mean", "sd", "q05", "q25", "q50", "q75", "q95", "unit"]
 ELASTIC = ["E_x", "E_y", "G_xy"]
@@ -82,12 +82,12 @@ def test_no_number_that_json_does_not_have_is_written():
 
     with pytest.raises(ValueError, match="not JSON compliant"):
         json_text(wrong)
-    assert [finite(value) for value in (1.5, float("nan"), float("inf"))] == [1.5, None, None]
+    assert [finite_or_none(value) for value in (1.5, float("nan"), float("inf"))] == [1.5, None, None]
 
 
 def test_a_run_that_failed_the_gate_has_no_constants():
     model, sampler = ModelHeader("thin", "linear", (), False, "x"), SamplerHealth(4, 32, 10, None, None, None, 0.5)
-    failed = Unconverged(1, "made", 1, {}, "0", model, False, sampler, ("too short",))
+    failed = UnconvergedSummary(1, "made", 1, {}, "0", model, False, sampler, ("too short",))
     header = CONTRACT[""][:6]
 
     assert list(read(failed)) == [*header, "converged", "sampler", "warnings"]
@@ -150,7 +150,7 @@ def warned(*, law="linear", settled=True, enough=True, exact_worst=0.0, doubts=(
         estimate=SimpleNamespace(converged=settled),
         posterior=SimpleNamespace(law=law),
     )
-    return warnings_of(problem, SimpleNamespace(doubts=doubts, linear_is_enough=enough, exact_worst=exact_worst))
+    return fit_warnings(problem, SimpleNamespace(doubts=doubts, linear_is_enough=enough, exact_worst=exact_worst))
 
 
 WARNINGS = [
@@ -175,7 +175,7 @@ def test_each_fault_is_told_once_after_what_the_board_notes():
 def test_what_speaks_against_the_constants_is_a_doubt_and_a_label_that_is_left_open_is_none():
     problem = SimpleNamespace(doubts=("misread?", "near this plate"), veerings=("near this plate",))
 
-    assert doubts_of(problem, SimpleNamespace(doubts=("check its label",))) == ("misread?", "check its label")
+    assert fit_doubts(problem, SimpleNamespace(doubts=("check its label",))) == ("misread?", "check its label")
 
 
 def test_means_that_rest_on_too_few_draws_are_not_given():

@@ -16,7 +16,7 @@ from read_pages import Read, faults
 from bayesplate.commands.shown import show_diagnosis, show_fit
 from bayesplate.diagnosis.tables import candidates_table
 from bayesplate.results.layout import column_widths
-from bayesplate.results.tables import Table, escape, notebook, render, visible
+from bayesplate.results.tables import Table, escape, notebook_html, render, strip_control_characters
 from bayesplate.results.words import Value, percent
 
 FORMULAS = ("=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "  =1")
@@ -31,8 +31,8 @@ def table_of(text):
 @pytest.mark.parametrize("payload", [EVERY, *FORMULAS, *STEERS], ids=repr)
 def test_a_text_stays_a_text_in_every_medium(payload):
     """It is seen as it stands, and nothing else happens."""
-    seen = " ".join(visible(payload).split())
-    page = Read("<title></title>" + notebook(payload, [payload], [table_of(payload)]))
+    seen = " ".join(strip_control_characters(payload).split())
+    page = Read("<title></title>" + notebook_html(payload, [payload], [table_of(payload)]))
     on_terminal = escape(payload, "terminal")
     _, (cell, *_), _ = csv.reader(io.StringIO(render(table_of(payload), "csv")), strict=True)
     latex = render(table_of(payload), "latex")
@@ -41,7 +41,10 @@ def test_a_text_stays_a_text_in_every_medium(payload):
     assert faults(page) == []
     assert " ".join(page.text.split()).count(seen) == 6
     assert not [c for c in on_terminal if not c.isprintable() and c not in "\n\u200c\u200d"]
-    assert " ".join(on_terminal.split()) == " ".join(visible(payload.replace("\r", " ")).split()) or "\r" in payload
+    assert (
+        " ".join(on_terminal.split()) == " ".join(strip_control_characters(payload.replace("\r", " ")).split())
+        or "\r" in payload
+    )
     assert not cell.startswith(("=", "+", "-", "@", "\t", "\r", " "))
     assert cell.removeprefix("" if payload.startswith("'") else "'") == seen
     assert comment.startswith("% ")
@@ -69,9 +72,9 @@ def test_symbols_are_set_with_lowered_indices():
 
 
 def test_visible_keeps_joined_emoji_and_turns_breaks_into_spaces():
-    assert visible("a\nb\tc") == "a b c"
-    assert visible("\U0001f469\u200d\U0001f527") == "\U0001f469\u200d\U0001f527"
-    assert visible("\u202ex\u202c\x07\x1b[0m\ufeff") == "x[0m"
+    assert strip_control_characters("a\nb\tc") == "a b c"
+    assert strip_control_characters("\U0001f469\u200d\U0001f527") == "\U0001f469\u200d\U0001f527"
+    assert strip_control_characters("\u202ex\u202c\x07\x1b[0m\ufeff") == "x[0m"
 
 
 def test_latex_prints_what_stands_there():
@@ -128,7 +131,7 @@ def test_a_sentence_and_a_table_on_a_terminal():
 
 def test_shown_is_what_is_left_of_a_payload():
     """The two ways to say so agree where nothing but direction marks steers."""
-    assert [visible(one) for one in PAYLOADS] == [shown(one) for one in PAYLOADS]
+    assert [strip_control_characters(one) for one in PAYLOADS] == [shown(one) for one in PAYLOADS]
 
 
 TABLES = (

@@ -241,7 +241,7 @@ BAD_FILES = [
     ("plate/bad.py", "def f():\n    from bayesplate.commands.modes import modes", "plate imports commands"),
     ("cli.py", "from bayesplate.plate.terms import Weights", "cli imports plate"),
     ("terminal.py", "from bayesplate.cli import main", "terminal imports cli"),
-    ("commands/bad.py", "from bayesplate.terminal import reporting", "commands imports terminal"),
+    ("commands/bad.py", "from bayesplate.terminal import exit_on_error", "commands imports terminal"),
     ("batch.py", "from bayesplate.cli import main", "batch imports cli"),
     ("errors.py", "from bayesplate.board.board import Board", "errors imports board"),
     ("gadgets/bad.py", "", "stands in no known room: gadgets"),

@@ -15,21 +15,21 @@ from bayesplate import errors
 from bayesplate.board.setup import CLAMPED_NOISE, DEFAULT_NOISE
 from bayesplate.board.shelf import card_names
 from bayesplate.campaign import evidence, likelihood, population, scatter
-from bayesplate.campaign.claim import p_value
-from bayesplate.campaign.search import OF_TWO
-from bayesplate.campaign.search import PRIOR as WAYS_BEFORE
+from bayesplate.campaign.claim import board_p_value
+from bayesplate.campaign.search import PRIOR_SHARE_OF_TWO
+from bayesplate.campaign.search import SHARING_PRIOR as WAYS_BEFORE
 from bayesplate.commands.prepare import prepare
-from bayesplate.diagnosis.claim import IMPROBABLE, STANDARD_ERRORS
-from bayesplate.diagnosis.folds import NEEDED
-from bayesplate.diagnosis.hypotheses import NONE, ONE, TWO
-from bayesplate.diagnosis.null_control import BY_CHANCE, FALSE_ALARMS, N_SETS
-from bayesplate.diagnosis.search import PASSES
-from bayesplate.diagnosis.sensitivity import NOISES, WIDTHS
-from bayesplate.diagnosis.signatures import LOOK_ALIKE
-from bayesplate.diagnosis.sizes import AT_LIMIT
-from bayesplate.diagnosis.verdict import CLEARLY, WITHIN
+from bayesplate.diagnosis.claim import IMPROBABLE_BELOW, STANDARD_ERRORS
+from bayesplate.diagnosis.folds import NEEDED_BELOW
+from bayesplate.diagnosis.hypotheses import PRIOR_OF_NONE, PRIOR_OF_ONE, PRIOR_OF_TWO
+from bayesplate.diagnosis.null_control import CHANCE_SHARE, FALSE_ALARMS, N_SETS
+from bayesplate.diagnosis.search import LEAST_P_VALUE
+from bayesplate.diagnosis.sensitivity import NOISE_FACTORS, PRIOR_WIDTH_FACTORS
+from bayesplate.diagnosis.signatures import LOOK_ALIKE_COSINE
+from bayesplate.diagnosis.sizes import LIMIT_PROBABILITY
+from bayesplate.diagnosis.verdict import ALTERNATIVE_FACTOR, CLEAR_FACTOR
 from bayesplate.effects import EFFECTS
-from bayesplate.effects.words import joined
+from bayesplate.effects.words import join_words
 from bayesplate.planning import bench, gains
 from bayesplate.posterior.convergence import Gate
 from bayesplate.results import references as cited
@@ -215,7 +215,7 @@ def reference(folder: Path, name: str) -> str:
 def references(folder: Path) -> str:
     """Every reference that a fit may give."""
     entries = [cited.PAPER, cited.ELEMENT]
-    for group in ((cited.THIN,), *(effect.references for effect in EFFECTS.values()), cited.COMPUTATION):
+    for group in ((cited.THIN_THEORY,), *(effect.references for effect in EFFECTS.values()), cited.COMPUTATION):
         entries += group
     return "\n".join(f"- {_unquoted(entry)}" for entry in dict.fromkeys(entries)) + "\n"
 
@@ -227,7 +227,7 @@ def planning_references(folder: Path) -> str:
 
 def campaign_references(folder: Path) -> str:
     """What boards that share something rest on: the references of the functions and files that do it."""
-    documented = (likelihood, evidence, p_value, scatter, population)
+    documented = (likelihood, evidence, board_p_value, scatter, population)
     tails = ((one.__doc__ or "").split("References\n")[1].partition("\n")[2] for one in documented)
     return "\n".join(f"- {_unquoted(' '.join(tail.split()))}" for tail in tails) + "\n"
 
@@ -283,24 +283,30 @@ _WAYS = {
 def verdict_limits(folder: Path) -> str:
     """The numbers in the rules of the verdict."""
     rows = [
-        ("an effect is needed: probability of no effect below", f"{NEEDED:g}"),
+        ("an effect is needed: probability of no effect below", f"{NEEDED_BELOW:g}"),
         ("or larger odds against no effect than all but so many boards without any", f"{100 * FALSE_ALARMS:g} of 100"),
-        ("named: more probable than the next by a factor of", f"{CLEARLY:g}"),
-        ("group: within a factor of the best", f"{WITHIN:g}"),
-        ("a pair counts if it beats its better member by a factor of", f"{CLEARLY:g}"),
-        ("prior predictive p-value, at least", f"{PASSES:g}"),
-        ("limit of a range: prior probability beyond the size, below", f"{AT_LIMIT:g}"),
-        ("look-alikes: cosine of the visible parts above", f"{LOOK_ALIKE:g}"),
-        ("prior probability of no effect, one, two", f"{NONE:g}, {ONE:g}, {TWO:g}"),
+        ("named: more probable than the next by a factor of", f"{CLEAR_FACTOR:g}"),
+        ("group: within a factor of the best", f"{ALTERNATIVE_FACTOR:g}"),
+        ("a pair counts if it beats its better member by a factor of", f"{CLEAR_FACTOR:g}"),
+        ("prior predictive p-value, at least", f"{LEAST_P_VALUE:g}"),
+        ("limit of a range: prior probability beyond the size, below", f"{LIMIT_PROBABILITY:g}"),
+        ("look-alikes: cosine of the visible parts above", f"{LOOK_ALIKE_COSINE:g}"),
+        ("prior probability of no effect, one, two", f"{PRIOR_OF_NONE:g}, {PRIOR_OF_ONE:g}, {PRIOR_OF_TWO:g}"),
         ("simulated boards of the null control", f"{N_SETS}"),
-        ("a name survives widths of the sizes' priors times", joined([f"{one:g}" for one in WIDTHS.values()])),
-        ("and noises times", joined([f"{one:.2g}" for one in NOISES.values()])),
+        (
+            "a name survives widths of the sizes' priors times",
+            join_words([f"{one:g}" for one in PRIOR_WIDTH_FACTORS.values()]),
+        ),
+        ("and noises times", join_words([f"{one:.2g}" for one in NOISE_FACTORS.values()])),
         (
             "a claim: an effect chosen by chance lowers the left-out error as far in fewer than",
-            f"{100 * BY_CHANCE:g} of 100",
+            f"{100 * CHANCE_SHARE:g} of 100",
         ),
         ("a claim: standard errors by which the nested log score rises, more than", f"{STANDARD_ERRORS:g}"),
-        ("a claim: probability of no effect, and of one that is not told, at their largest, below", f"{IMPROBABLE:g}"),
+        (
+            "a claim: probability of no effect, and of one that is not told, at their largest, below",
+            f"{IMPROBABLE_BELOW:g}",
+        ),
     ]
     return words_table(("rule", "number"), rows)
 
@@ -308,10 +314,13 @@ def verdict_limits(folder: Path) -> str:
 def campaign_limits(folder: Path) -> str:
     """The limits of what a search of a campaign says, and what is believed before."""
     rows = [
-        ("least probability that nothing is lacking, for *none needed*", f"{IMPROBABLE:g}"),
-        ("how many times as probable as the next, for *named*", f"{CLEARLY:g}"),
+        ("least probability that nothing is lacking, for *none needed*", f"{IMPROBABLE_BELOW:g}"),
+        ("how many times as probable as the next, for *named*", f"{CLEAR_FACTOR:g}"),
         *((f"probability before: {_WAYS[way]}", f"{before:g}") for way, before in WAYS_BEFORE.items()),
-        ("share of what is alike beforehand that is two effects, where the boards can show two", f"{OF_TWO:g}"),
+        (
+            "share of what is alike beforehand that is two effects, where the boards can show two",
+            f"{PRIOR_SHARE_OF_TWO:g}",
+        ),
     ]
     return words_table(("limit", "value"), rows)
 
@@ -347,7 +356,7 @@ def _measured(stem: str) -> str:
             parts.setdefault((entry["date"], entry["tree"]), []).append(part)
     told = []
     for (date, tree), names in sorted(parts.items()):
-        which = f"{joined(names)} " if any(names) else ""
+        which = f"{join_words(names)} " if any(names) else ""
         told.append(f"{which}on {date} (tree {tree})")
     return f"; measured {'; '.join(told)}" if parts else ""
 

@@ -17,9 +17,9 @@ from made_campaigns import MASS, write_campaign
 from numpy.typing import NDArray
 
 from bayesplate.board.board import Board
-from bayesplate.board.named import load_named
-from bayesplate.board.setup import Ends
-from bayesplate.commands.prepare import prepare, prepared_card
+from bayesplate.board.named import load_named_cards
+from bayesplate.board.setup import EdgeConditions
+from bayesplate.commands.prepare import prepare, prepare_card
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.joint import full_search
 from bayesplate.frequencies.laws import LawName
@@ -122,7 +122,7 @@ def our_sampling(problem: PosedProblem, seed: int) -> float:
     return float(n_effective / seconds)
 
 
-def plate_at_estimate(problem: PosedProblem) -> tuple[Ends, Ends, tuple[int, int], Weights]:
+def plate_at_estimate(problem: PosedProblem) -> tuple[EdgeConditions, EdgeConditions, tuple[int, int], Weights]:
     """Edges, mesh and weights of a problem's plate."""
     (model,) = problem.posterior.models
     weights = term_weights(problem.estimate.values, model.setup).at(0)
@@ -188,7 +188,7 @@ def search(n_modes: int, tried: Sequence[str] | None = None) -> tuple[int, float
 
     text = plant(np.random.default_rng(1), DESIGNS["free-12"], [], 1.0, 5.0, name="free").card_text()
     card = Board.from_text(text, "free")
-    prepared = prepared_card(card, load_named(card), [])
+    prepared = prepare_card(card, load_named_cards(card), [])
     (setup,) = prepared.board.setups
     board = replace(prepared.board, setups=(replace(setup, readings=setup.readings[:n_modes]),))
     baseline = baseline_of(pose(board, prepared.prior))

@@ -23,7 +23,7 @@ from validation.calibration.truths import Design, Truth, noises_of, prior_values
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.errors import BayesplateError
-from bayesplate.frequencies.model import SetupModel, with_others
+from bayesplate.frequencies.model import SetupModel, with_other_modes
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.target import Posterior
 
@@ -49,7 +49,7 @@ def every_mode() -> SetupModel:
     (model,) = problem.posterior.models
     far_up = peaks_of(_FAR_UP * max(model.setup.measured))
     system = replace(model.system, setup=replace(model.setup, peaks=far_up))
-    return with_others(replace(model, system=system), values)
+    return with_other_modes(replace(model, system=system), values)
 
 
 def unread(values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:

@@ -16,10 +16,10 @@ from validation.calibration.sbc import MOST_STEPS, held_out, random_lines, ranke
 from validation.calibration.truths import Design, Truth, draw_truth, make_problem, reference
 
 from bayesplate.board.parameter import Parameter
-from bayesplate.campaign.boards import Member
-from bayesplate.campaign.learning import Learnt, learn
-from bayesplate.campaign.shared import Shared
-from bayesplate.campaign.together import Together, walk
+from bayesplate.campaign.boards import FittedBoard
+from bayesplate.campaign.learning import SharedPosterior, learn_shared
+from bayesplate.campaign.shared import SharedParameter
+from bayesplate.campaign.together import CombinedBoards, sample_shared
 from bayesplate.errors import BayesplateError
 from bayesplate.posterior.convergence import Convergence, Gate
 from bayesplate.posterior.draws import named_draws
@@ -40,10 +40,10 @@ def of_boards() -> Parameter:
     return found
 
 
-def shared() -> Shared:
+def shared() -> SharedParameter:
     """The number that all boards have in common."""
     one = of_boards()
-    return Shared(one.effect, one.key, one.prior, one.unit)
+    return SharedParameter(one.effect, one.key, one.prior, one.unit)
 
 
 def draw(rng: np.random.Generator) -> list[Truth]:
@@ -59,23 +59,23 @@ def settings(rng: np.random.Generator, gate: Gate | None = None) -> SamplerSetti
     return SamplerSettings(seed=int(rng.integers(2**31)), max_steps=MOST_STEPS, **chosen)
 
 
-def learnt_from(truths: list[Truth], rng: np.random.Generator) -> Learnt:
+def learnt_from(truths: list[Truth], rng: np.random.Generator) -> SharedPosterior:
     """Every board fitted alone, and what they teach together."""
     members, gate = [], Gate(tau_count_min=DESIGN.gate_taus, ess_min=ESS_OF_A_BOARD)
     for truth in truths:
         inference = infer(make_problem(DESIGN, truth), settings(rng, gate))
         _require(inference.convergence)
-        members.append(Member(inference, named_draws(inference, int(rng.integers(2**31))), (shared(),)))
-    learnt = learn(members, settings(rng))
+        members.append(FittedBoard(inference, named_draws(inference, int(rng.integers(2**31))), (shared(),)))
+    learnt = learn_shared(members, settings(rng))
     _require(learnt.convergence)
     return learnt
 
 
-def repeated(learnt: Learnt, times: int, rng: np.random.Generator) -> Chains:
+def repeated(learnt: SharedPosterior, times: int, rng: np.random.Generator) -> Chains:
     """What is shared by so many times as many boards, each of them there as often."""
     once = learnt.together
-    often = Together.of(once.shared, once.names * times, once.likelihoods * times, once.pulls * times)
-    chains, convergence = walk(often, settings(rng))
+    often = CombinedBoards.of(once.shared, once.names * times, once.likelihoods * times, once.pulls * times)
+    chains, convergence = sample_shared(often, settings(rng))
     _require(convergence)
     return chains
 

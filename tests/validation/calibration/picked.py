@@ -19,8 +19,8 @@ import ritz
 from generator.ringing import Blow, Ringing, moved, recorded, ringing, with_noise
 from numpy.typing import NDArray
 
-from bayesplate.recordings.hits import find_hits, usable
-from bayesplate.recordings.picking import HIGHEST, Picked, pick_modes
+from bayesplate.recordings.hits import find_hits, usable_hits
+from bayesplate.recordings.picking import HIGHEST, PickedModes, pick_modes
 from bayesplate.recordings.signals import Recording
 from bayesplate.recordings.spectra import Spectra, decay_spectra
 
@@ -78,13 +78,13 @@ def simulate_one(base_seed: int, index: int) -> Record:
     hum = float(10.0 ** (-rng.uniform(20.0, 50.0) / 20.0)) if index % 3 == 0 else 0.0
     recordings = recordings_of(rng, board, decibels, hum)
     started = time.process_time()
-    spectra = decay_spectra([(one, usable(find_hits(one))) for one in recordings], HIGHEST)
+    spectra = decay_spectra([(one, usable_hits(find_hits(one))) for one in recordings], HIGHEST)
     picked = pick_modes(spectra)
     seconds = time.process_time() - started
     return {"simulation": index, "decibels": decibels, "seconds": round(seconds, 2)} | judged(board, picked)
 
 
-def judged(board: Ringing, picked: Picked) -> Record:
+def judged(board: Ringing, picked: PickedModes) -> Record:
     """Picked modes against planted ones: each belongs to one at most, the nearest pairs first."""
     truth = board.damped
     likely = picked.likely

@@ -13,7 +13,19 @@ from validation.calibration.records import Record
 from validation.calibration.sbc import N_DRAWS
 from validation.calibration.table import FAMILY_LEVEL, NOT_COUNTED
 
-from bayesplate.report.style import BLACK, BLUE, GREEN, LIGHT, ORANGE, PURPLE, SKY, SMALL, VERMILLION, WORDS, plain_axes
+from bayesplate.report.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    LIGHT,
+    ORANGE,
+    PURPLE,
+    SKY,
+    SMALL_SIZE,
+    TEXT_SIZE,
+    VERMILLION,
+    plain_axes,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,10 +51,10 @@ def draw(records: Sequence[Record], path: Path) -> None:
     figure = Figure(figsize=(7.2, 3.6), layout="constrained")
     for panel, board in zip(figure.subplots(1, len(boards), squeeze=False, sharey=True)[0], boards, strict=True):
         _panel(panel, [record["ranks"] for record in good if record.get("board", "") == board])
-        panel.set_title(board, fontsize=WORDS)
-    figure.axes[0].set_ylabel("share of truths below it,\nless the expected one", fontsize=SMALL)
+        panel.set_title(board, fontsize=TEXT_SIZE)
+    figure.axes[0].set_ylabel("share of truths below it,\nless the expected one", fontsize=SMALL_SIZE)
     handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=1, fontsize=SMALL, frameon=False)
+    figure.legend(handles, labels, loc="outside lower center", ncols=1, fontsize=SMALL_SIZE, frameon=False)
     figure.savefig(path, dpi=150, metadata={"Software": None})
 
 
@@ -63,7 +75,7 @@ def _panel(panel: Axes, every: Sequence[Mapping[str, Mapping[str, int]]]) -> Non
         panel.plot(shares, _distribution(ranks, worst) - shares, color=colour, lw=1.0, ls="--", label=told)
     reach = 2.5 * float(np.max(high - shares))
     panel.set(xlim=(0.0, 1.0), ylim=(-reach, reach))
-    panel.set_xlabel("rank of the truth among the draws, share", fontsize=SMALL)
+    panel.set_xlabel("rank of the truth among the draws, share", fontsize=SMALL_SIZE)
     plain_axes(panel)
 
 

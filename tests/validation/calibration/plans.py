@@ -32,20 +32,20 @@ from validation.trial.shared import baseline_of_card, median_baseline, shared_la
 
 from bayesplate.board.board import Board
 from bayesplate.board.prior import load_prior
-from bayesplate.board.sessions import shared_share
+from bayesplate.board.sessions import shared_variance_share
 from bayesplate.diagnosis.forms import forms
-from bayesplate.diagnosis.hypotheses import NONE, ONE, Hypothesis
-from bayesplate.diagnosis.search import Ground, SearchResult, prepare_search, search
-from bayesplate.diagnosis.verdict import WITHIN
+from bayesplate.diagnosis.hypotheses import PRIOR_OF_NONE, PRIOR_OF_ONE, Hypothesis
+from bayesplate.diagnosis.search import SearchGround, SearchResult, prepare_search, run_search
+from bayesplate.diagnosis.verdict import ALTERNATIVE_FACTOR
 from bayesplate.errors import BayesplateError
 from bayesplate.planning.beliefs import entropy
-from bayesplate.planning.explained import believed, survivors
+from bayesplate.planning.explained import search_beliefs, surviving_explanations
 from bayesplate.planning.gains import EXPLANATIONS, probabilities_after
 from bayesplate.planning.laws import known_mass
-from bayesplate.planning.modes_read import REPEATED
-from bayesplate.planning.proposals import BELIEFS, FAINT, Planner, Proposal
-from bayesplate.planning.sizes_read import LOOKS
-from bayesplate.streams import stream
+from bayesplate.planning.modes_read import REPEAT_SCATTER
+from bayesplate.planning.proposals import BELIEFS_STREAM, FAINT_GAIN, Planner, Proposal
+from bayesplate.planning.sizes_read import INSPECTIONS
+from bayesplate.streams import random_stream
 
 Record = dict[str, Any]
 
@@ -66,7 +66,7 @@ ASKED = {
 NEXT = 3
 _MOST_BOARDS = 60
 _SEARCHED = 34
-_NO_EFFECT = NONE / (NONE + ONE)
+_NO_EFFECT = PRIOR_OF_NONE / (PRIOR_OF_NONE + PRIOR_OF_ONE)
 """Probability, as the search has it, that a board has no effect, where it may have one at most."""
 WAYS = ("first", "random", "listed", "next")
 CALIBRATED = ("first", "random", "listed")
@@ -127,14 +127,18 @@ def _asked(rng: np.random.Generator, design: str) -> tuple[Asked, int]:
             planted = _planted(rng, design, true)
         except (RuntimeError, ValueError):
             continue
-        found = search(_as_planted(prepare_search(baseline_of_card(planted), shared_law, pair)))
-        left = survivors(found)
-        if len(left) == 2 and left[0].support < WITHIN * left[1].support and true in [one.members for one in left]:
+        found = run_search(_as_planted(prepare_search(baseline_of_card(planted), shared_law, pair)))
+        left = surviving_explanations(found)
+        if (
+            len(left) == 2
+            and left[0].support < ALTERNATIVE_FACTOR * left[1].support
+            and true in [one.members for one in left]
+        ):
             return Asked(planted, found, true), n_boards
     raise RuntimeError(f"{design}: wanted two surviving explanations, got none in {_MOST_BOARDS} boards")
 
 
-def _as_planted(ground: Ground) -> Ground:
+def _as_planted(ground: SearchGround) -> SearchGround:
     """The search without pairs and exchanged labels, neither of which is planted."""
     kept: tuple[Hypothesis, ...] = tuple(one for one in ground.hypotheses if len(one.members) < 2 and one.swap is None)
     return replace(ground, hypotheses=kept)
@@ -183,10 +187,10 @@ def _board(design: str) -> Board:
 def _measured(asked: Asked, rng: np.random.Generator) -> Record:
     """What is expected and what comes of the three ways to go on."""
     seed = int(rng.integers(2**31))
-    beliefs = believed(asked.found, load_prior("weakly-informative"), stream(seed, BELIEFS))
+    beliefs = search_beliefs(asked.found, load_prior("weakly-informative"), random_stream(seed, BELIEFS_STREAM))
     planner = Planner(beliefs, seed, EXPLANATIONS)
     every = planner.ranked(least=float("-inf"))
-    listed = [one for one in every if one.entry.gain.score > FAINT]
+    listed = [one for one in every if one.entry.gain.score > FAINT_GAIN]
     if not listed:
         return {"silent": True}
     chosen = {
@@ -264,8 +268,8 @@ def _read(asked: Asked, one: Proposal, rng: np.random.Generator) -> np.ndarray:
     bare = exact if what == "again" else _solved(design, held, truth.constants, acting[:-1])
     off = np.log(before.measured) - bare
     if what == "mass":
-        return np.asarray(exact + off + REPEATED * rng.standard_normal(len(exact)))
-    share, noise = shared_share(before), drawn(setup.noise, rng)
+        return np.asarray(exact + off + REPEAT_SCATTER * rng.standard_normal(len(exact)))
+    share, noise = shared_variance_share(before), drawn(setup.noise, rng)
     discrepancy = share * off + (share * (1.0 - share)) ** 0.5 * first * rng.standard_normal(len(exact))
     return np.asarray(exact + discrepancy + (1.0 - share) ** 0.5 * noise * rng.standard_normal(len(exact)))
 
@@ -281,10 +285,10 @@ def _solved(design: Design, held: Held, constants: Mapping[str, float], acting: 
 
 def _looked_at(asked: Asked, one: Proposal, rng: np.random.Generator) -> np.ndarray:
     """The sizes of an effect as they are, zero where the board does not have it, with the error of the look."""
-    effect = next(name for name, look in LOOKS.items() if look.sentence == one.entry.sentence)
+    effect = next(name for name, look in INSPECTIONS.items() if look.sentence == one.entry.sentence)
     keys = [free.key for free in asked.found.ground.candidates[effect].laws[0].form.free]
     true = asked.planted.truth.effects.get(effect, {})
-    sd = LOOKS[effect].sd(asked.found.ground.baseline.board)
+    sd = INSPECTIONS[effect].sd(asked.found.ground.baseline.board)
     return np.array([float(true.get(key, 0.0)) + sd * rng.standard_normal() for key in keys])
 
 
@@ -296,13 +300,13 @@ def is_group(record: Record) -> bool:
 def settled(record: Record, way: str) -> bool:
     """Whether the true explanation is left alone."""
     true = record[way]["true"]
-    return bool(true >= WITHIN * (1.0 - true))
+    return bool(true >= ALTERNATIVE_FACTOR * (1.0 - true))
 
 
 def wrongly(record: Record, way: str) -> bool:
     """Whether the false explanation is left alone."""
     true = record[way]["true"]
-    return bool(1.0 - true >= WITHIN * true)
+    return bool(1.0 - true >= ALTERNATIVE_FACTOR * true)
 
 
 def judged(records: Sequence[Record]) -> list[Record]:

@@ -24,7 +24,7 @@ from validation.calibration.cases import CASES, Place, Values, effect_of
 from bayesplate.board.board import Board
 from bayesplate.board.material import MODULI
 from bayesplate.board.quantity import Quantity
-from bayesplate.commands.prepare import Prepared, prepare
+from bayesplate.commands.prepare import PreparedBoard, prepare
 from bayesplate.errors import BayesplateError
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws, named_draws
@@ -97,7 +97,7 @@ def prior_text() -> str:
     return "\n".join(['format = 1\nname = "spread"', *tables]) + "\n"
 
 
-def prepared(folder: Path, name: str, hertz: Readings, place: Place) -> Prepared:
+def prepared(folder: Path, name: str, hertz: Readings, place: Place) -> PreparedBoard:
     """The card of a case with these readings, read as a user's is."""
     case = CASES[name]
     text = card_text(
@@ -129,7 +129,7 @@ def short_names(values: Values, board: Board) -> dict[str, float]:
     return {keys.get(name, name): value for name, value in values.items()}
 
 
-def draw_truth(name: str, asked: Prepared, place: Place, rng: np.random.Generator) -> Truth:
+def draw_truth(name: str, asked: PreparedBoard, place: Place, rng: np.random.Generator) -> Truth:
     """Draw everything from the priors of a prepared card, until the generator names every mode beyond doubt."""
     for redraws in range(MOST_REDRAWS):
         values = {key: float(density.sample(rng, 1)[0]) for key, density in asked.prior.constants.items()}

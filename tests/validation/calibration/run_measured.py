@@ -32,7 +32,7 @@ from validation.calibration.study import Page
 
 import bayesplate
 from bayesplate.recordings.contract import PickedRow
-from bayesplate.results.words import chances, percent
+from bayesplate.results.words import percent, probabilities_text
 
 WITHIN, MOST_FURTHER, HIGHEST, RATHER = 3e-3, 2, 1000.0, 0.5
 ABOUT = (
@@ -107,7 +107,7 @@ def compared(
     lines.append(f"  further peaks that are rather modes than not by the recordings: {len(further)}")
     lines += [
         f"    {mode.hz:.1f} Hz: a mode of the board {percent(mode.mode_probability)}; no mode by the recordings alone "
-        f"{percent(mode.spurious_probability)}, among the board's modes {chances(mode.may_be(2))}"
+        f"{percent(mode.spurious_probability)}, among the board's modes {probabilities_text(mode.may_be(2))}"
         for mode in further
     ]
     lines.append(f"  of these, rather modes of the board than not: {len(modes)}")

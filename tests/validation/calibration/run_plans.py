@@ -38,16 +38,16 @@ from validation.calibration.plans import (
 from validation.calibration.records import Record
 from validation.calibration.study import Page, Study, arguments, carry_out, numbered
 
-from bayesplate.diagnosis.verdict import WITHIN
+from bayesplate.diagnosis.verdict import ALTERNATIVE_FACTOR
 
 SEED = 2
 """Boards of seed 1 were looked at while the trial was written."""
 ABOUT = (
     "Boards whose readings leave two explanations, two effects or an effect and none; each is measured further, in one "
-    f"of four ways. Settled: the true explanation is then at least {WITHIN:g} times as probable as the other; wrongly: "
-    "the false one is. Min: mean minutes that it takes, by the plan's own costs. Boards passed over left more "
-    "explanations than two, or fewer, or not the true one, or had a label in doubt. The doubt is the entropy of the "
-    "probabilities of the two."
+    f"of four ways. Settled: the true explanation is then at least {ALTERNATIVE_FACTOR:g} times as probable as the "
+    "other; wrongly: the false one is. Min: mean minutes that it takes, by the plan's own costs. Boards passed over "
+    "left more explanations than two, or fewer, or not the true one, or had a label in doubt. The doubt is the entropy "
+    "of the probabilities of the two."
 )
 PAGE = Page("plans", "Plans, calibrated", ABOUT)
 _WORDS = {

@@ -27,7 +27,7 @@ from validation.calibration.study import Page, Study, arguments, carry_out, numb
 import bayesplate
 from bayesplate.recordings.picking import pick_modes
 from bayesplate.recordings.signals import Recording
-from bayesplate.recordings.taking import take
+from bayesplate.recordings.taking import take_spectra
 
 BASE_SEED, RATE, HIGHEST, NEAR = 60, 6000.0, 600.0, 5e-3
 SIDES, THICKNESS, DENSITY = (0.580, 0.217), 4.2e-3, 420.0
@@ -87,7 +87,7 @@ def simulate_one(base_seed: int, index: int) -> Record:
     damping = np.exp(rng.uniform(np.log(0.005), np.log(0.015), N_MODES))
     places = [(SIDES[0] * x, SIDES[1] * y) for x, y in PLACES]
     boards = [ringing(plate, N_MODES, damping, place, SENSOR_MASS) for place in places]
-    picked = pick_modes(take(recordings_of(rng, boards, places), HIGHEST).spectra, 20.0, HIGHEST)
+    picked = pick_modes(take_spectra(recordings_of(rng, boards, places), HIGHEST).spectra, 20.0, HIGHEST)
     truth = np.mean([board.damped for board in boards], axis=0)
     names = [f"({m},{n})" for (m, n), _ in boards[0].modes.names()][:N_MODES]
     likely = [mode for mode in picked.likely if mode.hz < 0.98 * HIGHEST]

@@ -27,7 +27,7 @@ from validation.calibration.study import Page, Study, arguments, carry_out
 from bayesplate.commands.prepare import prepare
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
-from bayesplate.recordings.sand import sand_evidence, straightened
+from bayesplate.recordings.sand import sand_evidence, straighten_picture
 
 BASE_SEED, N_MODES, NEAR = 7, 10, 0.15
 TOP_1, TOP_2 = 0.95, 0.99
@@ -58,7 +58,7 @@ def simulate_one(name: str, mode: int, number: int) -> Record:
     truth, hertz, shapes = _solved(name)
     plate = BOARDS[name]
     rng = np.random.default_rng([BASE_SEED, [*BOARDS].index(name), mode, number])
-    evidence = sand_evidence(straightened(photograph(rng, truth.shape(mode), (plate.L_x, plate.L_y))), shapes)
+    evidence = sand_evidence(straighten_picture(photograph(rng, truth.shape(mode), (plate.L_x, plate.L_y))), shapes)
     right = int(np.argmin(np.abs(hertz / truth.frequencies[mode] - 1.0)))
     near = np.abs(np.log(hertz / truth.frequencies[mode])) < NEAR
     above = evidence > evidence[right]

@@ -29,9 +29,9 @@ from validation.calibration.planted import NOISE, Settings, drawn, fitted, prior
 
 from bayesplate.board.board import Board
 from bayesplate.board.material import MODULI
-from bayesplate.commands.prepare import Prepared, prepare
+from bayesplate.commands.prepare import PreparedBoard, prepare
 from bayesplate.errors import BayesplateError
-from bayesplate.estimates.labelling import with_labels
+from bayesplate.estimates.labelling import label_likely_peaks
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.results.modes import assigned_peaks
@@ -67,7 +67,9 @@ def simulate_one(settings: Settings, index: int) -> Record:
     return record | {"seconds": round(time.perf_counter() - started, 2)}
 
 
-def _drawn(folder: Path, rng: np.random.Generator) -> tuple[Prepared, dict[str, float], dict[float, Label | None], int]:
+def _drawn(
+    folder: Path, rng: np.random.Generator
+) -> tuple[PreparedBoard, dict[str, float], dict[float, Label | None], int]:
     """A card with peaks, the constants behind it, which mode each peak is, and how many the noise has exchanged.
 
     The spurious peak is None.
@@ -129,7 +131,7 @@ def _as_sure(problem: PosedProblem, draws: Draws) -> Board:
     assert peaks is not None
     every = draws.every_log_frequency[0]
     shares = peaks.probabilities(every.reshape(-1, every.shape[-1])[::20], draws.noise[..., 0].ravel()[::20])
-    labelled = with_labels(setup, peaks, shares, 0.5)
+    labelled = label_likely_peaks(setup, peaks, shares, 0.5)
     readings = tuple(replace(reading, confidence=1.0) for reading in labelled.readings)
     return replace(problem.board, setups=(replace(labelled, readings=readings, peaks=()),))
 

@@ -9,8 +9,8 @@ import pytest
 from validation.calibration.plans import WAYS, calibration, is_calibrated, limits, settled, wrongly
 
 from bayesplate.board.material import ORTHOTROPIC
-from bayesplate.planning.beliefs import Belief, Beliefs, entropy
-from bayesplate.planning.gains import Readings, expected_gain, probabilities_after
+from bayesplate.planning.beliefs import Beliefs, ExplanationTerms, entropy
+from bayesplate.planning.gains import PlannedReadings, expected_gain, probabilities_after
 
 N_BOARDS, N_TERMS = 120, 24
 NOISE = 0.5
@@ -18,7 +18,7 @@ NOISE = 0.5
 
 def explanation(rng, members, probability):
     """Terms of an effect of unknown size: what it does to two further readings scatters."""
-    return Belief(
+    return ExplanationTerms(
         members=members, words="", probability=probability, mean=np.zeros((N_TERMS, 4)),
         covariance=np.tile(np.diag([1.0, 1.0, 1.0, 0.1]), (N_TERMS, 1, 1)), noise=np.full((N_TERMS, 1), NOISE),
         middle=np.zeros((N_TERMS, 3)), wanted=np.tile(np.eye(3, 4), (N_TERMS, 1, 1)),
@@ -35,7 +35,7 @@ def board(rng):
     size = rng.uniform(0.5, 4.0) * np.abs(rng.standard_normal(N_TERMS))
     shift = (np.zeros((N_TERMS, 2)), np.outer(size, rng.standard_normal(2)))
     slopes = tuple(np.tile(0.2 * rng.standard_normal((2, 4)), (N_TERMS, 1, 1)) for _ in range(2))
-    return beliefs, Readings(shift, (slopes[0],) * 2, (np.full((N_TERMS, 2), NOISE**2),) * 2)
+    return beliefs, PlannedReadings(shift, (slopes[0],) * 2, (np.full((N_TERMS, 2), NOISE**2),) * 2)
 
 
 def record(rng, index, true_noise):

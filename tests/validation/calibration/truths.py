@@ -13,7 +13,7 @@ from made_boards import models_at, setup_of, with_noise
 from numpy.typing import NDArray
 from validation.calibration.layouts import EDGES, LABELS, LENGTHS, SETUPS
 
-from bayesplate.board.board import Board, made_board
+from bayesplate.board.board import Board, make_board
 from bayesplate.board.material import MODULI, RIGIDITIES, rigidities
 from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.board.quantity import Quantity
@@ -21,7 +21,7 @@ from bayesplate.board.sessions import with_discrepancies
 from bayesplate.board.setup import DEFAULT_NOISE
 from bayesplate.effects import declare
 from bayesplate.estimates.least_squares import log_measured, reading_scales
-from bayesplate.estimates.refit import design as sensitivities
+from bayesplate.estimates.refit import design_matrix as sensitivities
 from bayesplate.estimates.refit import refit
 from bayesplate.frequencies.model import SetupModel, log_frequencies_of_board
 from bayesplate.posterior.laplace import predictor
@@ -101,7 +101,7 @@ class Design:
             for name in self.setups
             if name in hertz
         ]
-        board = made_board("simulated", self.inputs, setups, prior=self.prior, effects=self._effects)
+        board = make_board("simulated", self.inputs, setups, prior=self.prior, effects=self._effects)
         return with_discrepancies(declare(board))
 
     @property

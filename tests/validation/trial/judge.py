@@ -17,11 +17,11 @@ from validation.trial.cells import KINDS, SENSORS, Cell
 from validation.trial.shared import control_of, ground_of, shared_law
 
 from bayesplate.board.material import MODULI
-from bayesplate.diagnosis.claim import judge_claim, named_in_part, nested_of
+from bayesplate.diagnosis.claim import effects_named_in_part, judge_claim, nested_errors_of_board
 from bayesplate.diagnosis.null_control import NullControl
-from bayesplate.diagnosis.search import SearchResult, search
-from bayesplate.diagnosis.sensitivity import Constants, draw_constants
-from bayesplate.diagnosis.verdict import Verdict, alternatives, answers, decide
+from bayesplate.diagnosis.search import SearchResult, run_search
+from bayesplate.diagnosis.sensitivity import ConstantDraws, draw_constants
+from bayesplate.diagnosis.verdict import Verdict, alternatives, decide_verdict, rank_explanations
 from bayesplate.errors import BayesplateError
 
 Record = dict[str, Any]
@@ -51,7 +51,7 @@ def judge_one(cell: Cell, base_seed: int, index: int) -> Record:
     effects = cell.draw_effects(rng)
     try:
         planted = plant_board(rng, cell, effects)
-        found = search(ground_of(planted, shared_law))
+        found = run_search(ground_of(planted, shared_law))
         record |= {"truth": truth_of(planted)} | findings(found, planted, control_of(cell.setting), rng)
     except (BayesplateError, RuntimeError, np.linalg.LinAlgError) as error:
         record |= {"truth": {"effects": list(effects)}, "error": f"{type(error).__name__}: {error}"}
@@ -106,10 +106,10 @@ def findings(found: SearchResult, planted: PlantedBoard, control: NullControl, r
     rng : numpy.random.Generator
         For draws of the constants.
     """
-    verdict = decide(found, control)
-    folded = nested_of(found, control, verdict.tried)
+    verdict = decide_verdict(found, control)
+    folded = nested_errors_of_board(found, control, verdict.tried)
     claim = judge_claim(found, verdict, control.without(folded.carried if folded else ()), folded)
-    ranked = answers(found)
+    ranked = rank_explanations(found)
     near = verdict.stands_for or (alternatives(found, ranked) if ranked else ())
     best = verdict.best
     return {
@@ -117,7 +117,7 @@ def findings(found: SearchResult, planted: PlantedBoard, control: NullControl, r
         "needed": verdict.is_needed,
         "effects": list(verdict.effects),
         "reason": verdict.reason,
-        "in_part": list(named_in_part(found, verdict, folded)),
+        "in_part": list(effects_named_in_part(found, verdict, folded)),
         "claim": bool(claim.holds),
         "conditions": {condition.name: bool(condition.is_met) for condition in claim.conditions},
         "best": list(best.members) if best else [],
@@ -158,7 +158,7 @@ def _constants(
     return {name: {way: _interval(draws, name, truth[name]) for way, draws in drawn.items()} for name in MODULI}
 
 
-def _interval(draws: Constants, name: str, truth: float) -> dict[str, Any]:
+def _interval(draws: ConstantDraws, name: str, truth: float) -> dict[str, Any]:
     low, high = np.quantile(draws[name], [0.05, 0.95])
     return {"q05": _rounded(low), "q95": _rounded(high), "holds": bool(low <= truth <= high)}
 

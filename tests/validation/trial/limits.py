@@ -40,7 +40,7 @@ from validation.trial.counts import (
 from validation.trial.sizes import errors
 
 from bayesplate.diagnosis.null_control import FALSE_ALARMS
-from bayesplate.diagnosis.search import PASSES
+from bayesplate.diagnosis.search import LEAST_P_VALUE
 
 Limit = dict[str, Any]
 PLANNED = frozenset(
@@ -57,7 +57,7 @@ PLANNED = frozenset(
 """The classes that were planned first; the trial plants others too, harder to tell apart, and its limits count all."""
 NOT_NEEDED = (200, 1200)
 """Boards of six modes with one effect of twice the nominal size of which nothing may be said to lack on so many."""
-FLAGGED = PASSES + FALSE_ALARMS
+FLAGGED = LEAST_P_VALUE + FALSE_ALARMS
 """Share of the boards that lack nothing which the gate of the misfit and the need of an effect flag by design."""
 COVERED = (0.85, 0.95)
 """Shares of truths that intervals of 90 % may hold."""

@@ -17,7 +17,7 @@ from validation.trial.published import publish_records
 from validation.trial.summary import COLUMNS, CONDITIONS, summarise
 
 from bayesplate.diagnosis.null_control import FALSE_ALARMS
-from bayesplate.diagnosis.search import PASSES
+from bayesplate.diagnosis.search import LEAST_P_VALUE
 
 WAYS = {
     "without": "without tracing",
@@ -45,7 +45,7 @@ WORDS: tuple[str, ...] = (
     "Bounds in brackets are 95 % bounds, those of shares exact (Clopper and Pearson). An acceptance limit is an "
     "upper or a lower one, or a range. It is met if both bounds keep to it, and not the estimate alone: with 300 "
     "boards, a limit of 2 % is met if at most one is named. One that is missed stays here as missed. A board "
-    f"that lacks nothing is flagged by design, on {100 * PASSES:g} % by the gate of the misfit and on "
+    f"that lacks nothing is flagged by design, on {100 * LEAST_P_VALUE:g} % by the gate of the misfit and on "
     f"{100 * FALSE_ALARMS:g} % by the need of an effect: that limit is met unless the lower bound is above their sum. "
     "A limit counts all classes of effects that are planted; what the classes that were planned first would give by "
     "themselves stands in the notes: "

@@ -26,8 +26,8 @@ from bayesplate.commands.prepare import prepare
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.forms import Form, forms
 from bayesplate.diagnosis.laws import FormLaw, form_law
-from bayesplate.diagnosis.null_control import NullControl, made_to_choose, null_control
-from bayesplate.diagnosis.search import Ground, prepare_search
+from bayesplate.diagnosis.null_control import NullControl, force_choices, null_control
+from bayesplate.diagnosis.search import SearchGround, prepare_search
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.refit import Predict
 from bayesplate.frequencies.laws import ExactLaw
@@ -47,7 +47,7 @@ def baseline_of_card(planted: PlantedBoard) -> Baseline:
     return baseline_at(board, estimate, law_without_effect(planted.design.name, estimate))
 
 
-def ground_of(planted: PlantedBoard, law: Any = form_law) -> Ground:
+def ground_of(planted: PlantedBoard, law: Any = form_law) -> SearchGround:
     """Everything that the search needs of a board, each form by a given law."""
     return prepare_search(baseline_of_card(planted), law)
 
@@ -90,7 +90,7 @@ def control_of(setting: Setting) -> NullControl:
     """Null simulations of a setting: the same for every board of it, whichever process makes them."""
     planted = _median_board(setting)
     ground = ground_of(planted, shared_law)
-    return made_to_choose(ground, null_control(ground, setting.rng()))
+    return force_choices(ground, null_control(ground, setting.rng()))
 
 
 @cache
