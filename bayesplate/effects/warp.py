@@ -13,7 +13,7 @@ from bayesplate.board.board import Board, Values, board_density
 from bayesplate.board.parameter import BOARD_OWNER, Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
-from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, Scope, Stiffness
+from bayesplate.effects.base import Contribution, Effect, Floats, Scope, Stiffness
 from bayesplate.effects.part import aspect_ratio_of
 from bayesplate.plate.fields import Field
 from bayesplate.plate.membrane import MODULI, Curvature, curvature_pairs, membrane_terms
@@ -74,26 +74,6 @@ class Warp(Effect):
         if board.warp or _can_shift_modes(board):
             return ""
         return "the board is so thick that the warp of a sawn board would move no mode by a cent"
-
-    @classmethod
-    def forms(cls, board: Board) -> tuple[EffectForm, ...]:
-        """Two forms, cup with bow and twist alone; one form of all rises where the card states any."""
-        acting = [setup for setup in board.setups if not cls.refusal(board, setup)]
-        if board.warp or not acting:
-            return super().forms(board)
-        warps = [cls.of(board, setup) for setup in acting]
-        return tuple(
-            EffectForm(
-                words,
-                tuple(replace(warp, rises=tuple(rise for rise in warp.rises if rise[0] in names)) for warp in warps),
-            )
-            for words, names in (("cup and bow", ("cup", "bow")), ("twist", ("twist",)))
-        )
-
-    @property
-    def detail(self) -> str:
-        names = [name for name, *_ in self.rises]
-        return "" if len(names) == len(RISES) else " and ".join(names)
 
     def in_setup(self, board: Board, setup: Setup) -> Warp | None:
         if self.refusal(board, setup):

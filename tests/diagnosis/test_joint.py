@@ -159,3 +159,18 @@ def test_air_and_exciter_keep_the_labels_of_the_board_without_either():
     values = {**board.nominal(), **base.values, **{name: value[0] for name, value in sizes.items()}}
     model = setup_model(system_of(board, board.setups[0]), values)
     assert np.abs(cents(found - full_log_frequencies(model, values))).max() < CENT
+
+
+def test_a_board_that_is_cupped_and_twisted_is_not_taken_for_one_on_a_stiff_support():
+    """Both raise the lowest modes; cup or twist alone would fit worse than the support, together they fit exactly."""
+    shape = {"cup": 1.5e-3, "bow": 1.2e-3, "twist": 8e-3}
+    planted = plant(np.random.default_rng(0), "free-12", ["warp"], 1.0, 5.0, fixed={"warp": shape})
+    exact = replace(planted, readings=planted.exact)
+
+    result = run_search(prepare_search(baseline_of_card(exact), tried=("warp", "support_stiffness")))
+
+    evidence = {
+        hypothesis.members: value
+        for hypothesis, value in zip(result.ground.hypotheses, result.log_evidence, strict=True)
+    }
+    assert evidence[("warp",)] > evidence[("support_stiffness",)] > evidence[()]

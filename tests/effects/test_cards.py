@@ -132,7 +132,7 @@ def loaded(place, *effects, **edges):
 
 
 FORMS = [
-    ("warp", board_with(HALF_TOP), ["cup and bow", "twist"]),
+    ("warp", board_with(HALF_TOP), [""]),
     ("warp", board_with(replace(STEEL, h=0.06)), []),
     ("grain_angle", loaded(CORNER, "thickness_profile"), BOTH),
     ("grain_angle", loaded(MIDDLE, "thickness_profile"), [""]),
