@@ -18,7 +18,7 @@ from bayesplate.terminal import exit_on_error, print_json, print_tables, print_t
 
 if TYPE_CHECKING:
     from bayesplate.commands.options import Option, OptionGroup
-    from bayesplate.commands.shown import Printout
+    from bayesplate.commands.printout import Printout
 
 _SHARED_ARGUMENTS = ("out", "seed", "effects", "setup", "law", "robust", "report", "force", "resume")
 """Arguments that several commands take, in the order of the help: after those that a command has alone."""
@@ -56,20 +56,20 @@ def main() -> None:
 
 @dataclass(frozen=True)
 class CommandOutput:
-    """Result of a command and what is printed of it; `then` is called last, and its error is that of the command."""
+    """Result of a command and what is printed of it; `final_check` is called last and may raise its error."""
 
     content: Any  # what `--json` prints
-    shown: Callable[[], Printout] | None = None
+    make_printout: Callable[[], Printout] | None = None
     closing: str = ""  # where things were written, and what comes next
-    then: Callable[[], None] | None = None
+    final_check: Callable[[], None] | None = None
 
     def print(self, *, as_json: bool, quiet: bool) -> None:
         """Print JSON, or tables and the closing sentence, or nothing."""
         if as_json:
             print_json(self.content)
         elif not quiet:
-            if self.shown is not None:
-                print_tables(self.shown())
+            if self.make_printout is not None:
+                print_tables(self.make_printout())
             if self.closing:
                 print_text(self.closing)
 
@@ -125,15 +125,15 @@ class Command(click.Command):
             arguments = {name: option.value(name, values, about) for name, option in self._options.items()}
             for fault in contradictions(arguments):
                 raise click.UsageError(str(fault))
-            with progress_line(shown=has_progress and not quiet and not as_json) as tell:
+            with progress_line(is_shown=has_progress and not quiet and not as_json) as tell:
                 arguments |= {"progress": tell}
                 output = self._compute(
                     self._function, **{name: value for name, value in arguments.items() if value is not None}
                 )
             output.print(as_json=as_json, quiet=quiet)
-        if output.then is not None:
+        if output.final_check is not None:
             with exit_on_error(as_json=False, debug=debug):
-                output.then()
+                output.final_check()
 
 
 def _printing_options() -> list[click.Parameter]:
@@ -155,7 +155,7 @@ def command(answer: Callable[..., CommandOutput]) -> Command:
 def check(run: Callable[..., Any], **options: Any) -> CommandOutput:
     """Every fault of CARD, or what a fit of it can identify."""
     report = run(**options)
-    return CommandOutput(report, report.shown)
+    return CommandOutput(report, report.printout)
 
 
 @command
@@ -165,14 +165,14 @@ def fit(run: Callable[..., Any], **options: Any) -> CommandOutput:
     Writes report.html, summary.json and posterior.nc.
     """
     result = run(**options)
-    return CommandOutput(result.summary, result.shown, f"written to {result.folder}")
+    return CommandOutput(result.summary, result.printout, f"written to {result.folder}")
 
 
 @command
 def modes(run: Callable[..., Any], **options: Any) -> CommandOutput:
     """Lowest modes of CARD, and a sheet of their Chladni figures."""
     result = run(**options)
-    return CommandOutput(result.summary, result.shown)
+    return CommandOutput(result.summary, result.printout)
 
 
 @command
@@ -182,7 +182,7 @@ def compare(run: Callable[..., Any], **options: Any) -> CommandOutput:
     Each as a thin and as a shear-flexible plate.
     """
     result = run(**options)
-    return CommandOutput(result, result.shown)
+    return CommandOutput(result, result.printout)
 
 
 @command
@@ -192,7 +192,7 @@ def diagnose(run: Callable[..., Any], **options: Any) -> CommandOutput:
     Adds the effect, and reports the error before and after.
     """
     result = run(**options)
-    return CommandOutput(result.to_json(), result.shown, f"written to {result.folder}")
+    return CommandOutput(result.to_json(), result.printout, f"written to {result.folder}")
 
 
 @command
@@ -203,7 +203,7 @@ def plan(run: Callable[..., Any], **options: Any) -> CommandOutput:
     """
     result = run(**options)
     closing = f"written to {options['out']}: {', '.join(path.name for path in result.files)}"
-    return CommandOutput(result.summary, result.shown, closing)
+    return CommandOutput(result.summary, result.printout, closing)
 
 
 @command
@@ -239,7 +239,7 @@ def pick(run: Callable[..., Any], **options: Any) -> CommandOutput:
     result = run(**options)
     fit_arguments = f"{quote(options.get('card') or 'CARD')} --setup {quote(f'{out}/{FRAGMENT_FILE}')}"
     closing = f"written to {out}: {FRAGMENT_FILE}, {PICK_PAGE_FILE}. Next: bayesplate fit {fit_arguments}"
-    return CommandOutput(result.summary, result.shown, closing)
+    return CommandOutput(result.summary, result.printout, closing)
 
 
 @command
@@ -260,4 +260,4 @@ def batch(run: Callable[..., Any], **options: Any) -> CommandOutput:
     """
     result = run(**options)
     closing = f"written to {result.folder}"
-    return CommandOutput(result.summary, result.shown, closing, result.require_all)
+    return CommandOutput(result.summary, result.printout, closing, result.require_all)

@@ -17,7 +17,7 @@ import click
 from bayesplate.errors import BayesplateError, Fault, UnwritableError, printable
 
 if TYPE_CHECKING:
-    from bayesplate.commands.shown import Printout, Progress
+    from bayesplate.commands.printout import Printout, Progress
 
 EXIT_INTERRUPTED = 130
 EXIT_INTERNAL = 70
@@ -25,19 +25,19 @@ _NARROWEST_WIDTH, _USUAL_WIDTH = 20, 80
 """Columns of a terminal."""
 
 
-def print_tables(shown: Printout) -> None:
+def print_tables(printout: Printout) -> None:
     """Print tables, remarks, warnings and the closing words on the standard output."""
     from rich.console import Console
 
     # Laid out apart from the output: rich itself would end the program where a reader like `head` has closed the pipe.
     output = Console()
     width = output.width if output.width >= _NARROWEST_WIDTH else _USUAL_WIDTH  # COLUMNS=0 is no terminal
-    _write(shown.printed(width, styled=output.is_terminal))
+    _write(printout.printed(width, styled=output.is_terminal))
 
 
 def print_json(content: Any) -> None:
     """Print the result of a command as JSON, for other programs."""
-    from bayesplate.commands.shown import json_text
+    from bayesplate.commands.printout import json_text
 
     _write(json_text(content))
 
@@ -89,9 +89,9 @@ _STANDARD_ERROR = cast(IO[str], _StandardError())
 
 
 @contextmanager
-def progress_line(*, shown: bool) -> Iterator[Callable[[Progress], None] | None]:
+def progress_line(*, is_shown: bool) -> Iterator[Callable[[Progress], None] | None]:
     """A status line on the standard error while a command runs; a line now and then where that is no terminal."""
-    if not shown:
+    if not is_shown:
         yield None
         return
     from rich.console import Console
@@ -100,7 +100,7 @@ def progress_line(*, shown: bool) -> Iterator[Callable[[Progress], None] | None]
     with console.status("reading the card and solving the plate") as status:
         # Imported now, and not at the first message: Python gives another exit code to a run that is interrupted while
         # it defines classes of an import by executing text.
-        from bayesplate.commands.shown import progress_text
+        from bayesplate.commands.printout import progress_text
 
         def tell(progress: Progress) -> None:
             nonlocal stage

@@ -209,7 +209,11 @@ def rows(diagnoses: Mapping[str, Diagnosis]) -> list[tuple[str, ...]]:
             f"{one.verdict}, in part" if one.named_in_part else one.verdict,
             ", ".join(one.named_in_part or one.effects) or "-",
             "error reduced" if one.claim else "no claim",
-            *(f"{_cents(merit.of(one.before))} → {_cents(merit.of(one.after))}" for merit in MERITS if merit.is_rms),
+            *(
+                f"{_cents(merit.value_of(one.before))} → {_cents(merit.value_of(one.after))}"
+                for merit in MERITS
+                if merit.is_rms
+            ),
             *(_signed(shift.shift_in_sd) for shift in one.elastic_shift.values()),
             _nearest(one),
             _known(one),

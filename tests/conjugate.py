@@ -44,10 +44,10 @@ class PowerLaw:
     setup: Setup
 
     @property
-    def every_place(self):
+    def mode_places(self):
         return tuple(range(len(self.constant)))
 
-    def every_log_frequency(self, values, law):
+    def mode_log_frequencies(self, values, law):
         logs = np.log(np.stack([values[name] for name in ("D_x", "D_y", "D_s")], axis=-1))
         return self.constant + logs @ self.slopes.T
 

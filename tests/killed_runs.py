@@ -41,7 +41,7 @@ def quickly() -> None:
     for name in SAMPLING:
         command = import_module(f"bayesplate.commands.{name}")
         command.SamplerSettings = partial(SamplerSettings, gate=LOOSE_GATE)  # type: ignore[attr-defined]
-    diagnose.full_search = partial(full_search, tried=TRIED)  # type: ignore[assignment]
+    diagnose.full_search = partial(full_search, effects=TRIED)  # type: ignore[assignment]
 
 
 class Moments:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.campaign.pulls import NormalLikelihood
+from bayesplate.campaign.combined import CombinedBoards
+from bayesplate.campaign.normal_likelihood import NormalLikelihood
 from bayesplate.campaign.shared import SharedParameter
-from bayesplate.campaign.together import CombinedBoards
 
 
 @dataclass(frozen=True)

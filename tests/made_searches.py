@@ -65,7 +65,7 @@ def baseline(
         | {name: np.asarray(q.mean) for name, q in inputs.items()},
         log_rigidities=LOG_RIGIDITIES,
         log_readings=log_frequency,
-        every=PossibleModes(
+        possible_modes=PossibleModes(
             log_frequency=log_frequency,
             slopes=slopes,
             input_slopes=0.01 * rng.standard_normal((n_modes, n_inputs)),
@@ -86,7 +86,7 @@ def with_residual(base: Baseline, residual: np.ndarray) -> Baseline:
 
 def with_modes(base: Baseline, **changed: object) -> Baseline:
     """The same baseline with other slopes, frequencies or laws of its modes, and the readings that it had."""
-    return replace(base, every=replace(base.every, **changed))
+    return replace(base, possible_modes=replace(base.possible_modes, **changed))
 
 
 def exchanged(base: Baseline, swap: Swap, residuals: np.ndarray) -> np.ndarray:
@@ -151,7 +151,7 @@ def found_among(
 def left_out(ground: SearchGround, index: int, residual: np.ndarray) -> np.ndarray:
     """Errors of predicting each reading from the other modes under one hypothesis: (n_modes,) array, ln f."""
     one = ground.hypotheses[index]
-    return one.terms.left_out(one.seen(ground.baseline, residual[None, :]))[1][:, 0]
+    return one.terms.left_out(one.residual_under_labels(ground.baseline, residual[None, :]))[1][:, 0]
 
 
 def visible_of(one: Candidate) -> np.ndarray:
@@ -216,9 +216,9 @@ class MadeLaw(FormLaw):
 
     direction: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
-    def every_log_frequency(self, baseline, log_rigidities, values):
+    def mode_log_frequencies(self, baseline, log_rigidities, values):
         (size,) = values.values()
-        return baseline.every.predict(log_rigidities) + np.outer(size, self.direction)
+        return baseline.possible_modes.predict(log_rigidities) + np.outer(size, self.direction)
 
 
 def _along(base: Baseline, direction: np.ndarray, prior: Quantity, n: int) -> Cells:
@@ -226,14 +226,14 @@ def _along(base: Baseline, direction: np.ndarray, prior: Quantity, n: int) -> Ce
     width = (high - low) / n
     z = low + width * (np.arange(n) + 0.5)
     weights = np.exp(prior.log_prior(z))
-    moved = -np.outer(prior.value(z), base.absorbing @ direction)
+    moved = -np.outer(prior.value(z), base.absorption @ direction)
     slope = prior.value(z + 0.25 * width) - prior.value(z - 0.25 * width)
     return Cells(
         weights=weights / weights.sum(),
         shift=np.outer(prior.value(z), direction) + moved @ base.slopes.T,
-        slopes=(slope[:, None] * (direction - base.slopes @ (base.absorbing @ direction)))[:, :, None],
+        slopes=(slope[:, None] * (direction - base.slopes @ (base.absorption @ direction)))[:, :, None],
         moved=moved,
-        moved_slopes=-(slope[:, None] * (base.absorbing @ direction))[:, :, None],
+        moved_slopes=-(slope[:, None] * (base.absorption @ direction))[:, :, None],
         form=np.zeros(n, dtype=np.intp),
         z=z[:, None],
         z_slopes=np.full((n, 1), 0.5 * width),
@@ -250,7 +250,7 @@ def with_readings(base: Baseline, *, labels: Sequence[tuple[int, int]]) -> Basel
     return replace(base, board=replace(base.board, setups=(changed,)))
 
 
-CERTAIN = NullControl(against=np.full(100, 50.0), ratio=np.full(100, 0.9))
+CERTAIN = NullControl(log_odds=np.full(100, 50.0), ratio=np.full(100, 0.9))
 """A null control that leaves so much to chance that only certainty calls for an effect, as a probability below 0.1."""
 
 

@@ -164,7 +164,7 @@ def draws_of(inference: Inference) -> tuple[Floats, Floats]:
     chains = inference.chains
     log_posterior = chains.log_prob[:, chains.burn_in :]
     every = max(1, -(-log_posterior.size // _MOST_DRAWS))
-    return chains.kept[:, ::every], log_posterior[:, ::every]
+    return chains.after_burn_in[:, ::every], log_posterior[:, ::every]
 
 
 def differences(case: NormalCase, theta: Floats, log_posterior: Floats) -> list[str]:

@@ -426,7 +426,7 @@ from bayesplate.errors import InputError
 from bayesplate.posterior.sampling import Progress
 from bayesplate.terminal import exit_on_error, print_text, progress_line
 with exit_on_error(as_json=False, debug=True):
-    with progress_line(shown=True) as tell:
+    with progress_line(is_shown=True) as tell:
         for stage in "first", "second":
             tell(Progress(0, 0, stage=stage, done=0.5))
     print_text("done")

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from runs import files_in, sample_loosely
 
-from bayesplate.commands.shown import show_fit
+from bayesplate.commands.printout import show_fit
 from bayesplate.terminal import print_tables
 
 ROOT = Path(__file__).parents[1]

@@ -83,8 +83,8 @@ class Board:
     title: str = ""
     source: str = ""
     effects: tuple[str, ...] = ()
-    implies: bool = True
-    chosen: tuple[Any, ...] = ()
+    has_implied_effects: bool = True
+    effect_forms: tuple[Any, ...] = ()
     shear_xz: Quantity | None = None
     shear_yz: Quantity | None = None
     warp: Mapping[str, Quantity] = field(default_factory=dict)
@@ -165,7 +165,7 @@ class Board:
         return replace(
             self,
             effects=tuple(name for name in self.effects if name not in effects),
-            chosen=tuple(effect for effect in self.chosen if effect.name not in effects),
+            effect_forms=tuple(effect for effect in self.effect_forms if effect.name not in effects),
             parameters=tuple(parameter for parameter in self.parameters if parameter.effect not in effects),
         )
 
@@ -268,7 +268,7 @@ class Board:
             assumed_poisson=None if "poisson_xy" in quantities else default_poisson(isotropic),
             prior=prior.name if isinstance(prior, PriorCard) else os.fspath(prior),
             effects=tuple(effects or ()),
-            implies=effects is None or bool(effects),
+            has_implied_effects=effects is None or bool(effects),
             isotropic=isotropic,
             title=title,
             source=source,
@@ -329,7 +329,7 @@ class Board:
             source=keys.source,
             prior=material.prior,
             effects=keys.effects or (),
-            implies=keys.effects != (),
+            has_implied_effects=keys.effects != (),
             shear_xz=material.shear_xz,
             shear_yz=material.shear_yz,
             warp=plate.warp,
@@ -370,7 +370,7 @@ class Board:
             name=self.name,
             title=self.title,
             source=self.source,
-            effects=self.effects if self.effects or not self.implies else None,
+            effects=self.effects if self.effects or not self.has_implied_effects else None,
             plate=PlateKeys.model_construct(None, **inputs, warp=self.warp),
             material=MaterialKeys.model_construct(poisson_xy=poisson_xy, **material, prior=self.prior),
         )
@@ -408,7 +408,7 @@ class Board:
     @property
     def file(self) -> str:
         """The name of its card, as messages show it."""
-        return self.card.shown if self.card is not None else f"{self.name}.toml"
+        return self.card.display_name if self.card is not None else f"{self.name}.toml"
 
     @property
     def folder(self) -> Path | None:

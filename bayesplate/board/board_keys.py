@@ -117,7 +117,7 @@ def read_board(
     card: CardFile, may_lack_frequencies: bool = False, setup: str | os.PathLike[str] | None = None
 ) -> tuple[BoardKeys, CardFile]:
     """The keys of a card, and the card with the fragment that completes it; InputError has every fault at once."""
-    table, file = card.table, card.shown
+    table, file = card.table, card.display_name
     if {*table} == {"setup"} and isinstance(table["setup"], dict):
         remedy = f"it completes a card: CARD --setup {file}"
         raise InputError(Fault(file, "a card, which has a [plate]", "a [setup] alone, as pick writes it", remedy))

@@ -232,10 +232,10 @@ def _mass_checks(board: Board, setup: Setup, section: str) -> Iterator[Check]:
             yield f"{item_place} coil_mass_g", item.coil.mean < item.mass.mean, wanted, got, remedy
 
 
-def mass_check(board: Board, where: str, mass: float) -> Check:
+def mass_check(board: Board, place: str, mass: float) -> Check:
     """Whether an attached mass, kg, is less than that of the board itself."""
     limit = nominal_mass(board)
-    return where, mass < limit, f"less than the board's own {1e3 * limit:.4g} g", f"{1e3 * mass:g} g", ""
+    return place, mass < limit, f"less than the board's own {1e3 * limit:.4g} g", f"{1e3 * mass:g} g", ""
 
 
 def _bounce_checks(setup: Setup, section: str) -> Iterator[Check]:

@@ -109,6 +109,6 @@ class CoefficientCard(BaseCard):
         return {label: row.r_squared for label, row in self.rows.items() if row.r_squared is not None}
 
 
-def load_coefficients(name_or_path: str | os.PathLike[str], beside: Path | None = None) -> CoefficientCard:
-    """Read a coefficient table, shipped or a path from the folder `beside`; InputError names every fault at once."""
-    return validate_card(CoefficientCard, CardFile.load("coefficients", name_or_path, beside))
+def load_coefficients(name_or_path: str | os.PathLike[str], folder: Path | None = None) -> CoefficientCard:
+    """Read a coefficient table, shipped or a path from `folder`; InputError names every fault at once."""
+    return validate_card(CoefficientCard, CardFile.load("coefficients", name_or_path, folder))

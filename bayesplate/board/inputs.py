@@ -48,7 +48,7 @@ def input_parameters(
     assumed = {} if assumed_poisson is None else {"poisson_xy": assumed_poisson}
     stated = {**inputs, **_field_means(inputs), **assumed}
     board_parameters = (
-        Parameter(key, BOARD_OWNER, prior, INPUTS[key][0], words=INPUTS[key][1], assumed=assumed.get(key))
+        Parameter(key, BOARD_OWNER, prior, INPUTS[key][0], display_name=INPUTS[key][1], assumed=assumed.get(key))
         for key, prior in stated.items()
     )
     return (*board_parameters, *(parameter for setup in setups for parameter in setup.clamped_parameters))
@@ -80,8 +80,8 @@ def warp_quantities(stated: Mapping[str, Quantity | ArrayLike], place: str) -> t
     return warps, [*unknown_faults, *faults]
 
 
-def unknown_name_fault(place: str, name: object, known: Iterable[str]) -> Fault:
+def unknown_name_fault(place: str, name: object, known_names: Iterable[str]) -> Fault:
     """The fault of an unknown name."""
-    names = tuple(known)
+    names = tuple(known_names)
     remedy = did_you_mean(name, names) if isinstance(name, str) else ""
     return Fault(place, f"one of {', '.join(names)}", str(name), remedy)

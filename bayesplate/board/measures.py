@@ -56,29 +56,29 @@ class QuantityReader:
     @property
     def key(self) -> Key:
         """A key that holds such a quantity."""
-        return Key(self, self.written)
+        return Key(self, self.write)
 
     def __call__(self, value: object) -> Quantity:
         quantity, scale = self._read_in_key_units(value), self.number.si
         return quantity if scale == 1.0 else quantity.scaled(scale, SI["mm"])
 
-    def written(self, one: Quantity) -> Any:
+    def write(self, quantity: Quantity) -> Any:
         """A quantity in the unit of its key, in the shortest form that states it completely."""
         scale = self.number.si
-        if one.readings:
-            details: dict[str, Any] = {"resolution": in_unit(one.resolution, scale)} if one.resolution else {}
-            places = {"at_x_mm": one.at_x, "at_y_mm": one.at_y}
+        if quantity.readings:
+            details: dict[str, Any] = {"resolution": in_unit(quantity.resolution, scale)} if quantity.resolution else {}
+            places = {"at_x_mm": quantity.at_x, "at_y_mm": quantity.at_y}
             details |= {
                 key: [in_unit(coordinate, SI["mm"]) for coordinate in values]
                 for key, values in places.items()
                 if values
             }
-            details |= {"place_sd_mm": in_unit(one.place_sd, SI["mm"])} if one.place_sd else {}
-            readings = [in_unit(value, scale) for value in one.readings]
+            details |= {"place_sd_mm": in_unit(quantity.place_sd, SI["mm"])} if quantity.place_sd else {}
+            readings = [in_unit(value, scale) for value in quantity.readings]
             return {"readings": readings, **details} if details else readings
-        if one.is_exact:
-            return in_unit(one.mean, scale)
-        return {"mean": in_unit(one.mean, scale), "sd": in_unit(one.sd, scale)}
+        if quantity.is_exact:
+            return in_unit(quantity.mean, scale)
+        return {"mean": in_unit(quantity.mean, scale), "sd": in_unit(quantity.sd, scale)}
 
     def _read_in_key_units(self, value: object) -> Quantity:
         """The quantity in the units of its keys."""
@@ -114,12 +114,12 @@ class QuantityReader:
         if places and len(places) < len(self.places):
             raise Refusal(Complaint(f"{' and '.join(self.places)} together", f"only {places[0]}"))
         if "place_sd_mm" in entries and not places:
-            raise Refusal(Complaint(f"{' and '.join(self.places)} beside it", "no places", inside=("place_sd_mm",)))
+            raise Refusal(Complaint(f"{' and '.join(self.places)} beside it", "no places", path=("place_sd_mm",)))
         count = len(entries["readings"])
         wrong_keys = [key for key in places if len(entries[key]) != count]
         if wrong_keys:
             wanted = f"{count} places, one per reading"
-            raise Refusal(*(Complaint(wanted, str(len(entries[key])), inside=(key,)) for key in wrong_keys))
+            raise Refusal(*(Complaint(wanted, str(len(entries[key])), path=(key,)) for key in wrong_keys))
         return self._make_quantity(entries["readings"], entries)
 
     def _make_quantity(self, readings: list[float], table: dict[str, Any]) -> Quantity:
@@ -169,9 +169,9 @@ def read_factor(value: object) -> float:
     return factor
 
 
-def write_noise(one: Quantity, scale: float) -> dict[str, float]:
+def write_noise(quantity: Quantity, scale: float) -> dict[str, float]:
     """A relative noise as { median, factor } in the unit of its key, which is `scale` of the quantity's unit."""
-    pair = median_and_factor(one, scale, lambda m, f: Quantity.from_median(m, f).scaled(scale))
+    pair = median_and_factor(quantity, scale, lambda m, f: Quantity.from_median(m, f).scaled(scale))
     return dict(zip(("median", "factor"), pair, strict=True))
 
 

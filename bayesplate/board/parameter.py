@@ -41,13 +41,13 @@ class Parameter:
     owner: Owner
     prior: Quantity  # SI; sign and range are its bounds, and an exact quantity fixes the parameter
     unit: str  # SI
-    null: float | None = None  # the value at which it changes nothing; None for what every board has
+    neutral_value: float | None = None  # the value at which it changes nothing; None for what every board has
     effect: str = ""  # empty for the board's inputs, constants and noise
     replaces: str = ""  # name of the board's own input whose place it takes
     source: str = ""  # of the prior; empty if the card states it
-    words: str = ""  # what people call it; empty where that is its key
-    look: str = ""  # what a component of an effect does to the board; empty for what has a meaning alone
-    usual: float | None = None  # a representative size where one standard deviation above the mean is none
+    display_name: str = ""  # what people call it; empty where that is its key
+    description: str = ""  # what a component of an effect does to the board; empty for what has a meaning alone
+    typical_value: float | None = None  # a representative size where one standard deviation above the mean is none
     assumed: Quantity | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -68,7 +68,7 @@ class Parameter:
     @property
     def is_component(self) -> bool:
         """Whether a budget counts it together with others."""
-        return bool(self.look)
+        return bool(self.description)
 
     @property
     def is_listed(self) -> bool:
@@ -78,8 +78,8 @@ class Parameter:
     @property
     def nominal(self) -> float:
         """A representative size: the median of a log-normal prior, one sd above a normal one if its bounds allow."""
-        if self.usual is not None and not self.prior.is_exact:
-            return self.usual
+        if self.typical_value is not None and not self.prior.is_exact:
+            return self.typical_value
         if self.prior.is_exact or self.prior.kind != "normal":
             return self.prior.median
         return float(np.clip(self.prior.value(1.0), self.prior.lower, self.prior.upper))

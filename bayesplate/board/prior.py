@@ -200,9 +200,9 @@ class PriorCard(BaseCard):
         return {name: prior.source for name, prior in (self.stated_constants | stated).items() if prior}
 
 
-def load_prior(name_or_path: str | os.PathLike[str], beside: Path | None = None) -> PriorCard:
-    """Read a prior card, a shipped one or a path from the folder `beside`; InputError names every fault at once."""
-    return validate_card(PriorCard, CardFile.load("priors", name_or_path, beside), _constant_faults)
+def load_prior(name_or_path: str | os.PathLike[str], folder: Path | None = None) -> PriorCard:
+    """Read a prior card, a shipped one or a path from `folder`; InputError names every fault at once."""
+    return validate_card(PriorCard, CardFile.load("priors", name_or_path, folder), _constant_faults)
 
 
 def _can_be_stated(quantity: object, kinds: tuple[str, ...]) -> bool:

@@ -74,7 +74,7 @@ def _sourced_key(read: Callable[[Any], Quantity], write: Callable[[Quantity], di
         if not isinstance(value, dict):
             raise Refusal(Complaint("a table with a source", show_value(value)))
         if "source" not in value:
-            raise Refusal(Complaint("where the numbers come from", "nothing", inside=("source",)))
+            raise Refusal(Complaint("where the numbers come from", "nothing", path=("source",)))
         quantity = read({key: entry for key, entry in value.items() if key != "source"})
         return StatedPrior(quantity, read_text(value["source"]))
 
@@ -89,4 +89,4 @@ ElasticPrior = Annotated[StatedPrior | None, _ELASTIC_KEY]
 RigidityPrior = Annotated[StatedPrior | None, _RIGIDITY_KEY]
 NoisePrior = Annotated[StatedPrior | None, _sourced_key(read_noise_percent, lambda noise: write_noise(noise, 1.0))]
 PoissonPrior = Annotated[StatedPrior | None, _sourced_key(POISSON.read, POISSON.write)]
-DensityPrior = Annotated[StatedPrior | None, _sourced_key(_DENSITY_READER, _DENSITY_READER.written)]
+DensityPrior = Annotated[StatedPrior | None, _sourced_key(_DENSITY_READER, _DENSITY_READER.write)]

@@ -74,7 +74,7 @@ class ConditionedField:
     sd: float
     shape: Floats  # (n,) expected coefficients, as fractions of the mean
     covariance: Floats  # (n, n), as fractions of the mean
-    with_mean: Floats  # (n,) gain of the coefficients where the mean is one of its sd higher
+    mean_gain: Floats  # (n,) gain of the coefficients where the mean is one of its sd higher
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class PlacedReadings:
     y: tuple[float, ...]
     resolution: float  # in the unit of the readings
     place_sd: tuple[float, float]  # of the places, fractions of the sides
-    usual: FieldScales
+    scales: FieldScales
     is_along_x_only: bool = False
 
 
@@ -130,7 +130,7 @@ def condition_field(read: PlacedReadings) -> ConditionedField:
     slopes = [np.zeros(relative.size)] * 2
     for _ in range(_N_PASSES if any(read.place_sd) else 1):
         place_variance = sum((sd * slope) ** 2 for sd, slope in zip(read.place_sd, slopes, strict=True))
-        mean, covariance = _average(relative, design, rounding_variance + place_variance, degrees, read.usual)
+        mean, covariance = _average(relative, design, rounding_variance + place_variance, degrees, read.scales)
         slopes = [_design_matrix(degrees, x, y, order)[:, 1:] @ mean[1:] for order in ((1, 0), (0, 1))]
     sd = float(np.sqrt(covariance[0, 0]))
     with_mean = covariance[1:, 0] / sd / mean[0]
@@ -163,9 +163,9 @@ def sd_after_readings(read: PlacedReadings, x: Floats, y: Floats) -> float:
         np.array(read.values) / scale,
         len(read.values),
     )
-    log_weights = _regress(relative, design[:n], variances[:n], read.usual)[0]
+    log_weights = _regress(relative, design[:n], variances[:n], read.scales)[0]
     weights = np.exp(log_weights - log_weights.max())
-    mean_variances = _regress(np.ones(len(design)), design, variances, read.usual)[2][..., 0, 0]
+    mean_variances = _regress(np.ones(len(design)), design, variances, read.scales)[2][..., 0, 0]
     return float(scale * np.sqrt(np.average(mean_variances, weights=weights)))
 
 

@@ -112,7 +112,7 @@ class TableColumns:
             uncovered += [f"{key}{of_setup}" for key in (*labels, *filter(setup.get, _UNLABELLED_KEYS))]
         if uncovered:
             wanted, remedy = "no reading that has no column in the table", "leave it off: every board would have it"
-            yield Fault(f"{self.template.shown} (the template)", wanted, ", ".join(uncovered), remedy)
+            yield Fault(f"{self.template.display_name} (the template)", wanted, ", ".join(uncovered), remedy)
 
     def name_of(self, row: Sequence[CellValue]) -> str:
         """The name of the board of a row, as it stands there."""

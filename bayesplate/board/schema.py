@@ -48,7 +48,7 @@ def validate_card(
 
     `faults_of` returns the faults between keys, from the raw table and the file's name in messages.
     """
-    table, file = card.table, file or card.shown
+    table, file = card.table, file or card.display_name
     faults = [*_name_faults(table, file, card.stem), *faults_of(table, file)]
     try:
         valid_card = model.model_validate(table, context={"card": card, **(context or {})})
@@ -67,11 +67,11 @@ def validate_card(
     raise InputError(listed_faults)
 
 
-def fault_place(file: str, table: Mapping[str, Any], inside: Sequence[str | int]) -> str:
+def fault_place(file: str, table: Mapping[str, Any], path: Sequence[str | int]) -> str:
     """Place of a value: 'my-board.toml [plate] thickness_mm', 'my-board.toml [[setup]] 2 "free" edges.x0'."""
-    if not inside:
+    if not path:
         return file
-    head, *rest = inside
+    head, *rest = path
     value = table.get(str(head))
     number = rest[0] if rest else None
     if isinstance(value, list) and isinstance(number, int) and any(isinstance(entry, dict) for entry in value):
@@ -100,16 +100,16 @@ def _error_faults(model: type[Section], table: Mapping[str, Any], file: str, det
     inside: tuple[str | int, ...] = detail["loc"]
     for complaint in _error_complaints(model, inside, detail):
         yield Fault(
-            fault_place(file, table, (*inside, *complaint.inside)), complaint.wanted, complaint.got, complaint.remedy
+            fault_place(file, table, (*inside, *complaint.path)), complaint.wanted, complaint.got, complaint.remedy
         )
 
 
-def _error_complaints(model: type[Section], inside: tuple[str | int, ...], detail: Any) -> Sequence[Complaint]:
+def _error_complaints(model: type[Section], path: tuple[str | int, ...], detail: Any) -> Sequence[Complaint]:
     error = detail.get("ctx", {}).get("error")
     if isinstance(error, Refusal):
         return error.complaints
     sections = sections_of(model)
-    keys = tuple(part for part in inside if isinstance(part, str))
+    keys = tuple(part for part in path if isinstance(part, str))
     if detail["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         return (_unknown_key(keys, sections),)
     if detail["type"] == "missing":

@@ -78,11 +78,13 @@ def with_discrepancies(board: Board) -> Board:
 
 def _discrepancy_parameters(owner: Owner, labels: Sequence[Label]) -> Iterator[Parameter]:
     words = "discrepancy of the board from its plate"
-    yield Parameter(DISCREPANCY, owner, DEFAULT_NOISE, "1", source=_SOURCE, words=words)
+    yield Parameter(DISCREPANCY, owner, DEFAULT_NOISE, "1", source=_SOURCE, display_name=words)
     standard_normal = Quantity.from_mean(0.0, 1.0, "normal")
     for label in labels:
         look = f"shifts mode {label} in all sessions"
-        yield Parameter(_discrepancy_key(label), owner, standard_normal, "1", words=MODE_DISCREPANCIES, look=look)
+        yield Parameter(
+            _discrepancy_key(label), owner, standard_normal, "1", display_name=MODE_DISCREPANCIES, description=look
+        )
 
 
 def shared_variance_share(setup: Setup) -> float:

@@ -357,13 +357,13 @@ class Setup:
     @property
     def noise_parameter(self) -> Parameter:
         """The relative noise of a frequency as a parameter."""
-        return Parameter("noise", self.owner, self.noise, "1", words="noise")
+        return Parameter("noise", self.owner, self.noise, "1", display_name="noise")
 
     @property
     def clamped_parameters(self) -> tuple[Parameter, ...]:
         """What the clamps cover, one parameter per clamped edge for which the card states it."""
         return tuple(
-            Parameter(f"clamped_{edge}", self.owner, length, "m", words=f"covered by the clamp on {edge}")
+            Parameter(f"clamped_{edge}", self.owner, length, "m", display_name=f"covered by the clamp on {edge}")
             for edge, length in self.clamped.items()
         )
 

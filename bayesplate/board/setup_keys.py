@@ -77,9 +77,9 @@ class Edges(Section):
         return dict(self)
 
 
-def edge_letters(words: Mapping[str, str]) -> str:
+def edge_letters(end_conditions: Mapping[str, str]) -> str:
     """The paper's four letters, "CFFF", in its order x0, y0, x1, y1, from the words of the four edges."""
-    return "".join(words[edge][0].upper() for edge in ("x0", "y0", "x1", "y1"))
+    return "".join(end_conditions[edge][0].upper() for edge in ("x0", "y0", "x1", "y1"))
 
 
 def edge_words(text: object) -> dict[str, EdgeCondition] | None:
@@ -196,7 +196,7 @@ class SetupKeys(Section):
             unclamped = [edge for edge in value if edges.words[edge] != "clamped"]
             if unclamped:
                 raise Refusal(
-                    *(Complaint("a clamped edge", f"a {edges.words[edge]} one", inside=(edge,)) for edge in unclamped)
+                    *(Complaint("a clamped edge", f"a {edges.words[edge]} one", path=(edge,)) for edge in unclamped)
                 )
         return value
 
@@ -234,5 +234,5 @@ class SetupKeys(Section):
             stray = [str(label) for label in value if label not in frequencies]
             if stray:
                 wanted = "a label among the frequencies_hz"
-                raise Refusal(*(Complaint(wanted, text, inside=(text,)) for text in stray))
+                raise Refusal(*(Complaint(wanted, text, path=(text,)) for text in stray))
         return value

@@ -37,14 +37,14 @@ def card_names(kind: CardKind) -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in shelf_folder(kind).glob("*.toml")))
 
 
-def find_card(kind: CardKind, name_or_path: str | os.PathLike[str], beside: Path | None = None) -> Path:
-    """The file of a card: a path, from the folder `beside`, if it looks like one, otherwise a name on the shelf.
+def find_card(kind: CardKind, name_or_path: str | os.PathLike[str], folder: Path | None = None) -> Path:
+    """The file of a card: a path, from `folder`, if it looks like one, otherwise a name on the shelf.
 
     Raises InputError if a name is not on the shelf, with the nearest card and how to write a path.
     """
     text = os.fspath(name_or_path)
     if isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or any(mark in text for mark in "/\\"):
-        return Path(text) if beside is None else beside / text
+        return Path(text) if folder is None else folder / text
     names = card_names(kind)
     if text in names:
         return shelf_folder(kind) / f"{text}.toml"
@@ -73,9 +73,9 @@ class CardFile:
     read: str = ""  # the text of the file; empty for a table made in Python
 
     @classmethod
-    def load(cls, kind: CardKind, name_or_path: str | os.PathLike[str], beside: Path | None = None) -> CardFile:
+    def load(cls, kind: CardKind, name_or_path: str | os.PathLike[str], folder: Path | None = None) -> CardFile:
         """A card of the shelf by its name, or of a path; raises InputError if it is no table."""
-        path = find_card(kind, name_or_path, beside)
+        path = find_card(kind, name_or_path, folder)
         return cls.of(read_file(path), path.name, path.parent)
 
     @classmethod
@@ -85,7 +85,7 @@ class CardFile:
         return cls(parse_toml(data, printable(name)), name, folder, data.decode("utf-8"))
 
     @property
-    def shown(self) -> str:
+    def display_name(self) -> str:
         """The name of the file as messages show it."""
         return printable(self.name)
 

@@ -50,10 +50,10 @@ def quantities_of(
     return quantities, faults
 
 
-def type_faults(place: str, given: Iterable[tuple[str, object, bool, str]]) -> Iterator[Fault]:
+def type_faults(place: str, arguments: Iterable[tuple[str, object, bool, str]]) -> Iterator[Fault]:
     """A fault for every argument of a wrong type, from its name, its value, whether the type is right, and the type
     wanted."""
-    for name, value, will_do, wanted in given:
+    for name, value, will_do, wanted in arguments:
         if not will_do:
             got = repr(value)
             yield Fault(f"{place} {name}", wanted, got if len(got) <= _LONGEST_REPR else f"{got[:_LONGEST_REPR]}...")

@@ -31,15 +31,15 @@ def in_unit(value: float, scale: float = 1.0) -> float:
 
 
 def median_and_factor(
-    one: Quantity, scale: float, read: Callable[[float, float], Quantity] = Quantity.from_median
+    quantity: Quantity, scale: float, read: Callable[[float, float], Quantity] = Quantity.from_median
 ) -> tuple[float, float]:
     """Median and factor of a log-normal density in the unit of its key; `read` makes a density of two such numbers."""
-    median, factor = one.median / scale, one.factor
+    median, factor = quantity.median / scale, quantity.factor
     rounded = (_rounded(median), _rounded(factor))
-    if rounded[1] > 1 and _are_close(read(*rounded), one):
+    if rounded[1] > 1 and _are_close(read(*rounded), quantity):
         return rounded
     candidates = ((rounded[0], factor), *product(_neighbours(median), _neighbours(factor)))
-    return next((pair for pair in candidates if pair[1] > 1 and read(*pair) == one), (median, factor))
+    return next((pair for pair in candidates if pair[1] > 1 and read(*pair) == quantity), (median, factor))
 
 
 def _rounded(value: float) -> float:

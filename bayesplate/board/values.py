@@ -33,7 +33,7 @@ class Complaint:
     wanted: str
     got: str
     remedy: str = ""
-    inside: ValuePath = ()
+    path: ValuePath = ()
 
 
 class Refusal(ValueError):
@@ -43,9 +43,9 @@ class Refusal(ValueError):
         super().__init__("; ".join(f"wanted {complaint.wanted}, got {complaint.got}" for complaint in complaints))
         self.complaints = complaints
 
-    def inside(self, *keys: str | int) -> list[Complaint]:
+    def complaints_below(self, *keys: str | int) -> list[Complaint]:
         """The complaints about a part of a value, with the keys that lead to the part."""
-        return [replace(complaint, inside=(*keys, *complaint.inside)) for complaint in self.complaints]
+        return [replace(complaint, path=(*keys, *complaint.path)) for complaint in self.complaints]
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def read_items(items: Iterable[tuple[str | int, Any]], read: Callable[[Any], T])
         try:
             values.append(read(value))
         except Refusal as refusal:
-            complaints += refusal.inside(key)
+            complaints += refusal.complaints_below(key)
     if complaints:
         raise Refusal(*complaints)
     return values
@@ -94,8 +94,8 @@ def read_entries(
         try:
             entries[key] = readers[key](value)
         except Refusal as refusal:
-            complaints += refusal.inside(key)
-    complaints += [Complaint("a value", "nothing", inside=(key,)) for key in needed if key not in table]
+            complaints += refusal.complaints_below(key)
+    complaints += [Complaint("a value", "nothing", path=(key,)) for key in needed if key not in table]
     if complaints:
         raise Refusal(*complaints)
     return entries

@@ -88,7 +88,7 @@ def _join(words: Iterable[str]) -> str:
     return ", ".join(word[:_LONGEST_SHOWN] for word in words)
 
 
-def nearest_word(word: str, known: Iterable[str]) -> str:
+def nearest_word(word: str, known_words: Iterable[str]) -> str:
     """The known word nearest to a misspelt one, or an empty text; a missing unit suffix does not count.
 
     A part that only one known word has stands for it: "shear" for transverse_shear.
@@ -96,7 +96,7 @@ def nearest_word(word: str, known: Iterable[str]) -> str:
     if len(word) > _LONGEST_SHOWN:
         return ""
     candidates: dict[str, str] = {}
-    names = list(known)
+    names = list(known_words)
     for name in names:
         candidates.setdefault(_UNIT.sub("", name), name)
         candidates[name] = name
@@ -113,9 +113,9 @@ def _name_parts(name: str) -> set[str]:
     return set(re.split(r"[-_ ]+", name.casefold())) - {""}
 
 
-def did_you_mean(word: str, known: Iterable[str]) -> str:
+def did_you_mean(word: str, known_words: Iterable[str]) -> str:
     """A remedy that names the nearest known word; empty if none is near."""
-    name = nearest_word(word, known)
+    name = nearest_word(word, known_words)
     return f"did you mean {name}?" if name else ""
 
 

@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from bayesplate.arrays import Floats
+from bayesplate.campaign.conditional import ConditionalPosterior
 from bayesplate.campaign.evidence import bridge_sampling
-from bayesplate.campaign.given import ConditionalPosterior
 from bayesplate.campaign.likelihood import SharedLikelihood, SharedLogDensity, moments
-from bayesplate.campaign.pulls import NormalLikelihood
+from bayesplate.campaign.normal_likelihood import NormalLikelihood
 from bayesplate.campaign.shared import SharedParameter
 from bayesplate.diagnosis.terms import log_sum, normalised_weights
 from bayesplate.posterior.draws import Draws, named_draws
@@ -51,7 +51,7 @@ class Sample:
         ln r.
     log_evidence : float
         ln of the integral of r(z) L(z).
-    every : tuple of (n, n_every) array
+    log_frequencies : tuple of (n, n_modes) array
         ln f (Hz) of all modes, setup by setup, under the law of the board.
     """
 
@@ -61,7 +61,7 @@ class Sample:
     n_independent: float
     log_reference: SharedLogDensity
     log_evidence: float
-    every: tuple[Floats, ...]
+    log_frequencies: tuple[Floats, ...]
 
     @cached_property
     def weights(self) -> Floats:
@@ -112,15 +112,15 @@ class FittedBoard:
         return self.inference.problem.board.name
 
     @cached_property
-    def given(self) -> ConditionalPosterior:
+    def conditional(self) -> ConditionalPosterior:
         """The board's density, given the shared parameters."""
         return ConditionalPosterior(self.inference.problem.posterior, self.shared)
 
-    def quick(self, surrogate: Surrogate | None) -> ConditionalPosterior:
+    def surrogate_conditional(self, surrogate: Surrogate | None) -> ConditionalPosterior:
         """The same density by a surrogate of the board's law, where there is one."""
         if surrogate is None:
-            return self.given
-        return replace(self.given, posterior=with_surrogate(self.given.posterior, surrogate))
+            return self.conditional
+        return replace(self.conditional, posterior=with_surrogate(self.conditional.posterior, surrogate))
 
     def log_prior(self, z: Floats) -> Floats:
         """ln of the campaign's prior of the shared parameters: (n,) array."""
@@ -129,7 +129,7 @@ class FittedBoard:
         )
 
     @cached_property
-    def alone(self) -> Sample:
+    def own_sample(self) -> Sample:
         """Draws of the board's own posterior, under the campaign's prior of the shared parameters.
 
         They are the draws of its fit. A board in whose fit each setup had a parameter of its own is sampled anew with
@@ -137,46 +137,48 @@ class FittedBoard:
         """
         flat, convergence = self.draws.flat, self.inference.convergence
         log_frequencies = tuple(
-            log_frequency.reshape(len(flat), -1) for log_frequency in self.draws.every_log_frequency
+            log_frequency.reshape(len(flat), -1) for log_frequency in self.draws.mode_log_frequencies
         )
         n_independent = min(float(convergence.ess_min), float(len(flat)))
-        z, log_weights = self.given.z_of(flat), self.given.log_reweighting(flat)
-        if not self.given.is_one_to_one:
+        z, log_weights = self.conditional.z_of(flat), self.conditional.log_reweighting(flat)
+        if not self.conditional.is_one_to_one:
             fitted_sample = Sample(flat, z, log_weights, n_independent, self.log_prior, np.nan, log_frequencies)
-            return self.anew(self.log_prior, fitted_sample, moments(z, fitted_sample.weights), 0)
+            return self.sample_anew(self.log_prior, fitted_sample, moments(z, fitted_sample.weights), 0)
         log_evidence = self._log_evidence(self.log_prior, flat, z, normalised_weights(log_weights), 0)
         return Sample(flat, z, log_weights, n_independent, self.log_prior, log_evidence, log_frequencies)
 
     @property
-    def pull(self) -> NormalLikelihood:
+    def normal_likelihood(self) -> NormalLikelihood:
         """The board's likelihood of the shared parameters, as a normal one."""
         return NormalLikelihood.of_draws(
-            self.alone.z, self.alone.weights, [parameter.prior for parameter in self.shared]
+            self.own_sample.z, self.own_sample.weights, [parameter.prior for parameter in self.shared]
         )
 
-    def likelihood(self, drawn: Sample, log_reference: SharedLogDensity) -> SharedLikelihood:
+    def likelihood(self, sample: Sample, log_reference: SharedLogDensity) -> SharedLikelihood:
         """The board's likelihood of the shared parameters, from a sample weighted to another density r.
 
         Draws of a new walk lie away from the board's own, where the polynomial fitted to them is only extrapolated;
         what this board teaches the others rests on its own draws. So both samples are used, half and half: they are
         draws of L times the mean of both densities r, each over its evidence.
         """
-        weights = drawn.weights_under(log_reference)
-        n_effective, log_evidence = drawn.effective(weights), drawn.log_evidence_under(log_reference)
-        own_sample = self.alone
-        if drawn is own_sample:
-            return SharedLikelihood.found(drawn.z, weights, n_effective, log_reference, log_evidence)
+        weights = sample.weights_under(log_reference)
+        n_effective, log_evidence = sample.effective(weights), sample.log_evidence_under(log_reference)
+        own_sample = self.own_sample
+        if sample is own_sample:
+            return SharedLikelihood.from_draws(sample.z, weights, n_effective, log_reference, log_evidence)
 
         def log_mixture(z: Floats) -> Floats:
             return np.logaddexp(self.log_prior(z) - own_sample.log_evidence, log_reference(z) - log_evidence) - np.log(
                 2.0
             )
 
-        z, both_weights = np.concatenate([own_sample.z, drawn.z]), 0.5 * np.concatenate([own_sample.weights, weights])
+        z, both_weights = np.concatenate([own_sample.z, sample.z]), 0.5 * np.concatenate([own_sample.weights, weights])
         n_both = 4.0 / (1.0 / own_sample.effective(own_sample.weights) + 1.0 / n_effective)
-        return SharedLikelihood.found(z, both_weights, n_both, log_mixture, 0.0)
+        return SharedLikelihood.from_draws(z, both_weights, n_both, log_mixture, 0.0)
 
-    def anew(self, log_reference: SharedLogDensity, before: Sample, aim: tuple[Floats, Floats], seed: int) -> Sample:
+    def sample_anew(
+        self, log_reference: SharedLogDensity, before: Sample, aim: tuple[Floats, Floats], seed: int
+    ) -> Sample:
         """Sample the board under another density of the shared parameters, and weight the draws by the exact law.
 
         The surrogate of the board's own fit is poor away from it: while too few draws count by their weights, a new
@@ -192,7 +194,7 @@ class FittedBoard:
         aim : (n_shared,) and (n_shared, n_shared) arrays
             Approximate mean and covariance of the shared parameters.
         """
-        own_columns, surrogate = self.given.own_columns, self.inference.surrogate
+        own_columns, surrogate = self.conditional.own_columns, self.inference.surrogate
         start = _moved_moments(np.column_stack([before.theta[:, own_columns], before.z]), before.weights, aim)
         samples: list[Sample] = []
         solved_points: list[LawPoints] = []
@@ -220,22 +222,22 @@ class FittedBoard:
 
         Without a surrogate the walk is on the law itself, and all weights are one.
         """
-        conditional, n_own = self.quick(surrogate), self.given.own_columns.size
+        conditional, n_own = self.surrogate_conditional(surrogate), self.conditional.own_columns.size
         log_joint = _log_joint_density(conditional, log_reference)
 
         def log_within(x: Floats) -> Floats:
             if surrogate is None:
                 return np.zeros(len(x))
-            return surrogate.log_within(self.given.theta(x[:, :n_own], x[:, n_own:]))
+            return surrogate.log_within(self.conditional.theta(x[:, :n_own], x[:, n_own:]))
 
         names = [f"parameter {i}" for i in range(start[0].size)]
         chains, convergence = sample(lambda x: log_joint(x) + log_within(x), *start, SamplerSettings(seed), names=names)
         pooled_draws, log_prob = chains.pooled, chains.log_prob[:, chains.burn_in :].ravel()
         picked_draws = np.random.default_rng([seed, _LINE]).choice(len(pooled_draws), N_EXACT_DRAWS)
         x = pooled_draws[picked_draws]
-        theta, z = self.given.theta(x[:, :n_own], x[:, n_own:]), x[:, n_own:]
-        log_frequencies = tuple(self.given.posterior.every_log_frequency(theta))
-        log_likelihood = self.given.posterior.log_likelihood_of(log_frequencies, theta).sum(axis=1)
+        theta, z = self.conditional.theta(x[:, :n_own], x[:, n_own:]), x[:, n_own:]
+        log_frequencies = tuple(self.conditional.posterior.mode_log_frequencies(theta))
+        log_likelihood = self.conditional.posterior.log_likelihood_of(log_frequencies, theta).sum(axis=1)
         log_weights = log_likelihood - conditional.posterior.log_likelihood(theta).sum(axis=1) - log_within(x)
         log_weights = np.nan_to_num(log_weights, nan=-np.inf, neginf=-np.inf)
         n_independent = min(float(convergence.ess_min), float(N_EXACT_DRAWS))
@@ -244,7 +246,7 @@ class FittedBoard:
             theta, np.concatenate(log_frequencies, axis=1), log_prob[picked_draws] + log_weights
         )
 
-    def moved(self, drawn: Sample, log_density: SharedLogDensity, z: Floats, rng: np.random.Generator) -> Sample:
+    def moved(self, sample: Sample, log_density: SharedLogDensity, z: Floats, rng: np.random.Generator) -> Sample:
         """Draws of a sample moved to other shared parameters, the board's own ones moved by linear regression.
 
         A draw has no weight where the model lacks a mode that was read.
@@ -256,16 +258,18 @@ class FittedBoard:
         z : (n, n_shared) array
             Their standard coordinates.
         """
-        own_columns = self.given.own_columns
-        _, covariance = moments(np.column_stack([drawn.theta[:, own_columns], drawn.z]), drawn.weights)
+        own_columns = self.conditional.own_columns
+        _, covariance = moments(np.column_stack([sample.theta[:, own_columns], sample.z]), sample.weights)
         slopes = _regression_slopes(covariance, z.shape[1])[: own_columns.size]
-        picked_draws = rng.permutation(resample(drawn.weights, len(z), rng))
-        theta = self.given.theta(drawn.theta[picked_draws][:, own_columns] + (z - drawn.z[picked_draws]) @ slopes.T, z)
-        posterior = self.given.posterior
-        log_frequencies = tuple(posterior.every_log_frequency(theta))
+        picked_draws = rng.permutation(resample(sample.weights, len(z), rng))
+        theta = self.conditional.theta(
+            sample.theta[picked_draws][:, own_columns] + (z - sample.z[picked_draws]) @ slopes.T, z
+        )
+        posterior = self.conditional.posterior
+        log_frequencies = tuple(posterior.mode_log_frequencies(theta))
         is_possible = np.isfinite(posterior.log_likelihood_of(log_frequencies, theta)).all(axis=1)
         log_weights = np.where(is_possible, 0.0, -np.inf)
-        return Sample(theta, z, log_weights, drawn.effective(drawn.weights), log_density, np.nan, log_frequencies)
+        return Sample(theta, z, log_weights, sample.effective(sample.weights), log_density, np.nan, log_frequencies)
 
     def _log_evidence(
         self, log_reference: SharedLogDensity, theta: Floats, z: Floats, weights: Floats, seed: int
@@ -273,22 +277,22 @@ class FittedBoard:
         """ln of the integral of r(z) L(z), from weighted draws of that density."""
         rng = np.random.default_rng([seed, _LINE, 1])
         picked_draws = rng.permutation(resample(weights, len(z), rng))
-        draws = np.column_stack([theta[:, self.given.own_columns], z])[picked_draws]
-        return bridge_sampling(_log_joint_density(self.given, log_reference), draws, rng)
+        draws = np.column_stack([theta[:, self.conditional.own_columns], z])[picked_draws]
+        return bridge_sampling(_log_joint_density(self.conditional, log_reference), draws, rng)
 
     def posterior_of(
-        self, drawn: Sample, weights: Floats, rng: np.random.Generator, seed: int
+        self, sample: Sample, weights: Floats, rng: np.random.Generator, seed: int
     ) -> tuple[Inference, Draws]:
         """An inference with the weighted draws of a sample, and the draws by name."""
         picked_draws = rng.permutation(resample(weights, len(self.draws.flat), rng))
         theta, log_frequencies = (
-            drawn.theta[picked_draws],
-            [log_frequency[picked_draws] for log_frequency in drawn.every],
+            sample.theta[picked_draws],
+            [log_frequency[picked_draws] for log_frequency in sample.log_frequencies],
         )
         old_convergence, problem, n_effective = (
             self.inference.convergence,
             self.inference.problem,
-            drawn.effective(weights),
+            sample.effective(weights),
         )
         log_prob = problem.posterior.log_prior(theta)
         log_prob += problem.posterior.log_likelihood_of(log_frequencies, theta).sum(axis=1)

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.campaign.boards import FittedBoard
+from bayesplate.campaign.combined import CombinedBoards, shared_values
 from bayesplate.campaign.learning import SharedPosterior
-from bayesplate.campaign.together import CombinedBoards, shared_values
 from bayesplate.diagnosis.claim import STANDARD_ERRORS, score_gain
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.draws import Draws
@@ -37,35 +37,35 @@ class LeftOutBoard:
     refuses: bool  # whether it does not want what they teach, as many boards as were asked being allowed for
 
 
-def judge_left_out_boards(together: CombinedBoards) -> dict[str, LeftOutBoard]:
+def judge_left_out_boards(combined: CombinedBoards) -> dict[str, LeftOutBoard]:
     """Leave each board out in turn and judge it against the others."""
-    log_evidence, refusing_names = together.log_evidence(), refusing_boards(together)
+    log_evidence, refusing_names = combined.log_evidence(), refusing_boards(combined)
     return {
         name: LeftOutBoard(
-            log_evidence - together.log_evidence((i,)), board_p_value(together, i), name in refusing_names
+            log_evidence - combined.log_evidence((i,)), board_p_value(combined, i), name in refusing_names
         )
-        for i, name in enumerate(together.names)
+        for i, name in enumerate(combined.names)
     }
 
 
-def refusing_boards(together: CombinedBoards) -> tuple[str, ...]:
+def refusing_boards(combined: CombinedBoards) -> tuple[str, ...]:
     """Names of the boards that refuse what the others teach, with a correction for the number of boards.
 
     The board with the smallest p-value is left out before the others are judged again, because it had taught them too.
     Where the last two boards do not agree, both are named: nothing tells which of them is odd.
     """
     refusing_indices: list[int] = []
-    n = len(together.names)
+    n = len(combined.names)
     while len(refusing_indices) < n - 1:
-        values = {i: board_p_value(together, i, refusing_indices) for i in range(n) if i not in refusing_indices}
+        values = {i: board_p_value(combined, i, refusing_indices) for i in range(n) if i not in refusing_indices}
         worst = min(values, key=lambda i: values[i])
         if values[worst] * len(values) >= REFUSED_BELOW:
             break
         refusing_indices += [worst] if len(values) > 2 else list(values)
-    return tuple(together.names[i] for i in sorted(refusing_indices))
+    return tuple(combined.names[i] for i in sorted(refusing_indices))
 
 
-def board_p_value(together: CombinedBoards, board: int, without: Collection[int] = ()) -> float:
+def board_p_value(combined: CombinedBoards, board: int, without: Collection[int] = ()) -> float:
     """P-value of one board against the others that are not left out: the score test of its likelihood.
 
     The board's own posterior, its prior divided out, is a normal likelihood exp(h'z - z'Pz / 2). If the board is of the
@@ -79,15 +79,17 @@ def board_p_value(together: CombinedBoards, board: int, without: Collection[int]
     """
     from scipy.stats import chi2
 
-    mean, covariance = together.taught((board, *without))
-    pull = together.pulls[board]
-    sizes, directions = np.linalg.eigh(pull.precision)
+    mean, covariance = combined.moments_from_others((board, *without))
+    likelihood = combined.normal_likelihoods[board]
+    sizes, directions = np.linalg.eigh(likelihood.precision)
     informed_directions = directions[:, sizes > _LEAST_PRECISION]
     if not informed_directions.size:
         return 1.0
-    slope = informed_directions.T @ (pull.lean - pull.precision @ mean)
+    slope = informed_directions.T @ (likelihood.precision_times_mode - likelihood.precision @ mean)
     spread = (
-        informed_directions.T @ (pull.precision + pull.precision @ covariance @ pull.precision) @ informed_directions
+        informed_directions.T
+        @ (likelihood.precision + likelihood.precision @ covariance @ likelihood.precision)
+        @ informed_directions
     )
     return float(chi2.sf(slope @ np.linalg.solve(spread, slope), informed_directions.shape[1]))
 
@@ -134,23 +136,23 @@ def judge_shared_effect(boards: Mapping[str, TaughtBoard]) -> SharedClaim:
     return SharedClaim(total, error, refused_by, n_better, holds)
 
 
-def taught_boards(learnt: SharedPosterior, before: Mapping[str, FittedBoard], seed: int) -> dict[str, TaughtBoard]:
+def taught_boards(posterior: SharedPosterior, before: Mapping[str, FittedBoard], seed: int) -> dict[str, TaughtBoard]:
     """Predict each board by what the others teach; `before` are the boards fitted without the shared effect."""
-    together, boards = learnt.together, {}
-    for i, (name, left_out_board) in enumerate(judge_left_out_boards(together).items()):
+    combined, boards = posterior.combined, {}
+    for i, (name, left_out_board) in enumerate(judge_left_out_boards(combined).items()):
         rng = np.random.default_rng([seed, _LINE, i])
         bare_board = before[name]
-        _, draws = learnt.board_left_out(i, rng, seed)
-        taught_values = shared_values(together.shared, together.taught_draws(rng, _N_DRAWS, (i,)))
+        _, draws = posterior.board_left_out(i, rng, seed)
+        taught_values = shared_values(combined.shared, combined.draws_from_others(rng, _N_DRAWS, (i,)))
         boards[name] = TaughtBoard(
-            log_score_gain=left_out_board.log_score - bare_board.alone.log_evidence,
+            log_score_gain=left_out_board.log_score - bare_board.own_sample.log_evidence,
             before_rms_cents=rms_cents(bare_board.inference, bare_board.draws),
-            after_rms_cents=rms_cents(learnt.members[i].inference, draws),
+            after_rms_cents=rms_cents(posterior.members[i].inference, draws),
             p_value=left_out_board.p_value,
             refuses=left_out_board.refuses,
             others={
                 parameter.name: Spread.of(taught_values[parameter.name], parameter.unit)
-                for parameter in together.shared
+                for parameter in combined.shared
             },
         )
     return boards

@@ -87,16 +87,18 @@ class CampaignDiagnosis:
         return self.explanations[0].effects if self.explanations else self.effects
 
 
-def campaign_verdict(found: Sequence[CampaignExplanation]) -> tuple[str, tuple[str, ...], str]:
+def campaign_verdict(explanations: Sequence[CampaignExplanation]) -> tuple[str, tuple[str, ...], str]:
     """The verdict of a campaign from its explanations, the most probable first: the word, the effects, the reason.
 
     In a group the effects are the shared ones of any alternative, the most probable first.
     """
-    none = next(explanation.probability for explanation in found if explanation.way == "none")
+    none = next(explanation.probability for explanation in explanations if explanation.way == "none")
     if none >= IMPROBABLE_BELOW:
         return "none needed", (), f"that the boards lack nothing has the probability {none:.2g}"
-    best = found[0]
-    contenders = [explanation for explanation in found if CLEAR_FACTOR * explanation.probability > best.probability]
+    best = explanations[0]
+    contenders = [
+        explanation for explanation in explanations if CLEAR_FACTOR * explanation.probability > best.probability
+    ]
     shared = tuple(
         dict.fromkeys(
             effect for explanation in contenders if explanation.way == "shared" for effect in explanation.effects
@@ -111,7 +113,7 @@ def campaign_verdict(found: Sequence[CampaignExplanation]) -> tuple[str, tuple[s
         what = "of which they share the first" if best.way == "shared and own" else "which the boards do not share"
         return "unexplained", (), f"the most probable is {sharing_words(best)}, {what}{rival}"
     if len(contenders) == 1:
-        runner_up = found[1]
+        runner_up = explanations[1]
         times = best.probability / max(runner_up.probability, 1e-300)
         factor = f"{times:.0f}" if times < 1000.0 else "more than 1000"
         return "named", shared, f"{sharing_words(best)} is {factor} times as probable as {sharing_words(runner_up)}"
@@ -119,18 +121,18 @@ def campaign_verdict(found: Sequence[CampaignExplanation]) -> tuple[str, tuple[s
     return "indistinguishable group", shared, f"{words} may be as probable"
 
 
-def sharing_words(one: CampaignExplanation) -> str:
+def sharing_words(explanation: CampaignExplanation) -> str:
     """An explanation of a campaign in words."""
-    if one.way == "shared and own":
-        shared, own = one.effects
+    if explanation.way == "shared and own":
+        shared, own = explanation.effects
         return f"{effect_name(shared)} alike on all boards beside {effect_name(own)} of another size on each"
-    effect = effect_names(one.effects)
+    effect = effect_names(explanation.effects)
     return {
         "none": "no effect",
         "shared": f"{effect} alike on all boards",
         "own": f"{effect} of another size on each board",
-        "one board": f"{effect} on board {one.board} alone",
-    }[one.way]
+        "one board": f"{effect} on board {explanation.board} alone",
+    }[explanation.way]
 
 
 def campaign_claim_sentence(diagnosis: CampaignDiagnosis) -> str:

@@ -10,8 +10,8 @@ import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.campaign.boards import N_EXACT_DRAWS, FittedBoard, Sample
+from bayesplate.campaign.combined import CombinedBoards, sample_shared
 from bayesplate.campaign.likelihood import SharedLogDensity, moments
-from bayesplate.campaign.together import CombinedBoards, sample_shared
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
@@ -29,12 +29,12 @@ class SharedPosterior:
 
     members: tuple[FittedBoard, ...]
     samples: tuple[Sample, ...]  # one per board, with draws where the posterior from all boards is
-    together: CombinedBoards
+    combined: CombinedBoards
     chains: Chains  # of the standard coordinates `CombinedBoards.coordinates`
     convergence: Convergence
 
     @cached_property
-    def astray(self) -> Floats:
+    def offsets(self) -> Floats:
         """Distance of each board's draws from the shared posterior, in standard deviations: (n_boards,) array.
 
         The largest difference between the means of the shared parameters over the board's draws and over the shared
@@ -43,8 +43,8 @@ class SharedPosterior:
         """
         offsets = np.empty(len(self.samples))
         for i, sample in enumerate(self.samples):
-            mean, covariance = self.together.under_all(i)
-            weights = sample.weights_under(self.together.log_taught((i,)))
+            mean, covariance = self.combined.moments_from_all(i)
+            weights = sample.weights_under(self.combined.log_density_from_others((i,)))
             offset = np.abs(moments(sample.z, weights)[0] - mean) / np.sqrt(np.diagonal(covariance))
             offsets[i] = offset.max() - 2.0 * sample.effective(weights) ** -0.5
         return offsets
@@ -55,9 +55,9 @@ class SharedPosterior:
         The board's draws are weighted by the density of the shared parameters that the other boards teach; where too
         few draws count, the board is sampled anew.
         """
-        together, member = self.together, self.members[index]
-        log_reference = together.log_taught((index,))
-        sample = _sample_under(member, self.samples[index], log_reference, together.under_all(index), seed)
+        combined, member = self.combined, self.members[index]
+        log_reference = combined.log_density_from_others((index,))
+        sample = _sample_under(member, self.samples[index], log_reference, combined.moments_from_all(index), seed)
         weights = sample.weights_under(log_reference)
         return *member.posterior_of(sample, weights, rng, seed), sample.effective(weights)
 
@@ -68,8 +68,8 @@ class SharedPosterior:
         regression on the shared ones.
         """
         member, sample = self.members[index], self.samples[index]
-        taught_z = self.together.taught_draws(rng, N_EXACT_DRAWS, (index,))
-        moved_sample = member.moved(sample, self.together.log_taught((index,)), taught_z, rng)
+        taught_z = self.combined.draws_from_others(rng, N_EXACT_DRAWS, (index,))
+        moved_sample = member.moved(sample, self.combined.log_density_from_others((index,)), taught_z, rng)
         return member.posterior_of(moved_sample, moved_sample.weights, rng, seed)
 
 
@@ -82,18 +82,18 @@ def learn_shared(
     and what the other boards teach: it matters there, and a polynomial of low order fits it better. A board with too
     few draws there is sampled anew; one that still has too few keeps its likelihood from before.
     """
-    samples = [member.alone for member in members]
+    samples = [member.own_sample for member in members]
     likelihoods = [member.likelihood(sample, member.log_prior) for member, sample in zip(members, samples, strict=True)]
-    names, pulls = [member.name for member in members], [member.pull for member in members]
-    together = CombinedBoards.of(members[0].shared, names, likelihoods, pulls)
+    names, normal_likelihoods = [member.name for member in members], [member.normal_likelihood for member in members]
+    combined = CombinedBoards.of(members[0].shared, names, likelihoods, normal_likelihoods)
     for _ in range(_ROUNDS):
         for i, member in enumerate(members):
-            log_halfway = _log_halfway(member, together, i)
-            sample = _sample_under(member, samples[i], log_halfway, together.under_all(i), settings.seed)
+            log_halfway = _log_halfway(member, combined, i)
+            sample = _sample_under(member, samples[i], log_halfway, combined.moments_from_all(i), settings.seed)
             if sample.effective(sample.weights_under(log_halfway)) >= FEWEST_WEIGHTED_DRAWS:
                 samples[i], likelihoods[i] = sample, member.likelihood(sample, log_halfway)
-        together = CombinedBoards.of(together.shared, names, likelihoods, pulls)
-    return SharedPosterior(tuple(members), tuple(samples), together, *sample_shared(together, settings, progress))
+        combined = CombinedBoards.of(combined.shared, names, likelihoods, normal_likelihoods)
+    return SharedPosterior(tuple(members), tuple(samples), combined, *sample_shared(combined, settings, progress))
 
 
 def _sample_under(
@@ -107,11 +107,11 @@ def _sample_under(
     n_effective = sample.effective(sample.weights_under(log_reference))
     if n_effective >= FEWEST_WEIGHTED_DRAWS:
         return sample
-    new_sample = member.anew(log_reference, sample, aim, seed)
+    new_sample = member.sample_anew(log_reference, sample, aim, seed)
     return new_sample if new_sample.effective(new_sample.weights) > n_effective else sample
 
 
-def _log_halfway(member: FittedBoard, together: CombinedBoards, board: int) -> SharedLogDensity:
+def _log_halfway(member: FittedBoard, combined: CombinedBoards, board: int) -> SharedLogDensity:
     """ln of a density of the shared parameters halfway between the prior and what all boards but one teach."""
-    log_taught = together.log_taught((board,))
-    return lambda z: 0.5 * (member.log_prior(z) + log_taught(z))
+    log_density = combined.log_density_from_others((board,))
+    return lambda z: 0.5 * (member.log_prior(z) + log_density(z))

@@ -76,7 +76,7 @@ class SharedLikelihood:
     level: float = 0.0
 
     @classmethod
-    def found(
+    def from_draws(
         cls, z: Floats, weights: Floats, n_effective: float, log_reference: SharedLogDensity, log_evidence: float
     ) -> SharedLikelihood:
         """The likelihood from draws of a density proportional to r(z) L(z).

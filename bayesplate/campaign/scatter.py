@@ -25,7 +25,7 @@ from numpy.polynomial.hermite_e import hermegauss
 from bayesplate.arrays import Floats
 from bayesplate.board.quantity import Quantity
 from bayesplate.campaign.likelihood import Likelihood
-from bayesplate.campaign.pulls import NormalLikelihood
+from bayesplate.campaign.normal_likelihood import NormalLikelihood
 from bayesplate.campaign.shared import SharedParameter
 from bayesplate.diagnosis.terms import log_sum
 
@@ -90,8 +90,8 @@ class ScatteredLikelihood:
     """ln of the probability of a board's readings as a function of the numbers' middle and of their scatter."""
 
     shared: tuple[SharedParameter, ...]
-    own: Likelihood  # the board's likelihood of its own numbers
-    pull: NormalLikelihood  # its normal approximation
+    board_likelihood: Likelihood  # the board's likelihood of its own numbers
+    normal_likelihood: NormalLikelihood  # its normal approximation
 
     def at(self, hyper: Floats) -> Floats:
         """ln L at standard coordinates of numbers and scatters: (n,) array from (n, n_shared + n_scatters)."""
@@ -104,9 +104,15 @@ class ScatteredLikelihood:
         n, k = len(hyper), scatter_columns.size
         t = width[:, scatter_columns]
         precision = (
-            np.eye(k) + t[:, :, None] * self.pull.precision[np.ix_(scatter_columns, scatter_columns)] * t[:, None, :]
+            np.eye(k)
+            + t[:, :, None] * self.normal_likelihood.precision[np.ix_(scatter_columns, scatter_columns)] * t[:, None, :]
         )
-        slope = t * (self.pull.lean - middle @ self.pull.precision)[:, scatter_columns]
+        slope = (
+            t
+            * (self.normal_likelihood.precision_times_mode - middle @ self.normal_likelihood.precision)[
+                :, scatter_columns
+            ]
+        )
         factor = np.linalg.cholesky(precision)
         back = np.linalg.inv(factor)  # precision = factor factor', so that e = peak + back' x has it with unit x
         peak = np.einsum("nji,nj->ni", back, np.einsum("nij,nj->ni", back, slope))
@@ -114,7 +120,7 @@ class ScatteredLikelihood:
         e = peak[:, None, :] + np.einsum("nji,qj->nqi", back, x)
         z = np.repeat(middle[:, None, :], len(x), axis=1)
         z[:, :, scatter_columns] += t[:, None, :] * e
-        log_likelihood = self.own.at(z.reshape(-1, middle.shape[1])).reshape(n, len(x)).T
+        log_likelihood = self.board_likelihood.at(z.reshape(-1, middle.shape[1])).reshape(n, len(x)).T
         change = (log_weights + 0.5 * (x**2).sum(axis=1))[:, None] - 0.5 * (e**2).sum(axis=2).T
         log_det = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
         return log_sum(log_likelihood + change) - log_det

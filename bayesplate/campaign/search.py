@@ -89,7 +89,7 @@ class BoardSearch:
         if hypothesis is None:
             return {}
         by_cell = hypothesis.log_by_cell(self.ground.baseline, self.ground.baseline.residual)
-        by_cell = by_cell - hypothesis.own.half_log_det + hypothesis.log_labels
+        by_cell = by_cell - hypothesis.baseline.half_log_det + hypothesis.log_labels
         with np.errstate(divide="ignore"):
             log_prior = np.log(hypothesis.table.weights)
         possible_cells = np.flatnonzero(np.isfinite(log_prior))
@@ -99,9 +99,9 @@ class BoardSearch:
             for key, i in zip(keys, possible_cells, strict=True)
         }
 
-    def cells_beside(self, shared: str, own: str) -> dict[CellKey, tuple[float, float]]:
-        """The same of each cell of one effect, summed over the sizes of another; empty where there is no such pair."""
-        hypothesis = self.hypothesis((shared, own)) or self.hypothesis((own, shared))
+    def cells_in_pair(self, shared: str, other: str) -> dict[CellKey, tuple[float, float]]:
+        """`cells` of one effect in a pair, summed over the sizes of the other; empty where there is no such pair."""
+        hypothesis = self.hypothesis((shared, other)) or self.hypothesis((other, shared))
         if hypothesis is None:
             return {}
         n_first = 1 + hypothesis.table.parts[0].z.shape[1]
@@ -125,7 +125,7 @@ def search_board(
     name: str, baseline: Baseline, effects: Sequence[str], tell: Callable[[float], None] | None = None
 ) -> BoardSearch:
     """Tabulate effects on a board, and all pairs: several boards together may show what one board does not."""
-    ground = prepare_search(baseline, tried=effects, tell=tell)
+    ground = prepare_search(baseline, effects=effects, tell=tell)
     return BoardSearch(name, with_own_labels(ground.with_hypotheses(effects)))
 
 
@@ -166,7 +166,7 @@ def rank_campaign_explanations(
                 "shared and own",
                 pair,
                 "",
-                _log_evidence_of_common_cells([board.cells_beside(*pair) for board in boards]),
+                _log_evidence_of_common_cells([board.cells_in_pair(*pair) for board in boards]),
                 mixed_prior / len(ordered_pairs),
             )
             for pair in ordered_pairs

@@ -30,7 +30,7 @@ class SharedParameter:
     prior: Quantity  # of the number itself; its standard coordinate is sampled
     unit: str  # SI; "1" for a ratio
     source: str = ""  # where the prior comes from; empty if a card states it
-    to: str = ""  # the modulus that it is a ratio to; empty for a value
+    ratio_to: str = ""  # the modulus that it is a ratio to; empty for a value
     # scale of the half-normal prior of how much the boards' own differ from it, as the standard deviation of the
     # logarithm; 0 where all boards have the same
     scatter: float = 0.0
@@ -38,7 +38,7 @@ class SharedParameter:
     @property
     def name(self) -> str:
         """The name in results: "attached_mass.mass", "transverse_shear.G_xz / E_x"."""
-        return f"{self.effect}.{self.key}" + (f" / {self.to}" if self.to else "")
+        return f"{self.effect}.{self.key}" + (f" / {self.ratio_to}" if self.ratio_to else "")
 
     def parameters(self, board: Board) -> tuple[Parameter, ...]:
         """The uncertain parameters of a board that it sets: one, or one per setup."""
@@ -48,11 +48,11 @@ class SharedParameter:
 
     def of_board(self, value: Floats, values: Values) -> Floats:
         """The board's parameter from a value of the shared number: (n,) arrays, SI."""
-        return value * modulus(self.to, values) if self.to else value
+        return value * modulus(self.ratio_to, values) if self.ratio_to else value
 
     def from_board(self, parameter: Floats, values: Values) -> Floats:
         """The shared number from a board's parameter: the inverse of `of_board`."""
-        return parameter / modulus(self.to, values) if self.to else parameter
+        return parameter / modulus(self.ratio_to, values) if self.ratio_to else parameter
 
 
 def modulus(name: str, values: Values) -> Floats:

@@ -11,11 +11,11 @@ import numpy as np
 from bayesplate.board.material import MODULI
 from bayesplate.campaign.boards import FittedBoard
 from bayesplate.campaign.claim import LeftOutBoard, refusing_boards
+from bayesplate.campaign.combined import FEWEST_POINTS, shared_values
 from bayesplate.campaign.common import CommonResidual
 from bayesplate.campaign.learning import LARGEST_OFFSET, SharedPosterior
 from bayesplate.campaign.population import Population
 from bayesplate.campaign.scatter import scatters_of
-from bayesplate.campaign.together import FEWEST_POINTS, shared_values
 from bayesplate.effects.words import join_words
 from bayesplate.posterior.inference import MOST_DRAWS_A_CHAIN
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
@@ -111,15 +111,16 @@ class CampaignSummary(CampaignRun):
         return f"<CampaignSummary of {self.name}: {len(self.boards)} boards; {shared}>"
 
 
-def shared_numbers(learnt: SharedPosterior, seed: int) -> dict[str, SharedNumber]:
+def shared_numbers(posterior: SharedPosterior, seed: int) -> dict[str, SharedNumber]:
     """The shared numbers from all boards, from each board alone, and from all boards but each."""
     rng = np.random.default_rng([seed, _LINE])
-    together, shared = learnt.together, learnt.together.shared
-    all_values = shared_values(together.coordinates, learnt.chains.kept)
+    combined, shared = posterior.combined, posterior.combined.shared
+    all_values = shared_values(combined.coordinates, posterior.chains.after_burn_in)
     scatters = {scatter.of.name: Spread.of(all_values[scatter.name], scatter.unit) for scatter in scatters_of(shared)}
-    own_values = {member.name: _values_of_board(member, rng) for member in learnt.members}
+    own_values = {member.name: _values_of_board(member, rng) for member in posterior.members}
     taught_values = {
-        name: shared_values(shared, together.taught_draws(rng, _N_DRAWS, (i,))) for i, name in enumerate(together.names)
+        name: shared_values(shared, combined.draws_from_others(rng, _N_DRAWS, (i,)))
+        for i, name in enumerate(combined.names)
     }
     return {
         parameter.name: SharedNumber(
@@ -137,8 +138,8 @@ def shared_numbers(learnt: SharedPosterior, seed: int) -> dict[str, SharedNumber
 
 def _values_of_board(member: FittedBoard, rng: np.random.Generator) -> Mapping[str, np.ndarray]:
     """The shared numbers at draws of a board's own posterior, the campaign's prior in place of the board's."""
-    picked_draws = rng.choice(len(member.alone.z), size=_N_DRAWS, p=member.alone.weights)
-    return shared_values(member.shared, member.alone.z[picked_draws])
+    picked_draws = rng.choice(len(member.own_sample.z), size=_N_DRAWS, p=member.own_sample.weights)
+    return shared_values(member.shared, member.own_sample.z[picked_draws])
 
 
 def population_summary(population: Population, prior: str, seed: int) -> PopulationSummary:
@@ -160,29 +161,31 @@ def _by_constant(values: np.ndarray, unit: str) -> Elastic[Spread]:
     return Elastic(**{name: Spread.of(column, unit) for name, column in zip(MODULI, values.T, strict=True)})
 
 
-def learning_warnings(learnt: SharedPosterior, effective: Mapping[str, float]) -> tuple[str, ...]:
+def learning_warnings(posterior: SharedPosterior, effective: Mapping[str, float]) -> tuple[str, ...]:
     """Warnings on the shared numbers; `effective` is the number of draws on which each board's posterior rests."""
     warnings = []
-    refusing_names = refusing_boards(learnt.together)
+    refusing_names = refusing_boards(posterior.combined)
     if refusing_names:
         boards = "board" if len(refusing_names) == 1 else "boards"
-        scatter_words = "so little scatter" if scatters_of(learnt.together.shared) else "one value for all"
+        scatter_words = "so little scatter" if scatters_of(posterior.combined.shared) else "one value for all"
         warnings.append(
             f"{boards} {join_words(refusing_names)} {'does' if len(refusing_names) == 1 else 'do'} not want what the "
             f"others teach: {scatter_words} is not what these boards say"
         )
-    if learnt.together.fewest_points < FEWEST_POINTS:
+    if posterior.combined.fewest_points < FEWEST_POINTS:
         warnings.append(
-            f"what all boards, or all but one, find likely rests on {learnt.together.fewest_points:.0f} points only: "
-            "the shared intervals are rough"
+            "what all boards, or all but one, find likely rests on "
+            f"{posterior.combined.fewest_points:.0f} points only: the shared intervals are rough"
         )
-    astray_names = [
-        name for name, offset in zip(learnt.together.names, learnt.astray, strict=True) if offset > LARGEST_OFFSET
+    offset_names = [
+        name
+        for name, offset in zip(posterior.combined.names, posterior.offsets, strict=True)
+        if offset > LARGEST_OFFSET
     ]
-    if astray_names:
+    if offset_names:
         warnings.append(
-            f"what {join_words(astray_names)} {'says' if len(astray_names) == 1 else 'say'} of the shared numbers is "
-            f"no polynomial of low order in them: the shared means may be off by {max(learnt.astray):.1f} standard "
+            f"what {join_words(offset_names)} {'says' if len(offset_names) == 1 else 'say'} of the shared numbers is "
+            f"no polynomial of low order in them: the shared means may be off by {max(posterior.offsets):.1f} standard "
             "deviations"
         )
     poor_names = [name for name, n_draws in effective.items() if n_draws < FEWEST_WEIGHTED_DRAWS]
@@ -237,22 +240,22 @@ def archive_name(name: str) -> str:
     return name.replace(" / ", " over ")
 
 
-def shared_tree(learnt: SharedPosterior, attributes: Mapping[str, str]) -> Any:
+def shared_tree(posterior: SharedPosterior, attributes: Mapping[str, str]) -> Any:
     """Draws of shared numbers and scatters, SI, each board's log likelihood of them, the sampler's health: DataTree."""
-    chains, convergence, together = learnt.chains, learnt.convergence, learnt.together
+    chains, convergence, combined = posterior.chains, posterior.convergence, posterior.combined
     thinned = [
         thin_walker_major(draws, chains.burn_in, convergence.tau_max, n_draws_max=MOST_DRAWS_A_CHAIN)
         for draws in (chains.draws, chains.log_prob)
     ]
     z, log_posterior = thinned
-    likelihood = together.log_likelihoods(z.reshape(-1, z.shape[-1])).T.reshape(*z.shape[:2], -1)
-    values = shared_values(together.coordinates, z)
+    likelihood = combined.log_likelihoods(z.reshape(-1, z.shape[-1])).T.reshape(*z.shape[:2], -1)
+    values = shared_values(combined.coordinates, z)
     return build_tree(
         {
             "posterior": {archive_name(name): (DRAW_DIMENSIONS, np.asarray(draws)) for name, draws in values.items()},
             "log_likelihood": {"board": ((*DRAW_DIMENSIONS, "name"), likelihood)},
             "sample_stats": sample_stats(log_posterior, convergence),
         },
-        {"name": together.names, "parameter": [archive_name(coordinate.name) for coordinate in together.coordinates]},
+        {"name": combined.names, "parameter": [archive_name(coordinate.name) for coordinate in combined.coordinates]},
         attributes,
     )

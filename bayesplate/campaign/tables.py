@@ -100,9 +100,9 @@ def shared_words(name: str) -> str:
     return key if "/" in key else words if words.endswith(key) else f"{key} of {words}"
 
 
-def shared_name(name: str, one: SharedNumber) -> str:
+def shared_name(name: str, shared_number: SharedNumber) -> str:
     """A shared parameter in words, with its effect and its unit."""
-    unit = display_unit(one.all_boards.unit)[1]
+    unit = display_unit(shared_number.all_boards.unit)[1]
     words = f"{effect_name(name.partition('.')[0])}, {shared_words(name)}" if "/" in name else shared_words(name)
     return f"{words}, {unit}" if unit else words
 

@@ -62,28 +62,28 @@ def check_arguments(*rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
 
 def read_arguments(
-    function: Callable[..., Any], given: Mapping[str, Any], rules: Iterable[Rule] = ()
+    function: Callable[..., Any], arguments: Mapping[str, Any], rules: Iterable[Rule] = ()
 ) -> dict[str, Any]:
     """Read the arguments of a function, by name; raises InputError with every fault."""
     model, faults = _argument_model(function), list[Fault]()
     values = {}
     try:
-        values = dict(model.model_validate({name: given[name] for name in model.model_fields if name in given}))
+        values = dict(model.model_validate({name: arguments[name] for name in model.model_fields if name in arguments}))
     except ValidationError as error:
         for detail in error.errors(include_url=False):
             faults += [
                 Fault(
-                    _argument_place(*detail["loc"], *complaint.inside),
+                    _argument_place(*detail["loc"], *complaint.path),
                     complaint.wanted,
                     complaint.got,
                     complaint.remedy,
                 )
                 for complaint in detail["ctx"]["error"].complaints
             ]
-    faults += [fault for rule in rules for fault in rule(given)]
+    faults += [fault for rule in rules for fault in rule(arguments)]
     if faults:
         raise InputError(faults)
-    return {name: value for name, value in values.items() if name in given}
+    return {name: value for name, value in values.items() if name in arguments}
 
 
 def annotations_of(function: Callable[..., Any]) -> dict[str, Any]:
@@ -105,13 +105,13 @@ def _argument_place(*location: object) -> str:
     return " ".join(str(step + 1 if isinstance(step, int) else step) for step in location)
 
 
-def contradictions(given: Mapping[str, Any]) -> Iterator[Fault]:
+def contradictions(arguments: Mapping[str, Any]) -> Iterator[Fault]:
     """Arguments that exclude each other, or lack one another."""
-    if given.get("force") is True and given.get("resume") is True:
+    if arguments.get("force") is True and arguments.get("resume") is True:
         yield Fault("force and resume", "one of them", "both", "force starts anew and resume continues")
-    if given.get("resume") is True and given.get("out") is None:
+    if arguments.get("resume") is True and arguments.get("out") is None:
         yield Fault("resume", "the folder of the run that is continued, as out", "no out")
-    if given.get("workers") and given.get("dask"):
+    if arguments.get("workers") and arguments.get("dask"):
         yield Fault("workers and dask", "one of them", "both", "workers are processes here, dask others")
 
 
@@ -213,9 +213,11 @@ def effects_reader(name: str) -> Reader:
         for index, effect in enumerate(effects):
             if effect not in EFFECT_NAMES:
                 hint = did_you_mean(effect, EFFECT_NAMES) if isinstance(effect, str) else ""
-                complaints += refusal_of(f"one of {', '.join(EFFECT_NAMES)}", effect, hint).inside(index)
+                complaints += refusal_of(f"one of {', '.join(EFFECT_NAMES)}", effect, hint).complaints_below(index)
             elif effect in effects[:index]:
-                complaints += Refusal(Complaint("each name once", f"{quote_text(effect)} again")).inside(index)
+                complaints += Refusal(Complaint("each name once", f"{quote_text(effect)} again")).complaints_below(
+                    index
+                )
         if complaints:
             raise Refusal(*complaints)
         return effects

@@ -38,11 +38,11 @@ class PeakAssignment:
     guess: Guess
 
     @classmethod
-    def of(cls, way: Labelling, bare: Board) -> PeakAssignment:
-        """The modes at the constants of a labelling of some peaks of `bare`."""
-        estimate = weighted_least_squares(way.board)
-        model = with_other_modes(setup_model(system_of(bare, bare.setups[0]), estimate.values), estimate.values)
-        return cls(bare, model, guess_of(bare, estimate))
+    def of(cls, labelling: Labelling, board: Board) -> PeakAssignment:
+        """The modes at the constants of a labelling of some peaks of `board`."""
+        estimate = weighted_least_squares(labelling.board)
+        model = with_other_modes(setup_model(system_of(board, board.setups[0]), estimate.values), estimate.values)
+        return cls(board, model, guess_of(board, estimate))
 
     def with_peaks(self, board: Board) -> PeakAssignment:
         """The same with other peaks of the setup: signs joined to the same frequencies."""
@@ -57,7 +57,7 @@ class PeakAssignment:
     def probabilities(self, evidence: Floats | None) -> Floats:
         """Probability of each peak to be each mode, with further `evidence` in ln: (n_peaks, n_modes) array."""
         result = np.empty(self._likelihood.log_prior.shape)
-        result[self._likelihood.bare] = self._likelihood_with(evidence).probabilities(*self._draws)
+        result[self._likelihood.unlabelled] = self._likelihood_with(evidence).probabilities(*self._draws)
         return result
 
     def gain(self, evidence: Floats) -> float:
@@ -95,14 +95,14 @@ class PeakAssignment:
     def _likelihood_with(self, evidence: Floats | None) -> PeakLikelihood:
         if evidence is None:
             return self._likelihood
-        return replace(self._likelihood, log_prior=self._likelihood.log_prior + evidence[self._likelihood.bare])
+        return replace(self._likelihood, log_prior=self._likelihood.log_prior + evidence[self._likelihood.unlabelled])
 
     @cached_property
     def _draws(self) -> tuple[Floats, Floats]:
         """ln f of all modes at every draw, and the noise there."""
         free, values = np.exp(self.guess.log_rigidities).T, self.guess.values
         drawn_values = {**values, **self.board.symmetry.rigidities(free, values["poisson_xy"])}
-        log_frequencies = self.model.every_log_frequency(drawn_values, "linear")
+        log_frequencies = self.model.mode_log_frequencies(drawn_values, "linear")
         usable = np.isfinite(log_frequencies).all(axis=1)
         return log_frequencies[usable], np.full(int(usable.sum()), self.guess.noise)
 
@@ -118,4 +118,4 @@ class PeakAssignment:
         indices = {
             (parity, int(rank)): i for i, (parity, rank) in enumerate(zip(modes.parities, modes.ranks, strict=True))
         }
-        return np.array([indices[mode.place.parity, mode.place.rank] for mode in self.model.others], dtype=np.intp)
+        return np.array([indices[mode.place.parity, mode.place.rank] for mode in self.model.other_modes], dtype=np.intp)

@@ -39,7 +39,7 @@ from bayesplate.commands.options import (
     Seed,
     path_option,
 )
-from bayesplate.commands.shown import Printout, show_batch
+from bayesplate.commands.printout import Printout, show_batch
 from bayesplate.commands.workers import dask_cluster, worker_processes
 from bayesplate.errors import BatchError, CheckpointError, RunInterrupted
 from bayesplate.files import write_text
@@ -140,7 +140,7 @@ class BatchResult:
         if self.summary.n_failed:
             raise BatchError(self.summary.failures_text(self.table.name))
 
-    def shown(self) -> Printout:
+    def printout(self) -> Printout:
         """Tables and sentences for a person."""
         return show_batch(self.summary, self.grading)
 

@@ -102,25 +102,25 @@ def _complaints(value: GradingRequest) -> Iterator[Complaint]:
     mappings: tuple[object, ...] = (value.match_percent, value.limits)
     if not all(isinstance(mapping, Mapping) for mapping in mappings):
         got = " and ".join(type(mapping).__name__ for mapping in mappings)
-        yield Complaint("dicts by the name of a figure", got, inside=("match_percent and limits",))
+        yield Complaint("dicts by the name of a figure", got, path=("match_percent and limits",))
         return
     for key, percent in value.match_percent.items():
         if key not in _MATCHED_FIGURES:
-            yield Complaint(f"names of {', '.join(_MATCHED_FIGURES)}", quote_text(str(key)), inside=("match_percent",))
+            yield Complaint(f"names of {', '.join(_MATCHED_FIGURES)}", quote_text(str(key)), path=("match_percent",))
         elif not _is_percent(percent):
             wanted = f"a positive number of per cent up to {_LARGEST_PERCENT:g}"
-            yield Complaint(wanted, repr(percent), inside=("match_percent", key))
+            yield Complaint(wanted, repr(percent), path=("match_percent", key))
     limits: Mapping[str, Any] = value.limits
     for key, limit in limits.items():
         if key not in FIGURES:
-            yield Complaint(f"names of {', '.join(FIGURES)}", quote_text(str(key)), inside=("limits",))
+            yield Complaint(f"names of {', '.join(FIGURES)}", quote_text(str(key)), path=("limits",))
         elif not isinstance(limit, tuple) or len(limit) != 2:
             wanted = "a pair (least, greatest), SI, None for no limit"
-            yield Complaint(wanted, repr(limit), inside=("limits", key))
+            yield Complaint(wanted, repr(limit), path=("limits", key))
         elif not _is_range(limit):
-            yield Complaint(_WANTED_RANGE, repr(limit), inside=("limits", key))
+            yield Complaint(_WANTED_RANGE, repr(limit), path=("limits", key))
     if value.rigidity is not None and not is_positive(value.rigidity):
-        yield Complaint("a positive number of N m, or None", repr(value.rigidity), inside=("rigidity",))
+        yield Complaint("a positive number of N m, or None", repr(value.rigidity), path=("rigidity",))
 
 
 def _is_percent(value: object) -> bool:

@@ -106,7 +106,7 @@ class Campaign:
 
 
 def dispatch_card(
-    given: Problem | CardSource | Campaign,
+    card: Problem | CardSource | Campaign,
     of_board: Callable[[Problem], OfBoard],
     of_campaign: Callable[[Campaign], OfCampaign],
     *,
@@ -120,18 +120,18 @@ def dispatch_card(
 
     Raises InputError as `Problem.from_card` and `Campaign.from_card`; also for a Campaign beside what it states itself.
     """
-    if isinstance(given, Campaign) or is_campaign(given):
+    if isinstance(card, Campaign) or is_campaign(card):
         if setup is not None:
             raise InputError(Fault("setup", "a board, whose setup it completes", "a campaign", "give it to each board"))
-        if not isinstance(given, Campaign):
-            return of_campaign(Campaign.from_card(given, effects, law, robust))
+        if not isinstance(card, Campaign):
+            return of_campaign(Campaign.from_card(card, effects, law, robust))
         if effects is not None or law is not None or robust:
             wanted, remedy = "nothing beside a Campaign", "Campaign.from_card takes it"
             raise InputError(Fault("effects, law, robust", wanted, "a value", remedy))
-        return of_campaign(given)
+        return of_campaign(card)
     return of_board(
         as_problem(
-            given, effects=effects, law=law, robust=robust, setup=setup, may_lack_frequencies=may_lack_frequencies
+            card, effects=effects, law=law, robust=robust, setup=setup, may_lack_frequencies=may_lack_frequencies
         )
     )
 

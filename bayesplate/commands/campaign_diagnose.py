@@ -35,7 +35,7 @@ from bayesplate.commands.campaign_fit import (
     fitted_boards,
 )
 from bayesplate.commands.fitting import FIT_TIME, FitResult, Run, Stages
-from bayesplate.commands.shown import Printout, show_campaign_diagnosis
+from bayesplate.commands.printout import Printout, show_campaign_diagnosis
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.claim import IMPROBABLE_BELOW
 from bayesplate.diagnosis.forms import forms
@@ -89,12 +89,12 @@ class CampaignDiagnoseResult:
         content: dict[str, Any] = as_json(self.diagnosis)
         return content
 
-    def shown(self) -> Printout:
+    def printout(self) -> Printout:
         """Tables and sentences for a person."""
         return show_campaign_diagnosis(self.diagnosis)
 
     def _repr_html_(self) -> str:
-        return self.shown().html(self.diagnosis.name)
+        return self.printout().html(self.diagnosis.name)
 
     def __repr__(self) -> str:
         diagnosis = self.diagnosis
@@ -147,9 +147,9 @@ def _diagnose_boards(campaign: Campaign, unshared: Campaign, run: Run) -> Campai
         after = campaign_result(with_shared, before, before, None, (), run.seed)
     left_out_boards: Mapping[str, TaughtBoard] = {}
     claim: SharedClaim | None = None
-    if after.learnt is not None:
+    if after.shared_posterior is not None:
         members = {name: FittedBoard(fit.inference, fit.draws, ()) for name, fit in before.items()}
-        left_out_boards = taught_boards(after.learnt, members, run.seed)
+        left_out_boards = taught_boards(after.shared_posterior, members, run.seed)
         claim = judge_shared_effect(left_out_boards)
     diagnosis = _diagnosis(
         campaign, verdict, effects, reason, search_explanations, left_out_boards, claim, before, after, run.seed

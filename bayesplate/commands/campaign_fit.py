@@ -31,7 +31,7 @@ from bayesplate.campaign.summary import (
 )
 from bayesplate.commands.campaign import Campaign
 from bayesplate.commands.fitting import FIT_TIME, FitResult, Run, Stages, convergence_error
-from bayesplate.commands.shown import Printout, show_campaign_fit
+from bayesplate.commands.printout import Printout, show_campaign_fit
 from bayesplate.errors import Fault, InputError, NotConvergedError
 from bayesplate.files import catch_write_errors, write_text
 from bayesplate.posterior.assessment import assess
@@ -73,7 +73,7 @@ class CampaignFitResult:
     summary: CampaignSummary
     boards: Mapping[str, FitResult]
     alone: Mapping[str, FitResult]
-    learnt: SharedPosterior | None
+    shared_posterior: SharedPosterior | None
     population: Population | None
 
     @cached_property
@@ -98,10 +98,10 @@ class CampaignFitResult:
         InputError
             If nothing is shared.
         """
-        if self.learnt is None:
+        if self.shared_posterior is None:
             wanted, remedy = "a campaign that shares something", "every board has its own draws: boards[NAME]"
             raise InputError(Fault("to_arviz", wanted, "nothing shared", remedy))
-        return to_arviz(shared_tree(self.learnt, self._attributes))
+        return to_arviz(shared_tree(self.shared_posterior, self._attributes))
 
     @property
     def _attributes(self) -> dict[str, str]:
@@ -128,19 +128,19 @@ class CampaignFitResult:
                 fit.write_page(folder / BOARDS_FOLDER / name)
         if self.prior is not None:
             write_text(folder / f"{self.prior.name}.toml", self.prior.to_toml())
-        if self.learnt is not None:
-            write_tree(folder / ARCHIVE_FILE, shared_tree(self.learnt, self._attributes))
+        if self.shared_posterior is not None:
+            write_tree(folder / ARCHIVE_FILE, shared_tree(self.shared_posterior, self._attributes))
         write_text(folder / SUMMARY_FILE, json_text(self.summary))
         if report:
             with catch_write_errors(folder / PAGE_FILE):
                 write_campaign_report(folder, self.campaign.card.title, self.summary, diagnosis)
 
-    def shown(self) -> Printout:
+    def printout(self) -> Printout:
         """Tables and sentences for a person."""
         return show_campaign_fit(self.summary)
 
     def _repr_html_(self) -> str:
-        return self.shown().html(self.campaign.card.title or self.campaign.name)
+        return self.printout().html(self.campaign.card.title or self.campaign.name)
 
     def __repr__(self) -> str:
         return repr(self.summary).replace("<CampaignSummary", "<CampaignFitResult", 1)
@@ -157,9 +157,9 @@ def fit_campaign(campaign: Campaign, run: Run, *, report: bool) -> CampaignFitRe
 
 
 @contextmanager
-def campaign_run(campaign: Campaign, run: Run, left: float, place: str = "") -> Iterator[None]:
+def campaign_run(campaign: Campaign, run: Run, remaining_time: float, place: str = "") -> Iterator[None]:
     """A run that begins with each board alone, at a place of the checkpoint; summary.json states a failure."""
-    run.open({f"{place}{BOARDS_FOLDER}/{problem.board.name}": problem for problem in campaign.problems}, left)
+    run.open({f"{place}{BOARDS_FOLDER}/{problem.board.name}": problem for problem in campaign.problems}, remaining_time)
     try:
         yield
     except NotConvergedError as error:
@@ -181,7 +181,7 @@ def fit_boards(campaign: Campaign, run: Run, place: str = "") -> dict[str, FitRe
     """Fit every board alone, one after another, each with a folder of its own at a place of the checkpoint."""
     names = [problem.board.name for problem in campaign.problems]
     return {
-        name: run.fit(problem, f"{place}{BOARDS_FOLDER}/{name}", f"board {name}", of=f"board {name}")
+        name: run.fit(problem, f"{place}{BOARDS_FOLDER}/{name}", f"board {name}", subject=f"board {name}")
         for name, problem in zip(names, campaign.problems, strict=True)
     }
 
@@ -190,22 +190,22 @@ def fit_together(campaign: Campaign, run: Run) -> CampaignFitResult:
     """Fit boards and the parameters that they share; nothing is written but checkpoints."""
     alone = fit_boards(campaign, run)
     run.stages.begin("what the boards share", SHARED_TIME)
-    learnt, boards, warnings = _fit_shared(campaign, alone, run.seed, run.stages)
-    return campaign_result(campaign, alone, boards, learnt, warnings, run.seed)
+    shared_posterior, boards, warnings = _fit_shared(campaign, alone, run.seed, run.stages)
+    return campaign_result(campaign, alone, boards, shared_posterior, warnings, run.seed)
 
 
 def campaign_result(
     campaign: Campaign,
     alone: Mapping[str, FitResult],
     boards: Mapping[str, FitResult],
-    learnt: SharedPosterior | None,
+    shared_posterior: SharedPosterior | None,
     warnings: tuple[str, ...],
     seed: int,
 ) -> CampaignFitResult:
     """The result of fitted boards, with the population of their constants where they share one."""
-    population = _population(campaign, boards, learnt, seed)
-    summary = _summary(campaign, boards, learnt, population, warnings, seed)
-    return CampaignFitResult(None, campaign, summary, boards, alone, learnt, population)
+    population = _population(campaign, boards, shared_posterior, seed)
+    summary = _summary(campaign, boards, shared_posterior, population, warnings, seed)
+    return CampaignFitResult(None, campaign, summary, boards, alone, shared_posterior, population)
 
 
 def _fit_shared(
@@ -215,44 +215,45 @@ def _fit_shared(
     if not campaign.shared:
         return None, alone, ()
     members = [FittedBoard(fit.inference, fit.draws, campaign.shared) for fit in alone.values()]
-    learnt = learn_shared(members, SamplerSettings(seed=seed), stages.sampled)
-    if not learnt.convergence.passed:
-        raise convergence_error(learnt.convergence, of="what the boards share")
+    shared_posterior = learn_shared(members, SamplerSettings(seed=seed), stages.sampled)
+    if not shared_posterior.convergence.passed:
+        raise convergence_error(shared_posterior.convergence, subject="what the boards share")
     boards, effective = {}, {}
-    for i, member in enumerate(learnt.members):
+    for i, member in enumerate(shared_posterior.members):
         rng = np.random.default_rng([seed, _BOARD_STREAM, i])
-        inference, draws, effective[member.name] = learnt.board(i, rng, seed)
+        inference, draws, effective[member.name] = shared_posterior.board(i, rng, seed)
         fit_alone = alone[member.name]
         assessment = assess(inference, draws)
         sha256 = fit_alone.problem.prepared.card.sha256
         summary = summarise(inference, draws, assessment, seed, versions(), sha256)
         boards[member.name] = FitResult(fit_alone.problem, inference, draws, summary)
-    return learnt, boards, learning_warnings(learnt, effective)
+    return shared_posterior, boards, learning_warnings(shared_posterior, effective)
 
 
 def _population(
-    campaign: Campaign, boards: Mapping[str, FitResult], learnt: SharedPosterior | None, seed: int
+    campaign: Campaign, boards: Mapping[str, FitResult], shared_posterior: SharedPosterior | None, seed: int
 ) -> Population | None:
     if campaign.population is None:
         return None
     unscattered = [i for i, parameter in enumerate(campaign.shared) if not parameter.scatter]
     common, z = np.zeros((0, 0)), dict.fromkeys(boards)
-    if learnt is not None and unscattered:
-        common = learnt.together.moments()[1][np.ix_(unscattered, unscattered)]
+    if shared_posterior is not None and unscattered:
+        common = shared_posterior.combined.moments()[1][np.ix_(unscattered, unscattered)]
         z = {
-            member.name: member.given.z_of(boards[member.name].draws.flat)[:, unscattered] for member in learnt.members
+            member.name: member.conditional.z_of(boards[member.name].draws.flat)[:, unscattered]
+            for member in shared_posterior.members
         }
     constants = [BoardConstants.of(fit.inference, fit.draws, z[name]) for name, fit in boards.items()]
     population = find_population(constants, campaign.population, SamplerSettings(seed=seed), common)
     if not population.convergence.passed:
-        raise convergence_error(population.convergence, of="the population of the boards' constants")
+        raise convergence_error(population.convergence, subject="the population of the boards' constants")
     return population
 
 
 def _summary(
     campaign: Campaign,
     boards: Mapping[str, FitResult],
-    learnt: SharedPosterior | None,
+    shared_posterior: SharedPosterior | None,
     population: Population | None,
     warnings: tuple[str, ...],
     seed: int,
@@ -266,15 +267,17 @@ def _summary(
         versions=versions(),
         card_sha256=campaign.card.sha256,
         converged=True,
-        shared={} if learnt is None else shared_numbers(learnt, seed),
-        left_out_boards={} if learnt is None else judge_left_out_boards(learnt.together),
+        shared={} if shared_posterior is None else shared_numbers(shared_posterior, seed),
+        left_out_boards={} if shared_posterior is None else judge_left_out_boards(shared_posterior.combined),
         common_residual=common_residuals(summaries, fitted_boards(boards)),
         population=None if population is None or prior is None else population_summary(population, prior.name, seed),
         boards=summaries,
-        sampler=None if learnt is None else sampler_health(learnt.chains, learnt.convergence),
+        sampler=None
+        if shared_posterior is None
+        else sampler_health(shared_posterior.chains, shared_posterior.convergence),
         warnings=warnings,
     )
 
 
-def fitted_boards(found: Mapping[str, FitResult]) -> dict[str, Board]:
-    return {name: fit.inference.problem.board for name, fit in found.items()}
+def fitted_boards(fits: Mapping[str, FitResult]) -> dict[str, Board]:
+    return {name: fit.inference.problem.board for name, fit in fits.items()}

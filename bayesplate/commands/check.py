@@ -9,8 +9,8 @@ from typing import Annotated
 import numpy as np
 
 from bayesplate.board.material import MODULI, moduli
-from bayesplate.campaign.given import ConditionalPosterior
-from bayesplate.campaign.pulls import NormalLikelihood, prior_moments
+from bayesplate.campaign.conditional import ConditionalPosterior
+from bayesplate.campaign.normal_likelihood import NormalLikelihood, prior_moments
 from bayesplate.campaign.scatter import expected_width
 from bayesplate.campaign.shared import SharedParameter
 from bayesplate.campaign.summary import CampaignCheck, SharedNumberCheck
@@ -18,8 +18,8 @@ from bayesplate.commands.arguments import check_arguments
 from bayesplate.commands.campaign import Campaign, dispatch_card
 from bayesplate.commands.options import CARD, Effects, SetupFile
 from bayesplate.commands.prepare import CardSource
+from bayesplate.commands.printout import Printout, show_campaign_check, show_check
 from bayesplate.commands.problem import Problem
-from bayesplate.commands.shown import Printout, show_campaign_check, show_check
 from bayesplate.diagnosis.signatures import INVISIBLE_CHANGES, Signature, look_alikes, signatures
 from bayesplate.diagnosis.terms import normalised_weights
 from bayesplate.estimates.identifiability import identifiability_remarks
@@ -59,23 +59,23 @@ class CheckResult(CheckReport):
     def __repr__(self) -> str:
         return super().__repr__().replace("<CheckReport", "<CheckResult", 1)
 
-    def shown(self) -> Printout:
+    def printout(self) -> Printout:
         """Tables and sentences for a person."""
         return show_check(self)
 
     def _repr_html_(self) -> str:
-        return self.shown().html(self.title or self.name)
+        return self.printout().html(self.title or self.name)
 
 
 class CampaignCheckResult(CampaignCheck):
     """Result of `check` for a campaign: all of `CampaignCheck`."""
 
-    def shown(self) -> Printout:
+    def printout(self) -> Printout:
         """Tables and sentences for a person."""
         return show_campaign_check(self)
 
     def _repr_html_(self) -> str:
-        return self.shown().html(self.title or self.name)
+        return self.printout().html(self.title or self.name)
 
 
 @check_arguments()

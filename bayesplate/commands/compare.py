@@ -12,8 +12,8 @@ from bayesplate.commands.check import expected_sd
 from bayesplate.commands.fitting import convergence_error
 from bayesplate.commands.options import CARD, CoefficientChoice, CompareOut, Effects, Force, OnProgress, Seed
 from bayesplate.commands.prepare import CardSource
+from bayesplate.commands.printout import Printout, show_compare
 from bayesplate.commands.problem import Problem, as_problem
-from bayesplate.commands.shown import Printout, show_compare
 from bayesplate.effects import EFFECTS
 from bayesplate.estimates.coefficients import named_table
 from bayesplate.estimates.leave_one_out import CarryingMode, unite_carrying_modes
@@ -88,12 +88,12 @@ class CompareResult(Comparison):
     def __repr__(self) -> str:
         return super().__repr__().replace("<Comparison", "<CompareResult", 1)
 
-    def shown(self) -> Printout:
+    def printout(self) -> Printout:
         """Tables and sentences for a person."""
         return show_compare(self)
 
     def _repr_html_(self) -> str:
-        return self.shown().html(f"{self.name}: every method side by side")
+        return self.printout().html(f"{self.name}: every method side by side")
 
 
 @check_arguments()
@@ -213,5 +213,5 @@ def _posteriors(
 def _sample(problem: PosedProblem, settings: SamplerSettings, progress: OnProgress) -> tuple[Inference, Draws]:
     inference = infer(problem, settings, progress=progress)
     if not inference.convergence.passed:
-        raise convergence_error(inference.convergence, problem.doubts, so="nothing is compared")
+        raise convergence_error(inference.convergence, problem.doubts, consequence="nothing is compared")
     return with_likely_labels(inference, settings.seed)

@@ -21,8 +21,8 @@ from bayesplate.commands.campaign_diagnose import CampaignDiagnoseResult, diagno
 from bayesplate.commands.fitting import FIT_TIME, FitResult, Run, with_board
 from bayesplate.commands.options import CARD, Effects, Force, OnProgress, Out, Report, Resume, Seed, SetupFile
 from bayesplate.commands.prepare import CardSource
+from bayesplate.commands.printout import Printout, show_diagnosis
 from bayesplate.commands.problem import Problem
-from bayesplate.commands.shown import Printout, show_diagnosis
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.claim import Claim, effects_named_in_part, judge_claim, nested_errors_of_board
 from bayesplate.diagnosis.findings import Case, FittedModel, diagnosis_of
@@ -94,7 +94,7 @@ class DiagnoseResult:
         """The content of diagnosis.json."""
         return diagnosis_json(self.diagnosis)
 
-    def shown(self) -> Printout:
+    def printout(self) -> Printout:
         """Tables and sentences for a person."""
         return show_diagnosis(self.diagnosis)
 
@@ -194,23 +194,25 @@ def _diagnose_fit(problem: Problem, before: FitResult, run: Run, n_null: int) ->
     stages.begin("effects that are known", _KNOWN_TIME)
     known_effect_fits = known_fits(posed, stages.reached)
     stages.begin("the same search on simulated boards", _CONTROL_TIME)
-    control = null_control(ground, np.random.default_rng([run.seed, _NULL_STREAM]), n_null, search.against_none)
+    control = null_control(ground, np.random.default_rng([run.seed, _NULL_STREAM]), n_null, search.log_odds)
     verdict = decide_verdict(search, control)
-    folds = nested_errors_of_board(search, control, verdict.tried)
+    folds = nested_errors_of_board(search, control, verdict.judged_index)
     in_part = effects_named_in_part(search, verdict, folds)
-    finalists = verdict.fitted_again[:_MOST_FINALISTS]
-    stages.left = FIT_TIME * len(finalists) + (_CHOICE_TIME if verdict.index else 0.0)
+    finalists = verdict.refitted_explanations[:_MOST_FINALISTS]
+    stages.remaining_time = FIT_TIME * len(finalists) + (_CHOICE_TIME if verdict.index else 0.0)
     refits, failures = _refit_finalists(problem, run, search, finalists)
     fits = {0: before, **refits}
-    final_index = verdict.tried if (verdict.index or in_part) and verdict.tried in fits else 0
+    final_index = verdict.judged_index if (verdict.index or in_part) and verdict.judged_index in fits else 0
     after = fits[final_index]
     known_carrying = (carrying_modes(posed.board, fit.errors.leverages, MODULI) for fit in known_effect_fits)
     fit_carrying = (fit.summary.carrying_modes for fit in fits.values())
-    united_modes = unite_carrying_modes(find_carrying_modes(search, verdict.tried), *fit_carrying, *known_carrying)
+    united_modes = unite_carrying_modes(
+        find_carrying_modes(search, verdict.judged_index), *fit_carrying, *known_carrying
+    )
     folds = folds and folds.without(indices_of(united_modes, posed.board))
-    if verdict.index and folds is not None and folds.counted.any():
+    if verdict.index and folds is not None and folds.is_counted.any():
         stages.begin("the same search on simulated boards, made to choose", _CHOICE_TIME)
-        control = force_choices(ground, control, float(folds.ratio[0]), folds.carried)
+        control = force_choices(ground, control, float(folds.ratio[0]), folds.carrying_readings)
     notes = [*after.inference.problem.doubts, *failures]  # a doubt that an effect explains is none any more
     if final_index:
         effect_words = next(
@@ -223,23 +225,23 @@ def _diagnose_fit(problem: Problem, before: FitResult, run: Run, n_null: int) ->
     }
     diagnosis = diagnosis_of(
         Case(
-            found=search,
+            result=search,
             verdict=verdict,
             control=control,
-            folded=folds,
+            nested_errors=folds,
             before=fitted_models[0],
             after=fitted_models[final_index],
             claim=judge_claim(search, verdict, control, folds) if final_index else Claim(),
             recommendation=advice(search, verdict, before.problem.prior, run.seed),
-            known=known_effect_fits,
+            known_fits=known_effect_fits,
             stated_claims=stated_claims(posed, known_effect_fits) if known_effect_fits else (),
             finalists=[
                 (finalist, fitted_models[finalist.index]) for finalist in finalists if finalist.index in fitted_models
             ],
-            has_slip=bool(posed.slips),
+            has_slip=bool(posed.slip_remarks),
             notes=tuple(notes),
-            in_part=in_part,
-            carrying=united_modes,
+            effects_in_part=in_part,
+            carrying_modes=united_modes,
         )
     )
     return diagnosis, after
@@ -265,10 +267,10 @@ def _measured_frequencies(fit: FitResult) -> NDArray[np.float64]:
     return np.concatenate([setup.measured for setup in fit.inference.problem.board.setups])
 
 
-def advice(found: SearchResult, verdict: Verdict, prior: PriorCard, seed: int) -> str:
+def advice(result: SearchResult, verdict: Verdict, prior: PriorCard, seed: int) -> str:
     """What to do next: read a wrong reading again, or the first line of the plan; empty if nothing would help."""
     if verdict.word == "unexplained":
-        return wrong_reading(found)
-    survivors = surviving_explanations(found, [explanation.members for explanation in verdict.stands_for])
-    planner = Planner(search_beliefs(found, prior, random_stream(seed, BELIEFS_STREAM), survivors), seed)
-    return plan_first_line(planner, planner.ranked())
+        return wrong_reading(result)
+    survivors = surviving_explanations(result, [explanation.members for explanation in verdict.explanations])
+    planner = Planner(search_beliefs(result, prior, random_stream(seed, BELIEFS_STREAM), survivors), seed)
+    return plan_first_line(planner, planner.rank_proposals())

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from bayesplate.board.board import Board
+from bayesplate.commands.printout import Printout, show_fit
 from bayesplate.commands.problem import Problem, pose_all
-from bayesplate.commands.shown import Printout, show_fit
 from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.errors import CheckpointError, NotConvergedError
 from bayesplate.files import catch_write_errors, make_folder, write_text
@@ -102,12 +102,12 @@ class FitResult:
     def __repr__(self) -> str:
         return repr(self.summary).replace("<Summary", "<FitResult", 1)
 
-    def shown(self) -> Printout:
+    def printout(self) -> Printout:
         """Tables and sentences for a person."""
         return show_fit(self.summary)
 
     def _repr_html_(self) -> str:
-        return self.shown().html(self.problem.board.title or self.summary.name)
+        return self.printout().html(self.problem.board.title or self.summary.name)
 
 
 @dataclass
@@ -115,7 +115,7 @@ class Stages:
     """The progress of a run of several stages: reports each stage, and the share that is done, which never falls."""
 
     tell: Callable[[Progress], None] | None
-    left: float  # relative time of the stages that have not begun
+    remaining_time: float  # relative time of the stages that have not begun
     _stage: str = ""
     _past: float = 0.0
     _length: float = 0.0
@@ -125,7 +125,7 @@ class Stages:
         """Begin the next stage, of a relative length."""
         self._past += self._length
         self._stage, self._length = stage, length
-        self.left = max(self.left - length, 0.0)
+        self.remaining_time = max(self.remaining_time - length, 0.0)
         self.reached(0.0)
 
     def sampled(self, progress: Progress) -> None:
@@ -134,7 +134,7 @@ class Stages:
 
     def reached(self, share: float, progress: Progress | None = None) -> None:
         """Report that a share of the stage is done."""
-        total = self._past + self._length + self.left
+        total = self._past + self._length + self.remaining_time
         self._done = max(self._done, (self._past + share * self._length) / total)
         if self.tell is not None:
             self.tell(replace(progress or Progress(0, 0), stage=self._stage, done=self._done))
@@ -161,12 +161,13 @@ class Run:
         """Where the files go; None if nothing is to be written."""
         return None if self.folder is None else self.folder.path
 
-    def open(self, first: Mapping[str, Problem], left: float = 0.0) -> None:
-        """Pose the problems fitted first, by place in the checkpoint, and open the folder; `left` as of `Stages`.
+    def open(self, first: Mapping[str, Problem], remaining_time: float = 0.0) -> None:
+        """Pose the problems fitted first, by place in the checkpoint, and open the folder.
 
-        Raises InputError, NotIdentifiableError or CheckpointError; every refusal comes before a file is written.
+        `remaining_time` is as of `Stages`. Raises InputError, NotIdentifiableError or CheckpointError; every refusal
+        comes before a file is written.
         """
-        self.stages.left = left
+        self.stages.remaining_time = remaining_time
         if self.folder is not None:
             self.folder.require_usable(force=self._force, resume=self._resume)
         pose_all(list(first.values()))
@@ -181,7 +182,7 @@ class Run:
             self.folder.open(resume=self._resume)
 
     def fit(
-        self, problem: Problem, place: str = "", stage: str = "", *, of: str = "", tells_failure: bool = False
+        self, problem: Problem, place: str = "", stage: str = "", *, subject: str = "", tells_failure: bool = False
     ) -> FitResult:
         """Fit one problem; see `compute_fit`. Without a `stage` the progress of the sampler alone is reported."""
         if stage:
@@ -189,7 +190,7 @@ class Run:
         checkpoints = None if self.folder is None else self.folder.checkpoint / place
         progress = self.stages.sampled if stage else self.stages.tell
         failure = self.path if tells_failure else None
-        return compute_fit(problem, self.seed, checkpoints, progress, of=of, failure=failure)
+        return compute_fit(problem, self.seed, checkpoints, progress, subject=subject, failure=failure)
 
 
 def fit_problem(problem: Problem, run: Run, *, report: bool) -> FitResult:
@@ -215,7 +216,7 @@ def compute_fit(
     checkpoints: Path | None = None,  # one subfolder per law
     progress: Callable[[Progress], None] | None = None,
     *,
-    of: str = "",  # what is fitted, for the error of a run that fits more than one board
+    subject: str = "",  # what is fitted, for the error of a run that fits more than one board
     failure: Path | None = None,  # where summary.json says that the sampler did not converge
 ) -> FitResult:
     """Sample a problem, and once more under the exact law if the draws show that the linear one does not serve."""
@@ -235,7 +236,7 @@ def compute_fit(
                     problem.prepared.card.sha256,
                 )
                 write_text(failure / SUMMARY_FILE, json_text(failed_summary))
-            raise convergence_error(convergence, inference.problem.doubts, of=of)
+            raise convergence_error(convergence, inference.problem.doubts, subject=subject)
         return with_likely_labels(inference, seed)
 
     inference, draws = sample(problem.posed)
@@ -251,10 +252,14 @@ def compute_fit(
 
 
 def convergence_error(
-    convergence: Convergence, doubts: Sequence[str] = (), *, of: str = "", so: str = "no constants are given"
+    convergence: Convergence,
+    doubts: Sequence[str] = (),
+    *,
+    subject: str = "",
+    consequence: str = "no constants are given",
 ) -> NotConvergedError:
     """The error of draws that failed the gate, with its consequence and likely causes."""
-    head = f"the sampler did not converge{f' for {of}' if of else ''}, so {so}:"
+    head = f"the sampler did not converge{f' for {subject}' if subject else ''}, so {consequence}:"
     return NotConvergedError("\n".join((head, *convergence.reasons, *(f"A likely cause: {doubt}" for doubt in doubts))))
 
 
@@ -272,7 +277,7 @@ def fingerprint(problem: Problem, posed: PosedProblem) -> str:
         "noise": [repr(setup.noise) for setup in posed.board.setups],
         "parameters": [repr(parameter) for parameter in posed.board.parameters],
         "effects": list(posed.board.effects),
-        "forms": [repr(effect) for effect in posed.board.chosen],
+        "forms": [repr(effect) for effect in posed.board.effect_forms],
         "readings": [repr(setup.readings) for setup in posed.board.setups],
         "peaks": [repr((setup.peaks, setup.missed, setup.spurious)) for setup in posed.board.setups],
         "attached": [repr(setup.attached) for setup in posed.board.setups],

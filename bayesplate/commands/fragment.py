@@ -78,10 +78,10 @@ def _label_comment(peak: PickedRow) -> str:
 
 def _place_lines(spectra: Spectra, sensor_mass: tuple[float, float] | None) -> list[str]:
     """Hammer and accelerometer, as far as they are known and a card can say them."""
-    hammers = list(dict.fromkeys(hammer for hammer, _ in spectra.between if hammer is not None))
-    sensors = list(dict.fromkeys(sensor for _, sensor in spectra.between if sensor is not None))
+    hammers = list(dict.fromkeys(hammer for hammer, _ in spectra.place_pairs if hammer is not None))
+    sensors = list(dict.fromkeys(sensor for _, sensor in spectra.place_pairs if sensor is not None))
     lines = []
-    if len(hammers) == 1 and len(spectra.between) == 1:
+    if len(hammers) == 1 and len(spectra.place_pairs) == 1:
         lines += ["", "[setup.hammer]", f"at_mm = {toml_value(_place_mm(hammers[0]))}"]
     if sensors and spectra.motion != "pressure":
         places = [_place_mm(sensor) for sensor in sensors]

@@ -13,8 +13,8 @@ from bayesplate.board.board import Values
 from bayesplate.commands.arguments import check_arguments
 from bayesplate.commands.options import CARD, Effects, Force, Out, Seed, SetupFile
 from bayesplate.commands.prepare import CardSource, PreparedBoard
+from bayesplate.commands.printout import Printout, show_modes
 from bayesplate.commands.problem import Problem, as_problem
-from bayesplate.commands.shown import Printout, show_modes
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.identifiability import identifiability, require_identifiable, require_labels
 from bayesplate.estimates.least_squares import weighted_least_squares
@@ -59,12 +59,12 @@ class ModesResult:
     def __repr__(self) -> str:
         return repr(self.summary).replace("<ModesReport", "<ModesResult", 1)
 
-    def shown(self) -> Printout:
+    def printout(self) -> Printout:
         """Tables and sentences for a person."""
         return show_modes(self.summary)
 
     def _repr_html_(self) -> str:
-        return self.shown().html(self.summary.title or self.summary.name)
+        return self.printout().html(self.summary.title or self.summary.name)
 
 
 @check_arguments()

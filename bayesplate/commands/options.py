@@ -46,9 +46,9 @@ class Option:
         else:
             yield click.Argument([name], **settings)
 
-    def value(self, name: str, told: Mapping[str, Any], about: Any) -> Any:
+    def value(self, name: str, values: Mapping[str, Any], first_argument: Any) -> Any:
         """The argument, from all options that were given; `otherwise` derives it from the command's first argument."""
-        return self.otherwise(about) if told[name] is None and self.otherwise is not None else told[name]
+        return self.otherwise(first_argument) if values[name] is None and self.otherwise is not None else values[name]
 
 
 class OptionGroup:
@@ -61,8 +61,8 @@ class OptionGroup:
         for option_name, option in self.options.items():
             yield from option.parameters(option_name, None)
 
-    def value(self, name: str, told: Mapping[str, Any], about: Any) -> Any:
-        return self.join(**{option_name: told[option_name] for option_name in self.options})
+    def value(self, name: str, values: Mapping[str, Any], first_argument: Any) -> Any:
+        return self.join(**{option_name: values[option_name] for option_name in self.options})
 
 
 def options_of(function: Callable[..., Any]) -> dict[str, Option | OptionGroup]:
@@ -82,9 +82,9 @@ def path_option(*names: str, **settings: Any) -> Option:
     return Option(*names, type=click.Path(readable=False), **settings)
 
 
-def refuse_both(one: object, other: object, why: str) -> None:
+def refuse_both(first: object, second: object, why: str) -> None:
     """Refuse options that exclude each other; raises click.UsageError."""
-    if one and other:
+    if first and second:
         raise click.UsageError(f"{why}: give one of them.")
 
 
@@ -121,9 +121,9 @@ def _read_costs(value: object) -> object:
     for key, minutes in value.items():
         if key not in Costs.names():
             hint = did_you_mean(key, Costs.names()) if isinstance(key, str) else ""
-            complaints += refusal_of(f"one of {', '.join(Costs.names())}", key, hint).inside(str(key))
+            complaints += refusal_of(f"one of {', '.join(Costs.names())}", key, hint).complaints_below(str(key))
         elif not is_positive(minutes):
-            complaints += refusal_of("a positive number of minutes", minutes).inside(key)
+            complaints += refusal_of("a positive number of minutes", minutes).complaints_below(key)
     if complaints:
         raise Refusal(*complaints)
     return value

@@ -34,7 +34,7 @@ from bayesplate.commands.pick_options import (
 )
 from bayesplate.commands.pick_words import moved_hit_remarks, show_pick
 from bayesplate.commands.prepare import PreparedBoard, prepare
-from bayesplate.commands.shown import Printout
+from bayesplate.commands.printout import Printout
 from bayesplate.errors import Fault, InputError, NotIdentifiableError, printable
 from bayesplate.files import make_folder, require_new_files, write_text
 from bayesplate.recordings.contract import LabelChance, PickedRow, PickReport
@@ -79,12 +79,12 @@ class PickResult:
         hertz = ", ".join(f"{peak.hz:.1f}" for peak in self.summary.likely[:8])
         return f"<PickResult of {', '.join(self.summary.files[:3])}: {len(self.summary.likely)} modes, Hz: {hertz}>"
 
-    def shown(self) -> Printout:
+    def printout(self) -> Printout:
         """Tables and sentences for a person."""
         return show_pick(self.summary)
 
     def _repr_html_(self) -> str:
-        return self.shown().html("Picked modes")
+        return self.printout().html("Picked modes")
 
 
 @check_arguments(place_faults, lambda arguments: band_faults(arguments, LOWEST, HIGHEST))
@@ -263,13 +263,13 @@ def _summary(
     numbers = [number for number, peak in enumerate(picked.peaks) if peak.is_likely]
     peaks = [
         replace(peak, sign=picked.sign(answer, flips))
-        for peak, answer in zip(picked.peaks, picked.answers, strict=True)
+        for peak, answer in zip(picked.peaks, picked.mobilities, strict=True)
     ]
     stated_labels: dict[int, tuple[str, float]] = {}
     if labels is not None:
         for number, chances in zip(numbers, labels.probabilities, strict=True):
             peaks[number] = _with_labels(peaks[number], chances)
-        stated_labels = _surest_labels({number: labels.stated(i) for i, number in enumerate(numbers)})
+        stated_labels = _surest_labels({number: labels.label_to_state(i) for i, number in enumerate(numbers)})
     remarks += moved_hit_remarks(peaks, picked.spectra.duration)
     text = fragment_text(
         peaks,
@@ -283,7 +283,7 @@ def _summary(
         format=1,
         files=names,
         n_hits=len(picked.spectra.names),
-        n_places=len(picked.spectra.between),
+        n_places=len(picked.spectra.place_pairs),
         seconds=picked.spectra.duration,
         lowest_hz=picked.lowest,
         highest_hz=picked.highest,

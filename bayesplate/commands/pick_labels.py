@@ -65,7 +65,7 @@ class Labels:
     flips: bool | None  # whether force and response have opposite polarity; None if that does not show
     doubts: tuple[str, ...] = ()  # places or pictures that contradict the frequencies
 
-    def stated(self, peak: int) -> tuple[str, float] | None:
+    def label_to_state(self, peak: int) -> tuple[str, float] | None:
         """The label that a card may state, and the confidence in it; None where it is left to the fit.
 
         The fit does not use sand and residues: where they agree with the label, theirs is the confidence. It uses the
@@ -99,11 +99,13 @@ def label_peaks(
     doubts = []
     if max(assignment.gain(_residue_matrix(assignment, picked)) for assignment in assignments) < _CONTRADICTION_GAIN:
         doubts.append(_WRONG_PLACES_DOUBT)
-        picked = replace(picked, spectra=replace(picked.spectra, between=((None, None),) * len(picked.spectra.between)))
+        picked = replace(
+            picked, spectra=replace(picked.spectra, place_pairs=((None, None),) * len(picked.spectra.place_pairs))
+        )
     if flips is None:
         flips = _find_polarity(assignments, shares, picked)
     if flips is not None:
-        signs = [picked.sign(answer, flips) for answer in picked.likely_answers]
+        signs = [picked.sign(answer, flips) for answer in picked.likely_mobilities]
         assignments = [assignment.with_peaks(_bare_board(board, likely, signs)) for assignment in assignments]
     doubts += _picture_doubts(assignments[int(np.argmax(shares))], likely, pictures)
     evidence = [_combined_evidence(assignment, picked, pictures) for assignment in assignments]
@@ -159,15 +161,15 @@ def _residues(assignment: PeakAssignment, picked: PickedModes) -> Floats | None:
         return None
     columns = [
         assignment.deflections(hammer) * assignment.deflections(sensor)
-        for hammer, sensor in picked.spectra.between
+        for hammer, sensor in picked.spectra.place_pairs
         if hammer is not None and sensor is not None
     ]
-    return np.stack(columns, axis=1) if len(columns) == len(picked.spectra.between) else None
+    return np.stack(columns, axis=1) if len(columns) == len(picked.spectra.place_pairs) else None
 
 
 def _residue_evidence(assignment: PeakAssignment, picked: PickedModes, residues: Floats) -> tuple[Floats, float]:
     """Evidence of the residues for each pair of a likely peak and a mode, and for the polarity."""
-    answers = picked.likely_answers
+    answers = picked.likely_mobilities
     measured, sd = (
         np.array([np.real(answer.mobility) for answer in answers]),
         np.array([answer.sd for answer in answers]),
@@ -190,7 +192,7 @@ def _find_polarity(assignments: Sequence[PeakAssignment], shares: Floats, picked
         if (residues := _residues(assignment, picked)) is None:
             return None
         if residues.shape[1] == 1:
-            answers = picked.likely_answers
+            answers = picked.likely_mobilities
             signs = [
                 np.sign(answer.mobility[0].real) if answer.complexity < _MOST_COMPLEX else 0.0 for answer in answers
             ]

@@ -104,22 +104,22 @@ def _read_pictures(value: object) -> object:
     complaints = []
     for hertz, picture in value.items():
         if not is_positive(hertz):
-            complaints += refusal_of("a frequency in Hz", hertz).inside(value_text(hertz))
+            complaints += refusal_of("a frequency in Hz", hertz).complaints_below(value_text(hertz))
         try:
             read_path(picture)
         except Refusal as refusal:
-            complaints += refusal.inside(value_text(hertz))
+            complaints += refusal.complaints_below(value_text(hertz))
     if complaints:
         raise Refusal(*complaints)
     return value
 
 
-def place_faults(given: Mapping[str, Any]) -> Iterator[Fault]:
+def place_faults(arguments: Mapping[str, Any]) -> Iterator[Fault]:
     """Faults of the places, of which there is none, one for all files or one for each file."""
-    files = given["files"]
+    files = arguments["files"]
     count = len(files) if isinstance(files, list | tuple) else 1
     for argument in ("hammer", "sensor"):
-        places = given.get(argument, ())
+        places = arguments.get(argument, ())
         if not isinstance(places, list | tuple) or len(places) not in (0, 1, count):
             wanted = f"no place, one for all files, or one for each of {count}"
             yield Fault(argument, wanted, str(len(places)) if isinstance(places, list | tuple) else value_text(places))
@@ -130,9 +130,9 @@ def place_faults(given: Mapping[str, Any]) -> Iterator[Fault]:
                 yield Fault(f"{argument} {number}", "a place (x, y) in m", value_text(place), "hammer=[(0.02, 0.02)]")
 
 
-def band_faults(given: Mapping[str, Any], lowest: float, highest: float) -> Iterator[Fault]:
+def band_faults(arguments: Mapping[str, Any], lowest: float, highest: float) -> Iterator[Fault]:
     """Faults of the band in which modes are looked for, whose ends are by default those given here."""
-    low, high = given.get("lowest", lowest), given.get("highest", highest)
+    low, high = arguments.get("lowest", lowest), arguments.get("highest", highest)
     if not (is_positive(low) and is_positive(high) and 2.0 * low <= high <= 20_000.0):
         wanted = "two frequencies in Hz, the second twice the first or more and at most 20000"
         yield Fault("lowest and highest", wanted, f"{value_text(low)} and {value_text(high)}")

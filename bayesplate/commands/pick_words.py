@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bayesplate.commands.shown import Printout
+from bayesplate.commands.printout import Printout
 from bayesplate.recordings.contract import PickedRow, PickReport
 from bayesplate.recordings.plausibility import UNLIKE_HITS
 from bayesplate.results.tables import Cell, Row, Table

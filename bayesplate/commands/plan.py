@@ -18,8 +18,8 @@ from bayesplate.commands.campaign import Campaign, dispatch_card
 from bayesplate.commands.fitting import Stages
 from bayesplate.commands.options import CARD, Effects, Force, Goal, Minutes, OnProgress, Out, RivalEffects, Seed
 from bayesplate.commands.prepare import CardSource, PreparedBoard
+from bayesplate.commands.printout import Printout, show_plan
 from bayesplate.commands.problem import Problem
-from bayesplate.commands.shown import Printout, show_plan
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.hypotheses import RELABELLING
 from bayesplate.diagnosis.joint import full_search
@@ -29,11 +29,11 @@ from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.files import make_folder, require_new_files, write_text
 from bayesplate.planning.beliefs import Beliefs, prior_beliefs
 from bayesplate.planning.bench import Bench, draw_up_plan
+from bayesplate.planning.campaign import campaign_beliefs
 from bayesplate.planning.explained import explanations_of_effects, search_beliefs, survivors_by_support
 from bayesplate.planning.gains import EXPLANATIONS
 from bayesplate.planning.plan import Plan
 from bayesplate.planning.proposals import BELIEFS_STREAM, Costs, Planner
-from bayesplate.planning.together import campaign_beliefs
 from bayesplate.report.plots import PlanPlots
 from bayesplate.results.contract import json_text
 from bayesplate.results.folder import DIAGNOSIS_FILE
@@ -72,12 +72,12 @@ class PlanResult:
     def __repr__(self) -> str:
         return repr(self.summary).replace("<Plan", "<PlanResult", 1)
 
-    def shown(self) -> Printout:
+    def printout(self) -> Printout:
         """Tables and sentences for a person."""
         return show_plan(self.summary)
 
     def _repr_html_(self) -> str:
-        return self.shown().html(self.summary.title or self.summary.name)
+        return self.printout().html(self.summary.title or self.summary.name)
 
 
 @check_arguments()
@@ -147,7 +147,7 @@ def plan(
         may_lack_frequencies=True,
     )
     files = () if folder is None else require_new_files(folder, _file_names(), force=force)
-    planner = Planner(request.believed(), seed, goal, Costs(**(costs or {})))
+    planner = Planner(request.compute_beliefs(), seed, goal, Costs(**(costs or {})))
     planned_card, priors = request.card, [problem.prior for problem in request.problems]
     new_plan, benches = draw_up_plan(
         planner, planned_card.name, planned_card.title, planned_card.sha256, priors, request.shared
@@ -164,7 +164,7 @@ class _PlanRequest:
     card: Board | CampaignCard
     problems: Sequence[Problem]
     shared: Sequence[SharedParameter]
-    believed: Callable[[], Beliefs]
+    compute_beliefs: Callable[[], Beliefs]
 
 
 def _file_names() -> list[str]:

@@ -97,7 +97,11 @@ def prepare_card(read: Board, named: NamedCards, effects: Sequence[str] | None =
     implied = implied_effects(stated_board)
     names = (*stated_board.effects, *implied) if effects is None else map(canonical_effect, effects)
     declared = tuple(dict.fromkeys(names))
-    board = replace(stated_board, effects=declared, implies=bool(declared) or (stated_board.implies and not implied))
+    board = replace(
+        stated_board,
+        effects=declared,
+        has_implied_effects=bool(declared) or (stated_board.has_implied_effects and not implied),
+    )
     faults = [*physical_faults(stated_board), *named.faults, *label_faults(board), *effect_faults(board)]
     if not faults:
         require_sides(board)
@@ -116,6 +120,6 @@ def _unstated_effects(board: Board, prepared: Board) -> Iterator[Fault]:
     for parameter in board.parameters:
         if parameter.is_of_effect and parameter.name in card_inputs and parameter.prior != card_inputs[parameter.name]:
             yield Fault(f"{board.name} {parameter.name}", "the prior of a declared effect", "another one", remedy)
-    if board.chosen:
-        forms = ", ".join(effect.name for effect in board.chosen)
+    if board.effect_forms:
+        forms = ", ".join(effect.name for effect in board.effect_forms)
         yield Fault(f"{board.name} chosen", "effects in the form that a card gives them", f"other forms of {forms}")

@@ -284,7 +284,7 @@ def pose_all(problems: Sequence[Problem]) -> None:
 
 
 def as_problem(
-    given: Problem | CardSource,
+    card: Problem | CardSource,
     *,
     effects: Sequence[str] | None = None,
     law: LawName | None = None,
@@ -293,11 +293,11 @@ def as_problem(
     may_lack_frequencies: bool = False,
 ) -> Problem:
     """The card of a command as a problem; raises InputError for a Problem with options that it states itself."""
-    if not isinstance(given, Problem):
-        prepared = prepare(given, effects, setup=setup, may_lack_frequencies=may_lack_frequencies)
+    if not isinstance(card, Problem):
+        prepared = prepare(card, effects, setup=setup, may_lack_frequencies=may_lack_frequencies)
         return Problem(prepared, law, robust)
     is_stated = {"effects": effects is not None, "law": law is not None, "robust": robust, "setup": setup is not None}
     if any(is_stated.values()):
         names = ", ".join(name for name, is_given in is_stated.items() if is_given)
         raise InputError(Fault(names, "nothing beside a Problem", "a value", "Problem.from_card takes it"))
-    return given
+    return card

@@ -41,15 +41,15 @@ class PossibleModes:
     One setup after the other: the labelled modes first, then those of peaks.
     """
 
-    log_frequency: Floats  # (n_every,) array: ln f (Hz) at the estimate
-    slopes: Floats  # (n_every, n_constants) array: d ln f / d ln D
-    input_slopes: Floats  # (n_every, n_inputs) array: d ln f / d z
+    log_frequency: Floats  # (n_possible,) array: ln f (Hz) at the estimate
+    slopes: Floats  # (n_possible, n_constants) array: d ln f / d ln D
+    input_slopes: Floats  # (n_possible, n_inputs) array: d ln f / d z
     places: tuple[tuple[ModePlace, ...], ...]  # one tuple per setup
     inputs: Floats  # (n_inputs,) array: z at the estimate
     # one per setup: the likelihood of its peaks, given its modes; None where all labels are certain
     peaks: tuple[PeakLikelihood | None, ...]
     predict: Predict  # ln f (Hz) of all these modes as a function of x, without an effect
-    # (n_every,) array or 0: ln f of the board less that of its plate, at the estimate (`board.sessions`)
+    # (n_possible,) array or 0: ln f of the board less that of its plate, at the estimate (`board.sessions`)
     discrepancy: Floats | float = 0.0
 
     @cached_property
@@ -64,7 +64,7 @@ class PossibleModes:
 
     @property
     def middle(self) -> Floats:
-        """ln f (Hz) at the middle of the priors of the inputs: (n_every,) array."""
+        """ln f (Hz) at the middle of the priors of the inputs: (n_possible,) array."""
         return np.asarray(self.log_frequency - self.input_slopes @ self.inputs)
 
 
@@ -76,14 +76,14 @@ class Baseline:
     values: Mapping[str, Floats]  # rigidities and inputs at the estimate, SI
     log_rigidities: Floats  # (n_constants,) array: x_hat
     log_readings: Floats  # (n_modes,) array: ln measured (Hz)
-    every: PossibleModes  # all modes that the readings may be
-    # (n_modes,) array of int: the index in `every` of the mode that each reading is; -1: no mode, and then the entries
-    # of the arrays below mean nothing for this reading
+    possible_modes: PossibleModes  # all modes that the readings may be
+    # (n_modes,) array of int: the index in `possible_modes` of the mode that each reading is; -1: no mode, and then the
+    # entries of the arrays below mean nothing for this reading
     rows: ModeIndices
     symmetry: tuple[tuple[bool, bool], ...]  # whether each setup's two halves are alike along x and along y
 
     def labelled(self, rows: ModeIndices) -> Baseline:
-        """The same readings as other modes, by their indices in `every` (-1: no mode); itself if none differs."""
+        """The readings as other modes, by indices in `possible_modes` (-1: no mode); itself if none differs."""
         return self if np.array_equal(rows, self.rows) else replace(self, rows=rows)
 
     @property
@@ -96,29 +96,29 @@ class Baseline:
         return np.asarray(self.rows >= 0)
 
     @cached_property
-    def used(self) -> ModeIndices:
+    def mode_readings(self) -> ModeIndices:
         """Indices of the readings that are a mode."""
         return np.flatnonzero(self.is_mode)
 
     @cached_property
     def log_frequency(self) -> Floats:
         """g, ln f (Hz) at the estimate: (n_modes,) array."""
-        return self.every.log_frequency[self.rows]
+        return self.possible_modes.log_frequency[self.rows]
 
     @cached_property
     def slopes(self) -> Floats:
         """X, d ln f / d ln D: (n_modes, n_constants) array."""
-        return self.every.slopes[self.rows]
+        return self.possible_modes.slopes[self.rows]
 
     @cached_property
     def input_slopes(self) -> Floats:
         """Z, d ln f / d z: (n_modes, n_inputs) array."""
-        return self.every.input_slopes[self.rows]
+        return self.possible_modes.input_slopes[self.rows]
 
     @cached_property
     def middle(self) -> Floats:
         """ln f (Hz) at the middle of the priors of the inputs, from which residuals count: (n_modes,) array."""
-        return self.every.middle[self.rows]
+        return self.possible_modes.middle[self.rows]
 
     @cached_property
     def residual(self) -> Floats:
@@ -127,7 +127,7 @@ class Baseline:
 
     @cached_property
     def places(self) -> tuple[ModePlace, ...]:
-        places = [place for setup_places in self.every.places for place in setup_places]
+        places = [place for setup_places in self.possible_modes.places for place in setup_places]
         return tuple(places[row] for row in self.rows)
 
     @cached_property
@@ -136,15 +136,15 @@ class Baseline:
         return np.repeat(np.arange(len(self.board.setups)), [len(setup.readings) for setup in self.board.setups])
 
     @cached_property
-    def same_modes(self) -> tuple[tuple[int, ...], ...]:
+    def readings_by_mode(self) -> tuple[tuple[int, ...], ...]:
         """Indices of the readings of each mode; several only where sessions of one setup repeat it."""
         return readings_by_mode(self.board)
 
     @cached_property
     def mode_index(self) -> ModeIndices:
-        """Index in `same_modes` of the mode of each reading: (n_modes,) array."""
+        """Index in `readings_by_mode` of the mode of each reading: (n_modes,) array."""
         index = np.empty(self.n_modes, dtype=np.intp)
-        for i, mode in enumerate(self.same_modes):
+        for i, mode in enumerate(self.readings_by_mode):
             index[list(mode)] = i
         return index
 
@@ -159,38 +159,38 @@ class Baseline:
         return reading_scales(self.board)
 
     @cached_property
-    def absorbing(self) -> Floats:
+    def absorption(self) -> Floats:
         """Matrix from a shift of ln f to the step in ln D that absorbs it best: (n_constants, n_modes) array."""
         return np.asarray(np.linalg.pinv(self.slopes / self.scales[:, None]) / self.scales)
 
     @cached_property
-    def blind(self) -> Floats:
+    def residual_directions(self) -> Floats:
         """Orthonormal directions that the constants cannot reach: (n_directions, n_modes) array, 0 where no mode is."""
-        slopes = self.slopes[self.used]
+        slopes = self.slopes[self.mode_readings]
         directions = np.linalg.svd(slopes, full_matrices=True)[0][:, slopes.shape[1] :]
         padded = np.zeros((directions.shape[1], self.n_modes))
-        padded[:, self.used] = directions.T
+        padded[:, self.mode_readings] = directions.T
         return padded
 
     @cached_property
     def half_log_det(self) -> float:
         """Half the logarithm of the determinant of X'X: the restricted density's change of volume."""
-        slopes = self.slopes[self.used]
+        slopes = self.slopes[self.mode_readings]
         return 0.5 * float(np.linalg.slogdet(slopes.T @ slopes)[1])
 
-    def log_alone(self, reading: int) -> float:
-        """ln of the probability density, in ln f, of a reading that is no mode; 0 where its label is certain."""
+    def log_spurious(self, reading: int) -> float:
+        """ln of the probability density, in ln f, of a spurious reading; 0 where its label is certain."""
         setup = int(self.setup_index[reading])
-        peaks = self.every.peaks[setup]
+        peaks = self.possible_modes.peaks[setup]
         position = reading - int(np.flatnonzero(self.setup_index == setup)[0])
-        return 0.0 if peaks is None or position not in peaks.readings else peaks.log_density_alone(position)
+        return 0.0 if peaks is None or position not in peaks.readings else peaks.log_density_spurious(position)
 
     def refitted_to(self, shift: Floats) -> tuple[Floats, Floats]:
         """Rest of an (n_modes,) shift after a weighted refit of the constants, never more than the shift; their step
         in ln D."""
         if not np.isfinite(shift).all():
             return np.full(shift.size, np.nan), np.full(self.log_rigidities.size, np.nan)
-        predict = _predict_rows(self.every.predict, self.rows)
+        predict = _predict_rows(self.possible_modes.predict, self.rows)
         log_rigidities = refit(predict, self.log_frequency + shift, self.scales, self.log_rigidities)
         return self.log_frequency + shift - predict(log_rigidities[None, :])[0], log_rigidities - self.log_rigidities
 
@@ -208,12 +208,12 @@ def baseline_of(problem: PosedProblem) -> Baseline:
     slopes = sensitivities(predict, estimate)
     values = parameters.values_at(problem.centre)
     input_slopes, inputs = rescale_discrepancies(board, values, slopes[:, n:], estimate[n:])
-    discrepancies = [np.broadcast_to(model.discrepancies(values)[0], len(model.every_place)) for model in models]
+    discrepancies = [np.broadcast_to(model.discrepancies(values)[0], len(model.mode_places)) for model in models]
     modes = PossibleModes(
         log_frequency=predict(estimate[None, :])[0],
         slopes=slopes[:, :n],
         input_slopes=input_slopes,
-        places=tuple(model.every_place for model in models),
+        places=tuple(model.mode_places for model in models),
         inputs=inputs,
         peaks=problem.posterior.peaks,
         predict=predict.with_fixed(estimate[n:]),
@@ -224,7 +224,7 @@ def baseline_of(problem: PosedProblem) -> Baseline:
         values=values,
         log_rigidities=estimate[:n],
         log_readings=log_measured(board),
-        every=modes,
+        possible_modes=modes,
         rows=labelled_rows(models),
         symmetry=symmetry_of(models),
     )
@@ -232,7 +232,7 @@ def baseline_of(problem: PosedProblem) -> Baseline:
 
 def labelled_rows(models: Sequence[SetupModel]) -> ModeIndices:
     """Index of each labelled mode among all modes of the models: (n_modes,) array."""
-    starts = np.cumsum([0, *(len(model.every_place) for model in models)])[:-1]
+    starts = np.cumsum([0, *(len(model.mode_places) for model in models)])[:-1]
     return np.concatenate([start + np.arange(len(model.places)) for start, model in zip(starts, models, strict=True)])
 
 

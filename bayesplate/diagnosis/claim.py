@@ -61,24 +61,26 @@ class Claim:
         return bool(self.conditions) and all(condition.is_met for condition in self.conditions)
 
 
-def judge_claim(found: SearchResult, verdict: Verdict, control: NullControl, folded: NestedErrors | None) -> Claim:
+def judge_claim(
+    result: SearchResult, verdict: Verdict, control: NullControl, nested_errors: NestedErrors | None
+) -> Claim:
     """Judge the five conditions.
 
-    `folded` and the control do not count readings whose modes alone carry a constant or a size.
+    `nested_errors` and the control do not count readings whose modes alone carry a constant or a size.
     """
     if not verdict.index:
         return Claim()
-    searches = [found, *(vary_priors(found, width=factor) for factor in PRIOR_WIDTH_FACTORS.values())]
-    named_indices, p_value = {explanation.index for explanation in verdict.stands_for}, found.p_value(verdict.index)
+    searches = [result, *(vary_priors(result, width=factor) for factor in PRIOR_WIDTH_FACTORS.values())]
+    named_indices, p_value = {explanation.index for explanation in verdict.explanations}, result.p_value(verdict.index)
     other_probabilities = [
         sum(explanation.support for explanation in rank_explanations(search) if explanation.index not in named_indices)
         for search in searches
     ]
     return Claim(
         (
-            _chance_condition(folded, control),
-            _score_condition(found, folded),
-            _probability_condition("probability of none", [search.none for search in searches]),
+            _chance_condition(nested_errors, control),
+            _score_condition(result, nested_errors),
+            _probability_condition("probability of none", [search.probability_of_none for search in searches]),
             _probability_condition("probability of another", other_probabilities),
             Condition("prior predictive", p_value, LEAST_P_VALUE, p_value >= LEAST_P_VALUE),
         )
@@ -86,10 +88,10 @@ def judge_claim(found: SearchResult, verdict: Verdict, control: NullControl, fol
 
 
 def effects_named_in_part(
-    found: SearchResult,
+    result: SearchResult,
     verdict: Verdict,
-    folded: NestedErrors | None,
-    others: Iterable[tuple[str, SearchResult]] | None = None,
+    nested_errors: NestedErrors | None,
+    variants: Iterable[tuple[str, SearchResult]] | None = None,
 ) -> tuple[str, ...]:
     """Effects that explain the readings in part though something else remains; empty where that cannot be said.
 
@@ -99,26 +101,27 @@ def effects_named_in_part(
     claimed, and the constants are not to be trusted.
     """
     nearest = verdict.nearest
-    if nearest is None or found.none >= IMPROBABLE_IN_PART_BELOW:
+    if nearest is None or result.probability_of_none >= IMPROBABLE_IN_PART_BELOW:
         return ()
-    if found.p_value(nearest.index) >= LEAST_P_VALUE or size_at_limit(found, nearest.index):
+    if result.p_value(nearest.index) >= LEAST_P_VALUE or size_at_limit(result, nearest.index):
         return ()
-    if folded is None or not folded.ratio[0] <= LARGEST_ERROR_RATIO:  # not a number where no mode is left to judge by
+    # the ratio is not a number where no mode is left to judge by
+    if nested_errors is None or not nested_errors.ratio[0] <= LARGEST_ERROR_RATIO:
         return ()
-    if not stands_out(nearest, rank_explanations(found)) or find_rivals(
-        found, nearest, variant_searches(found) if others is None else others
+    if not stands_out(nearest, rank_explanations(result)) or find_rivals(
+        result, nearest, variant_searches(result) if variants is None else variants
     ):
         return ()
     return nearest.members
 
 
-def nested_errors_of_board(found: SearchResult, control: NullControl, index: int = 0) -> NestedErrors | None:
+def nested_errors_of_board(result: SearchResult, control: NullControl, index: int = 0) -> NestedErrors | None:
     """Nested errors of the board's own readings, an effect added in each fold whose odds call for one.
 
     Readings whose modes alone carry a constant or a size, without any effect or under a hypothesis, do not count.
     """
-    errors = nested_leave_one_out(found.ground, found.residual[None, :], control.needed_from)
-    return errors and errors.without(indices_of(find_carrying_modes(found, index), found.ground.baseline.board))
+    errors = nested_leave_one_out(result.ground, result.residual[None, :], control.needed_from)
+    return errors and errors.without(indices_of(find_carrying_modes(result, index), result.ground.baseline.board))
 
 
 def score_gain(gains: Floats | Sequence[float]) -> tuple[float, float]:
@@ -129,7 +132,7 @@ def score_gain(gains: Floats | Sequence[float]) -> tuple[float, float]:
 
 def _chance_condition(errors: NestedErrors | None, control: NullControl) -> Condition:
     limit = control.ratio_to_beat
-    if errors is None or limit is None or not errors.counted.any():
+    if errors is None or limit is None or not errors.is_counted.any():
         return Condition("chance selection", None, limit, False)
     ratio = float(errors.ratio[0])
     return Condition("chance selection", ratio, limit, ratio < limit)
@@ -138,7 +141,7 @@ def _chance_condition(errors: NestedErrors | None, control: NullControl) -> Cond
 def _score_condition(result: SearchResult, errors: NestedErrors | None) -> Condition:
     if errors is None:
         return Condition("log score", None, None, False)
-    gains = log_score_gains(result.ground, result.residual, errors.chosen[0], errors.carried)
+    gains = log_score_gains(result.ground, result.residual, errors.choices[0], errors.carrying_readings)
     if gains.size < _FEWEST_SCORED_MODES:
         return Condition("log score", None, None, False)
     gain, error = score_gain(gains)

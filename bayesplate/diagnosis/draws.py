@@ -26,7 +26,7 @@ class TermDraws:
     inputs: Floats  # (n_draws, n_inputs) array: standard coordinates of the board's uncertain inputs
     cells: Indices  # (n_draws,) array of int: indices of cells of the hypothesis' table
     within: Floats  # (n_draws, n_tangents) array: place within the cell, standard deviations
-    # (n_draws, n_every) array: ln f (Hz) of all modes by the linear terms; zero `inputs` are the middle of their priors
+    # (n_draws, n_modes) array: ln f (Hz) of all modes by the linear terms; zero `inputs` are the middle of their priors
     predicted: Floats
     variance: Floats  # (n_draws, n_modes) array: relative variance of each reading; infinite where it is no mode
     noise: Floats  # (n_draws, n_setups) array: relative noise
@@ -35,36 +35,38 @@ class TermDraws:
     def n_draws(self) -> int:
         return len(self.log_rigidities)
 
-    def at(self, picked: Indices) -> TermDraws:
-        return TermDraws(*(getattr(self, field.name)[picked] for field in fields(self)))
+    def select(self, indices: Indices) -> TermDraws:
+        return TermDraws(*(getattr(self, field.name)[indices] for field in fields(self)))
 
 
-def draw_terms(found: SearchResult, index: int, rng: np.random.Generator, n_draws: int) -> TermDraws:
+def draw_terms(result: SearchResult, index: int, rng: np.random.Generator, n_draws: int) -> TermDraws:
     """Draw from the posterior under one hypothesis of a search, sorted by noise and cell."""
-    return draw_hypothesis(found.ground.baseline, found.ground.hypotheses[index], found.residual, rng, n_draws)
+    return draw_hypothesis(result.ground.baseline, result.ground.hypotheses[index], result.residual, rng, n_draws)
 
 
 def draw_hypothesis(
-    of: Baseline, hypothesis: Hypothesis, residual: Floats, rng: np.random.Generator, n_draws: int
+    baseline: Baseline, hypothesis: Hypothesis, residual: Floats, rng: np.random.Generator, n_draws: int
 ) -> TermDraws:
     """Draw from the posterior under a hypothesis, given the residual of a baseline, which may have other labels."""
-    terms, table, modes = hypothesis.terms, hypothesis.table, of.every
-    baseline, labelled_table = terms.baseline, terms.table
-    own_residual = hypothesis.seen(of, residual[None, :])[0]
+    terms, table, modes = hypothesis.terms, hypothesis.table, baseline.possible_modes
+    labelled_baseline, labelled_table = terms.baseline, terms.table
+    own_residual = hypothesis.residual_under_labels(baseline, residual[None, :])[0]
     log_density = terms.log_densities(own_residual[None, :])[:, 0]
     picked_terms = np.sort(rng.choice(log_density.size, size=n_draws, p=normalised_weights(log_density)))
     levels, cells = np.divmod(picked_terms, table.n_cells)
-    n = baseline.log_rigidities.size
+    n = labelled_baseline.log_rigidities.size
     first_input = n + table.slopes.shape[2]
     noise = terms.noise.sd[levels]
-    variance = noise[:, baseline.setup_index] ** 2 + baseline.own_variance
-    variance[:, ~baseline.is_mode] = np.inf
-    columns = _regression_columns(baseline.slopes, labelled_table.slopes[cells], baseline.input_slopes)
+    variance = noise[:, labelled_baseline.setup_index] ** 2 + labelled_baseline.own_variance
+    variance[:, ~labelled_baseline.is_mode] = np.inf
+    columns = _regression_columns(
+        labelled_baseline.slopes, labelled_table.slopes[cells], labelled_baseline.input_slopes
+    )
     joint = _draw_coefficients(columns, variance, own_residual - labelled_table.shift[cells], rng, n)
     within = joint[:, n:first_input]
     every_column = _regression_columns(modes.slopes, table.slopes[cells], modes.input_slopes)
     return TermDraws(
-        log_rigidities=baseline.log_rigidities
+        log_rigidities=labelled_baseline.log_rigidities
         + joint[:, :n]
         + table.moved[cells]
         + np.einsum("nkp,np->nk", table.moved_slopes[cells], within),
@@ -98,15 +100,15 @@ def _draw_coefficients(
     return np.asarray((mean + np.linalg.solve(np.swapaxes(factor, 1, 2), normal))[:, :, 0])
 
 
-def standard_sizes_of(found: SearchResult, index: int, drawn: TermDraws, which: int) -> FormSizes:
+def standard_sizes_of(result: SearchResult, index: int, draws: TermDraws, member: int) -> FormSizes:
     """Sizes of one effect of a hypothesis at each draw, in standard coordinates: (n, n_parameters) arrays.
 
     They may lie beyond a bound of the prior, for a cell that ends there is normal.
     """
-    hypothesis_table = found.ground.hypotheses[index].table
-    table, cells = hypothesis_table.member(which, drawn.cells)
-    within = drawn.within[:, hypothesis_table.tangents(which)]
-    for i, law in enumerate(found.ground.members(index)[which].laws):
+    hypothesis_table = result.ground.hypotheses[index].table
+    table, cells = hypothesis_table.member(member, draws.cells)
+    within = draws.within[:, hypothesis_table.tangents(member)]
+    for i, law in enumerate(result.ground.members(index)[member].laws):
         rows = np.flatnonzero(table.form[cells] == i)
         if rows.size:
             n = len(law.form.free)
@@ -114,10 +116,10 @@ def standard_sizes_of(found: SearchResult, index: int, drawn: TermDraws, which: 
 
 
 def sizes_of(
-    found: SearchResult, index: int, drawn: TermDraws, which: int
+    result: SearchResult, index: int, draws: TermDraws, member: int
 ) -> Iterator[tuple[int, FormLaw, Indices, dict[str, Floats]]]:
     """Sizes of one effect at each draw in SI units, by parameter, within the bounds of their priors."""
-    for i, law, rows, z in standard_sizes_of(found, index, drawn, which):
+    for i, law, rows, z in standard_sizes_of(result, index, draws, member):
         values = {}
         for free, column in zip(law.form.free, z.T, strict=True):
             values[free.name] = np.asarray(free.prior.value(np.clip(column, *free.prior.standard_bounds)))
@@ -125,14 +127,14 @@ def sizes_of(
 
 
 def joint_sizes_of(
-    found: SearchResult, index: int, drawn: TermDraws
+    result: SearchResult, index: int, draws: TermDraws
 ) -> Iterator[tuple[FormLaw, Indices, dict[str, Floats]]]:
     """Sizes of both effects of a pair, at the draws of forms that have a joint law."""
-    laws = found.ground.hypotheses[index].joint
+    laws = result.ground.hypotheses[index].joint
     if not laws:
         return
-    for i, _, rows_first, values_first in sizes_of(found, index, drawn, 0):
-        for j, _, rows_second, values_second in sizes_of(found, index, drawn, 1):
+    for i, _, rows_first, values_first in sizes_of(result, index, draws, 0):
+        for j, _, rows_second, values_second in sizes_of(result, index, draws, 1):
             rows, in_first, in_second = np.intersect1d(rows_first, rows_second, return_indices=True)
             if (i, j) in laws and rows.size:
                 values = {name: value[in_first] for name, value in values_first.items()}

@@ -23,31 +23,35 @@ _LEAST_INCLUSION = 0.1
 
 
 def effect_entry(
-    found: SearchResult, verdict: Verdict, ranked: Sequence[Explanation], one: Candidate, doubled: float
+    result: SearchResult,
+    verdict: Verdict,
+    explanations: Sequence[Explanation],
+    candidate: Candidate,
+    doubled_inclusion: float,
 ) -> EffectEntry:
-    """The entry of a candidate effect; `doubled` is its inclusion probability with every prior twice as wide."""
-    ground = found.ground
-    index = next(i for i, hypothesis in enumerate(ground.hypotheses) if hypothesis.members == (one.name,))
-    log_bayes_factor = float(found.log_evidence[index] - found.log_evidence[0])
-    best_fit = _best_log_density(found, index) - _best_log_density(found, 0)
-    fate, reason = fate_of(found, verdict, ranked, one.name, index)
-    signature, has_directions = one.signature, ground.n_directions > 0
+    """The entry of a candidate effect; `doubled_inclusion` is its probability with every prior twice as wide."""
+    ground = result.ground
+    index = next(i for i, hypothesis in enumerate(ground.hypotheses) if hypothesis.members == (candidate.name,))
+    log_bayes_factor = float(result.log_evidence[index] - result.log_evidence[0])
+    best_fit = _best_log_density(result, index) - _best_log_density(result, 0)
+    fate, reason = fate_of(result, verdict, explanations, candidate.name, index)
+    signature, has_directions = candidate.signature, ground.n_directions > 0
     return EffectEntry(
-        name=one.name,
-        setup=_setup_names(one),
+        name=candidate.name,
+        setup=_setup_names(candidate),
         raw_rms_cents=finite_or_none(signature.raw_rms),
         visible_rms_cents=finite_or_none(signature.visible_rms) if has_directions else None,
         visible_cents=tuple(finite_or_none(float(value)) if has_directions else None for value in signature.visible),
         below_detection_limit=signature.is_below_detection_limit,
         bias_percent=signature.bias_percent,
-        inclusion_probability=found.inclusion(one.name),
-        inclusion_probability_with_doubled_priors=doubled,
+        inclusion_probability=result.inclusion(candidate.name),
+        inclusion_probability_with_doubled_priors=doubled_inclusion,
         log_bayes_factor=log_bayes_factor,
         ockham_log_factor=log_bayes_factor - best_fit,
-        p_value=p_value_of(found, index),
-        amplitude=_amplitude(found, index, one),
-        learnt_bits=_learnt_bits(found, index, one),
-        look_alikes=look_alikes([candidate.signature for candidate in ground.candidates.values()])[one.name]
+        p_value=p_value_of(result, index),
+        amplitude=_amplitude(result, index, candidate),
+        learnt_bits=_learnt_bits(result, index, candidate),
+        look_alikes=look_alikes([candidate.signature for candidate in ground.candidates.values()])[candidate.name]
         if has_directions
         else (),
         rejected_because=reason,
@@ -55,23 +59,25 @@ def effect_entry(
     )
 
 
-def exchange_entries(found: SearchResult, verdict: Verdict, ranked: Sequence[Explanation]) -> tuple[ExchangeEntry, ...]:
+def exchange_entries(
+    result: SearchResult, verdict: Verdict, explanations: Sequence[Explanation]
+) -> tuple[ExchangeEntry, ...]:
     """The entry of each exchange of two labels."""
-    ground = found.ground
-    named_indices = {explanation.index for explanation in verdict.stands_for}
+    ground = result.ground
+    named_indices = {explanation.index for explanation in verdict.explanations}
     labels = [f"{label}" for setup in ground.baseline.board.setups for label in setup.labels]
     entries = []
     for i, hypothesis in enumerate(ground.hypotheses):
         if hypothesis.swap is None:
             continue
         setup = ground.baseline.board.setups[ground.baseline.setup_index[hypothesis.swap.first]]
-        fate, reason = fate_of_exchange(found, verdict, ranked, i, is_accepted=i in named_indices)
+        fate, reason = fate_of_exchange(result, verdict, explanations, i, is_accepted=i in named_indices)
         entries.append(
             ExchangeEntry(
                 setup=setup.name,
                 labels=(labels[hypothesis.swap.first], labels[hypothesis.swap.second]),
-                inclusion_probability=float(found.probability[i]),
-                log_bayes_factor=float(found.log_evidence[i] - found.log_evidence[0]),
+                inclusion_probability=float(result.probability[i]),
+                log_bayes_factor=float(result.log_evidence[i] - result.log_evidence[0]),
                 rejected_because=reason,
                 fate=fate,
             )
@@ -79,9 +85,9 @@ def exchange_entries(found: SearchResult, verdict: Verdict, ranked: Sequence[Exp
     return tuple(entries)
 
 
-def p_value_of(found: SearchResult, index: int) -> float | None:
+def p_value_of(result: SearchResult, index: int) -> float | None:
     """The prior predictive p-value of a hypothesis; None where the constants fit every reading exactly."""
-    return found.p_value(index) if found.ground.n_directions else None
+    return result.p_value(index) if result.ground.n_directions else None
 
 
 def _setup_names(candidate: Candidate) -> str:
@@ -101,7 +107,7 @@ def _best_log_density(result: SearchResult, index: int) -> float:
     hypothesis = result.ground.hypotheses[index]
     weights, by_cell = hypothesis.table.weights, hypothesis.log_by_cell(result.ground.baseline, result.residual)
     best = float((by_cell[weights > 0] - np.log(weights[weights > 0])).max())
-    return best - hypothesis.own.half_log_det + hypothesis.log_labels
+    return best - hypothesis.baseline.half_log_det + hypothesis.log_labels
 
 
 def _amplitude(result: SearchResult, index: int, candidate: Candidate) -> Amplitude | None:
@@ -153,7 +159,7 @@ def _fixed_amplitude(candidate: Candidate) -> Amplitude | None:
 
 
 def fate_of(
-    found: SearchResult, verdict: Verdict, ranked: Sequence[Explanation], name: str, index: int
+    result: SearchResult, verdict: Verdict, explanations: Sequence[Explanation], name: str, index: int
 ) -> FateAndReason:
     """The fate of a candidate effect, and the reason; `index` is that of the hypothesis that it acts alone."""
     if name in verdict.effects:
@@ -165,36 +171,36 @@ def fate_of(
         and name in verdict.best.members
     ):
         return "does not fit", verdict.reason
-    if found.ground.candidates[name].signature.is_below_detection_limit and not (
-        verdict.is_needed and found.inclusion(name) >= _LEAST_INCLUSION
+    if result.ground.candidates[name].signature.is_below_detection_limit and not (
+        verdict.is_needed and result.inclusion(name) >= _LEAST_INCLUSION
     ):
         return "not detectable", "its visible part is below what these readings could show"
     return (
-        _fate_without_need(found, verdict)
-        or _fate_of_misfit(found, index)
-        or _fate_of_less_probable(found, ranked, name, index)
+        _fate_without_need(result, verdict)
+        or _fate_of_misfit(result, index)
+        or _fate_of_less_probable(result, explanations, name, index)
     )
 
 
 def fate_of_exchange(
-    found: SearchResult, verdict: Verdict, ranked: Sequence[Explanation], index: int, *, is_accepted: bool
+    result: SearchResult, verdict: Verdict, explanations: Sequence[Explanation], index: int, *, is_accepted: bool
 ) -> FateAndReason:
     """The fate of an exchange of two labels, and the reason with its likelihood ratio."""
     if is_accepted:
         return "in the verdict", None
     fate, reason = (
-        _fate_without_need(found, verdict)
-        or _fate_of_misfit(found, index)
-        or _fate_of_less_probable(found, ranked, None, index)
+        _fate_without_need(result, verdict)
+        or _fate_of_misfit(result, index)
+        or _fate_of_less_probable(result, explanations, None, index)
     )
-    return fate, f"{reason}; {exchange_ratio_words(found, index)}"
+    return fate, f"{reason}; {exchange_ratio_words(result, index)}"
 
 
 def _fate_without_need(result: SearchResult, verdict: Verdict) -> FateAndReason | None:
     if verdict.is_needed:
         return None
     fate: Fate = "not established" if verdict.word == "unexplained" else "not needed"
-    return fate, f"{fate}: nothing lacking has a probability of {result.none:.2f}"
+    return fate, f"{fate}: nothing lacking has a probability of {result.probability_of_none:.2f}"
 
 
 def _fate_of_misfit(result: SearchResult, index: int) -> FateAndReason | None:
@@ -223,8 +229,8 @@ def _fate_of_less_probable(
     return "less probable", f"{comparison} ({support_text}) than {explanation_words(result, best)} ({best_text})"
 
 
-def exchange_ratio_words(found: SearchResult, index: int) -> str:
+def exchange_ratio_words(result: SearchResult, index: int) -> str:
     """How much likelier the readings are with two labels exchanged than with the labels of the card, in words."""
-    log_ratio = float(found.log_evidence[index] - found.log_evidence[0])
+    log_ratio = float(result.log_evidence[index] - result.log_evidence[0])
     likelier = "likelier" if log_ratio > 0 else "less likely"
     return f"with these labels exchanged the readings are {odds_in_words(abs(log_ratio))} {likelier}"

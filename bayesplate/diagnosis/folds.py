@@ -37,25 +37,25 @@ class NestedErrors:
     # reading is no mode then
     after: Floats
     # (n_sets, n_modes) array of int: index of the hypothesis that the fold of each reading chose
-    chosen: ModeIndices
+    choices: ModeIndices
     # readings that count neither before nor after, because their mode alone carries a constant or a size
-    carried: tuple[int, ...] = ()
+    carrying_readings: tuple[int, ...] = ()
 
-    def without(self, carried: Sequence[int]) -> NestedErrors:
+    def without(self, carrying_readings: Sequence[int]) -> NestedErrors:
         """The same errors, some readings not counted."""
-        return replace(self, carried=tuple(sorted({*self.carried, *carried})))
+        return replace(self, carrying_readings=tuple(sorted({*self.carrying_readings, *carrying_readings})))
 
     @property
-    def counted(self) -> NDArray[np.bool_]:
+    def is_counted(self) -> NDArray[np.bool_]:
         """Which errors count, (n_sets, n_modes): of readings that are a mode before and after and not carried."""
-        counted = np.isfinite(self.before) & np.isfinite(self.after)
-        counted[:, list(self.carried)] = False
-        return counted
+        is_counted = np.isfinite(self.before) & np.isfinite(self.after)
+        is_counted[:, list(self.carrying_readings)] = False
+        return is_counted
 
     @property
     def ratio(self) -> Floats:
         """Rms after over rms before, over the readings that count: (n_sets,) array, not a number where none does."""
-        after, before = (np.where(self.counted, errors, 0.0) for errors in (self.after, self.before))
+        after, before = (np.where(self.is_counted, errors, 0.0) for errors in (self.after, self.before))
         with np.errstate(invalid="ignore"):
             return np.asarray(np.sqrt(np.sum(after**2, axis=1) / np.sum(before**2, axis=1)))
 
@@ -69,11 +69,13 @@ def nested_leave_one_out(
     Residuals are an (n_sets, n_modes) array. A fold adds the most probable effect where the ln odds against none exceed
     `needed_from`; `ANY_LOG_ODDS` makes every fold choose.
     """
-    if len(ground.baseline.same_modes) < FEWEST_MODES:
+    if len(ground.baseline.readings_by_mode) < FEWEST_MODES:
         return None
     evidences, errors = [], []
     for hypothesis in ground.hypotheses:
-        log_evidence, left_out_errors = hypothesis.terms.left_out(hypothesis.seen(ground.baseline, residuals))
+        log_evidence, left_out_errors = hypothesis.terms.left_out(
+            hypothesis.residual_under_labels(ground.baseline, residuals)
+        )
         evidences.append(log_evidence + hypothesis.log_labels)
         errors.append(left_out_errors)
     chosen_indices = choose_hypotheses(ground.hypotheses, np.stack(evidences), needed_from)[ground.baseline.mode_index]
@@ -82,7 +84,7 @@ def nested_leave_one_out(
 
 
 def choose_hypotheses(
-    found: Sequence[Hypothesis], evidences: Floats, needed_from: float = NEEDED_LOG_ODDS
+    hypotheses: Sequence[Hypothesis], evidences: Floats, needed_from: float = NEEDED_LOG_ODDS
 ) -> ModeIndices:
     """Index of the most probable hypothesis with an effect, or 0 where the odds against no effect are too low.
 
@@ -90,40 +92,40 @@ def choose_hypotheses(
     """
     if len(evidences) == 1:
         return np.zeros(evidences.shape[1:], dtype=np.intp)
-    best = 1 + np.argmax(probabilities(found, evidences)[1:], axis=0)
-    return np.where(odds_against_none(found, evidences) > needed_from, best, 0)
+    best = 1 + np.argmax(probabilities(hypotheses, evidences)[1:], axis=0)
+    return np.where(odds_against_none(hypotheses, evidences) > needed_from, best, 0)
 
 
-def log_score(ground: SearchGround, index: int, residual: Floats, carried: Collection[int] = ()) -> float:
+def log_score(ground: SearchGround, index: int, residual: Floats, carrying_readings: Collection[int] = ()) -> float:
     """Sum over the modes of the log density of the readings of each given the others, under one hypothesis.
 
-    Each density is a ratio of two restricted densities, noise and sizes averaged. Modes of `carried` readings do not
+    Each density is a ratio of two restricted densities, noise and sizes averaged. Modes of `carrying_readings` do not
     count.
     """
-    return float(_log_scores(ground, index, residual)[_is_scored(ground, carried)].sum())
+    return float(_log_scores(ground, index, residual)[_is_scored(ground, carrying_readings)].sum())
 
 
 def log_score_gains(
-    ground: SearchGround, residual: Floats, chosen: ModeIndices, carried: Collection[int] = ()
+    ground: SearchGround, residual: Floats, choices: ModeIndices, carrying_readings: Collection[int] = ()
 ) -> Floats:
     """Gain in log density of the readings left out by the hypothesis that each fold chose: one per mode that counts."""
-    scores = {int(index): _log_scores(ground, int(index), residual) for index in {0, *chosen}}
-    gains = [scores[int(chosen[mode[0]])][i] - scores[0][i] for i, mode in enumerate(ground.baseline.same_modes)]
-    return np.array(gains)[_is_scored(ground, carried)]
+    scores = {int(index): _log_scores(ground, int(index), residual) for index in {0, *choices}}
+    gains = [scores[int(choices[mode[0]])][i] - scores[0][i] for i, mode in enumerate(ground.baseline.readings_by_mode)]
+    return np.array(gains)[_is_scored(ground, carrying_readings)]
 
 
-def _is_scored(ground: SearchGround, carried: Collection[int]) -> NDArray[np.bool_]:
+def _is_scored(ground: SearchGround, carrying_readings: Collection[int]) -> NDArray[np.bool_]:
     """Which modes the others can predict: all but those that alone carry a constant or a size."""
-    return np.array([not set(mode) & set(carried) for mode in ground.baseline.same_modes])
+    return np.array([not set(mode) & set(carrying_readings) for mode in ground.baseline.readings_by_mode])
 
 
 def _log_scores(ground: SearchGround, index: int, residual: Floats) -> Floats:
     """Log density of the readings of each mode given the others, under one hypothesis: (n_same_modes,) array."""
     hypothesis = ground.hypotheses[index]
-    residuals = hypothesis.seen(ground.baseline, residual[None, :])
+    residuals = hypothesis.residual_under_labels(ground.baseline, residual[None, :])
     log_alone = [
-        sum(hypothesis.own.log_alone(i) for i in mode if not hypothesis.own.is_mode[i])
-        for mode in hypothesis.own.same_modes
+        sum(hypothesis.baseline.log_spurious(i) for i in mode if not hypothesis.baseline.is_mode[i])
+        for mode in hypothesis.baseline.readings_by_mode
     ]
     return (
         np.array(log_alone)
@@ -132,10 +134,10 @@ def _log_scores(ground: SearchGround, index: int, residual: Floats) -> Floats:
     )
 
 
-def find_carrying_modes(found: SearchResult, index: int) -> tuple[CarryingMode, ...]:
+def find_carrying_modes(result: SearchResult, index: int) -> tuple[CarryingMode, ...]:
     """Modes that alone carry a constant or a size without any effect or under a hypothesis; neither is judged by
     them."""
-    return unite_carrying_modes(*(_carrying_modes_under(found, i) for i in dict.fromkeys((0, index))))
+    return unite_carrying_modes(*(_carrying_modes_under(result, i) for i in dict.fromkeys((0, index))))
 
 
 def _carrying_modes_under(result: SearchResult, index: int) -> tuple[CarryingMode, ...]:
@@ -154,5 +156,5 @@ def _carrying_modes_under(result: SearchResult, index: int) -> tuple[CarryingMod
     columns = np.hstack([baseline.slopes, baseline.input_slopes, size_columns])
     scales = np.where(baseline.is_mode, baseline.scales, np.inf)
     names = (*board.symmetry.moduli, *(parameter.effect or parameter.name for parameter in board.uncertain), *owners)
-    leverages = leverages_of(columns, scales, baseline.same_modes, board.symmetry.n)
+    leverages = leverages_of(columns, scales, baseline.readings_by_mode, board.symmetry.n)
     return carrying_modes(board, leverages, names)

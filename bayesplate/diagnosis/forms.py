@@ -36,7 +36,9 @@ def forms(board: Board) -> dict[str, tuple[Form, ...]]:
 
 
 def _form(board: Board, name: str, form: EffectForm) -> Form:
-    declared_board = declare(replace(board, effects=(*board.effects, name), chosen=(*board.chosen, *form.effects)))
+    declared_board = declare(
+        replace(board, effects=(*board.effects, name), effect_forms=(*board.effect_forms, *form.effects))
+    )
     parameters = {parameter.name: parameter for effect in form.effects for parameter in effect.parameters()}
     return Form(
         name,
@@ -46,13 +48,13 @@ def _form(board: Board, name: str, form: EffectForm) -> Form:
     )
 
 
-def with_forms(board: Board, added: Sequence[Form]) -> Board:
+def with_forms(board: Board, added_forms: Sequence[Form]) -> Board:
     """A board with the effects of some forms declared together."""
-    for form in added:
+    for form in added_forms:
         board = replace(
             board,
             effects=tuple(dict.fromkeys((*board.effects, *form.board.effects))),
-            chosen=tuple(dict.fromkeys((*board.chosen, *form.board.chosen))),
+            effect_forms=tuple(dict.fromkeys((*board.effect_forms, *form.board.effect_forms))),
         )
     return declare(board)
 

@@ -53,35 +53,35 @@ class Hypothesis:
     prior: float
     table: Cells  # of all modes that readings may be
     noise: NoiseGrid
-    own: Baseline  # the baseline with the labels that readings have under this hypothesis
+    baseline: Baseline  # the baseline with the labels that readings have under this hypothesis
     swap: Swap | None = None  # the two labels that it exchanges
-    # ln of the likelihood summed over all assignments of peaks to modes, over that of the labels of `own`
+    # ln of the likelihood summed over all assignments of peaks to modes, over that of the labels of `baseline`
     log_labels: float = 0.0
     joint: JointLaws = field(default_factory=dict)  # joint laws of a pair, where its shifts are not just added
 
     @cached_property
     def terms(self) -> NormalTerms:
         """Its normal terms for the readings under its labels."""
-        return NormalTerms(self.table.of(self.own.rows), self.own, self.noise)
+        return NormalTerms(self.table.at_modes(self.baseline.rows), self.baseline, self.noise)
 
-    def seen(self, baseline: Baseline, residuals: Floats) -> Floats:
+    def residual_under_labels(self, baseline: Baseline, residuals: Floats) -> Floats:
         """Residuals of a baseline, which may have other labels, under the labels of this hypothesis: (n_sets, n_modes)
         arrays."""
-        return residuals + (baseline.middle - self.own.middle)
+        return residuals + (baseline.middle - self.baseline.middle)
 
     def labelled(self, baseline: Baseline, rows: ModeIndices) -> Hypothesis:
         """The same hypothesis with other labels of the readings, by indices of modes."""
-        return replace(self, own=baseline.labelled(rows))
+        return replace(self, baseline=baseline.labelled(rows))
 
     def log_by_cell(self, baseline: Baseline, residual: Floats) -> Floats:
         """ln of prior times density of each cell of its table, noise averaged, without `half_log_det`: (n_cells,)
         array."""
-        log_densities = self.terms.log_densities(self.seen(baseline, residual[None, :]))[:, 0]
+        log_densities = self.terms.log_densities(self.residual_under_labels(baseline, residual[None, :]))[:, 0]
         return log_sum(log_densities.reshape(-1, self.table.n_cells))
 
     def cells(self, baseline: Baseline, residual: Floats) -> Floats:
         """Posterior probability of each cell of its table: (n_cells,) array from an (n_modes,) residual."""
-        log_densities = self.terms.log_densities(self.seen(baseline, residual[None, :]))[:, 0]
+        log_densities = self.terms.log_densities(self.residual_under_labels(baseline, residual[None, :]))[:, 0]
         return np.asarray(normalised_weights(log_densities).reshape(-1, self.table.n_cells).sum(axis=0))
 
 
@@ -95,8 +95,8 @@ def make_hypotheses(
     """
     board = baseline.board
     reach = noise_reach(board, baseline.setup_index, np.where(baseline.is_mode, baseline.residual, np.nan))
-    levels, few_levels = (noise_grid(board, few=are_few, reach=reach) for are_few in (False, True))
-    empty = no_effect_cells(baseline.every.log_frequency.size, baseline.log_rigidities.size)
+    levels, few_levels = (noise_grid(board, is_coarse=are_few, reach=reach) for are_few in (False, True))
+    empty = no_effect_cells(baseline.possible_modes.log_frequency.size, baseline.log_rigidities.size)
     swaps = confusable_labels(baseline)
     pairs = list(combinations([name for name in fine if name in paired], 2))
     single_prior = PRIOR_OF_ONE / max(len(fine) + bool(swaps), 1)
@@ -137,7 +137,7 @@ def confusable_labels(baseline: Baseline) -> tuple[Swap, ...]:
     labels, and a label that is stated for sure is kept.
     """
     readings = baseline.log_readings
-    if baseline.every.is_open:
+    if baseline.possible_modes.is_open:
         return ()
     swaps = []
     for setup in range(len(baseline.board.setups)):
@@ -151,27 +151,27 @@ def confusable_labels(baseline: Baseline) -> tuple[Swap, ...]:
     return tuple(swaps)
 
 
-def log_evidences(found: Sequence[Hypothesis], baseline: Baseline, residuals: Floats) -> Floats:
+def log_evidences(hypotheses: Sequence[Hypothesis], baseline: Baseline, residuals: Floats) -> Floats:
     """Logarithm of the evidence of every hypothesis for every data set: (n_hypotheses, n_sets) array.
 
     Summed over the assignments of peaks to modes, where the hypotheses have labels of their own (`with_own_labels`).
     """
     return np.stack(
         [
-            hypothesis.terms.log_evidence(hypothesis.seen(baseline, residuals)) + hypothesis.log_labels
-            for hypothesis in found
+            hypothesis.terms.log_evidence(hypothesis.residual_under_labels(baseline, residuals)) + hypothesis.log_labels
+            for hypothesis in hypotheses
         ]
     )
 
 
-def probabilities(found: Sequence[Hypothesis], evidences: Floats) -> Floats:
+def probabilities(hypotheses: Sequence[Hypothesis], evidences: Floats) -> Floats:
     """Posterior probabilities, summing to one over the hypotheses: same shape as the evidences."""
-    return normalised_weights(_log_joint(found, evidences))
+    return normalised_weights(_log_joint(hypotheses, evidences))
 
 
-def odds_against_none(found: Sequence[Hypothesis], evidences: Floats) -> Floats:
+def odds_against_none(hypotheses: Sequence[Hypothesis], evidences: Floats) -> Floats:
     """ln of the odds that an effect is lacking against that none is: one per data set."""
-    total = _log_joint(found, evidences)
+    total = _log_joint(hypotheses, evidences)
     if len(total) == 1:
         return np.full(total.shape[1:], -np.inf)
     return np.asarray(log_sum(total[1:]) - total[0])

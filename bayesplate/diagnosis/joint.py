@@ -33,19 +33,19 @@ _LEAST_SHARE = 0.05
 
 
 def full_search(
-    baseline: Baseline, tried: Sequence[str] | None = None, tell: Callable[[float], None] | None = None
+    baseline: Baseline, effects: Sequence[str] | None = None, tell: Callable[[float], None] | None = None
 ) -> tuple[SearchGround, SearchResult]:
     """The ground of a diagnosis, with the labels of the board, and its search: all candidates, each hypothesis with
     labels of its own, plausible pairs solved together."""
-    ground = prepare_search(baseline, tried=tried, tell=tell)
+    ground = prepare_search(baseline, effects=effects, tell=tell)
     result = run_search(with_own_labels(ground))
     joint_ground = with_joint_pairs(result, ground)
     return (ground, result) if joint_ground is ground else (joint_ground, run_search(with_own_labels(joint_ground)))
 
 
-def with_joint_pairs(found: SearchResult, ground: SearchGround) -> SearchGround:
+def with_joint_pairs(result: SearchResult, ground: SearchGround) -> SearchGround:
     """The ground with the plausible pairs of its search solved together; the same ground if there is none."""
-    pairs = [i for i in _plausible_pairs(found) if not ground.hypotheses[i].joint]
+    pairs = [i for i in _plausible_pairs(result) if not ground.hypotheses[i].joint]
     if not pairs:
         return ground
     hypotheses = list(ground.hypotheses)
@@ -53,7 +53,7 @@ def with_joint_pairs(found: SearchResult, ground: SearchGround) -> SearchGround:
         first, second = ground.members(index)
         laws: JointLaws = {
             (i, j): joint_law(ground.baseline, first.laws[i].form, second.laws[j].form)
-            for i, j in _probable_forms(found, index)
+            for i, j in _probable_forms(result, index)
         }
         table = joint_table(ground.baseline, hypotheses[index].table, laws)
         hypotheses[index] = replace(hypotheses[index], table=table, joint=laws)

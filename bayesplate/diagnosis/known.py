@@ -80,7 +80,7 @@ def known_fit(problem: PosedProblem, combination: Sequence[str] | None = None) -
     """The constants fitted to a board with a combination of its known effects; by default to the board as it stands."""
     declared = [name for name in known_effects(problem.board) if name in problem.board.effects]
     baseline = fit_with_effects(problem, combination)
-    used_readings, law = baseline.used, baseline.every.predict
+    used_readings, law = baseline.mode_readings, baseline.possible_modes.predict
     assert isinstance(law, Predictor)
     modes = [np.flatnonzero(np.isin(used_readings, mode)).tolist() for mode in readings_by_mode(problem.board)]
     errors = prediction_errors(
@@ -134,11 +134,11 @@ def fit_with_effects(problem: PosedProblem, combination: Sequence[str] | None, n
         values=_values(board, log_rigidities, inputs),
         log_rigidities=log_rigidities,
         log_readings=log_measured(board),
-        every=PossibleModes(
+        possible_modes=PossibleModes(
             log_frequency=law(log_rigidities[None, :])[0],
             slopes=sensitivities(law, log_rigidities),
-            input_slopes=np.zeros((sum(len(model.every_place) for model in law.models), 0)),
-            places=tuple(model.every_place for model in law.models),
+            input_slopes=np.zeros((sum(len(model.mode_places) for model in law.models), 0)),
+            places=tuple(model.mode_places for model in law.models),
             inputs=np.zeros(0),
             peaks=(None,) * len(law.models),
             predict=law,
@@ -156,7 +156,7 @@ def _likely_rows(problem: PosedProblem, law: Predictor, rows: ModeIndices, log_r
     if not any(problem.posterior.peaks):
         return rows
     predicted = law(log_rigidities[None, :])
-    if predicted.shape[1] != sum(problem.posterior.n_every):
+    if predicted.shape[1] != sum(problem.posterior.n_modes):
         return rows
     used_readings = np.flatnonzero(rows >= 0)
     residual = log_measured(problem.board)[used_readings] - predicted[0, rows[used_readings]]
@@ -205,7 +205,9 @@ def _solve_models(problem: PosedProblem, board: Board, inputs: Values, log_rigid
         model = setup_model(system, values, system.plate(mesh_values))
         keeps_symmetry = symmetry_of([model]) == symmetry_of([fitted_model])
         models.append(
-            replace(model, places=fitted_model.places, others=fitted_model.others) if keeps_symmetry else model
+            replace(model, places=fitted_model.places, other_modes=fitted_model.other_modes)
+            if keeps_symmetry
+            else model
         )
     slopes = board.symmetry.along(np.concatenate([model.sensitivities(values) for model in models]))
     weighted = slopes / reading_scales(board)[:, None]
@@ -250,7 +252,9 @@ def with_combination(board: Board, combination: Sequence[str]) -> Board:
     kept_board, new_effects = board.without(left_out), [name for name in combination if name not in board.effects]
     acting_effects = [effect for name in new_effects for effect in effects_at_known_size(board, name)]
     extended_board = replace(
-        kept_board, effects=(*kept_board.effects, *new_effects), chosen=(*kept_board.chosen, *acting_effects)
+        kept_board,
+        effects=(*kept_board.effects, *new_effects),
+        effect_forms=(*kept_board.effect_forms, *acting_effects),
     )
     sizes = {size.name: size for effect in acting_effects for size in effect.parameters()}
     sizes |= {size.name: size for size in kept_board.uncertain if size.effect in combination and size.source}

@@ -44,16 +44,16 @@ class KnownModel:
     n_readings: int  # all of them
 
 
-def known_models(fits: Sequence[KnownFit], carried: Sequence[int] = ()) -> tuple[KnownModel, ...]:
+def known_models(fits: Sequence[KnownFit], carrying_readings: Sequence[int] = ()) -> tuple[KnownModel, ...]:
     """Errors in cents and changes in percent, in the order of the fits, the board as it stands first.
 
-    `carried` readings, whose mode alone carries a constant or a size, do not count in the left-out errors.
+    `carrying_readings`, whose mode alone carries a constant or a size, do not count in the left-out errors.
     """
     if not fits:
         return ()
     left_out = np.array([fit.errors.left_out for fit in fits])
     is_of_all = np.isfinite(left_out).all(axis=0)
-    is_of_all[list(carried)] = False
+    is_of_all[list(carrying_readings)] = False
     return tuple(
         KnownModel(
             combination=fit.combination,
@@ -72,12 +72,12 @@ def known_models(fits: Sequence[KnownFit], carried: Sequence[int] = ()) -> tuple
     )
 
 
-def known_table(known: Sequence[KnownModel]) -> Table | None:
+def known_table(known_models: Sequence[KnownModel]) -> Table | None:
     """Errors and changes, model by model; None where there is nothing to compute."""
-    if len(known) < 2:
+    if len(known_models) < 2:
         return None
     rows: list[Row] = []
-    for words, model in zip(known_titles(known), known, strict=True):
+    for words, model in zip(known_titles(known_models), known_models, strict=True):
         errors = (number(value, 1) for value in (model.in_sample_rms_cents, model.leave_one_out_rms_cents))
         changes = (number(value, 1, signed=True) for value in model.change_percent.values())
         rows.append((words, *errors, *changes))
@@ -90,36 +90,36 @@ def known_table(known: Sequence[KnownModel]) -> Table | None:
     return Table(title, columns, tuple(rows), keys)
 
 
-def known_titles(known: Sequence[KnownModel]) -> list[str]:
+def known_titles(known_models: Sequence[KnownModel]) -> list[str]:
     """A title of each model; the first is the board as it stands."""
-    return [AS_IT_STANDS, *map(model_words, known[1:])]
+    return [AS_IT_STANDS, *map(model_words, known_models[1:])]
 
 
-def model_words(one: KnownModel) -> str:
+def model_words(known_model: KnownModel) -> str:
     """A model in words: the known effects that it has and the declared ones that it lacks."""
-    phrases = [f"with {effect_names(one.combination)}"] if one.combination else []
-    phrases += [f"without {effect_names(one.without)}"] if one.without else []
+    phrases = [f"with {effect_names(known_model.combination)}"] if known_model.combination else []
+    phrases += [f"without {effect_names(known_model.without)}"] if known_model.without else []
     return ", ".join(phrases) or AS_IT_STANDS
 
 
-def known_sentence(known: Sequence[KnownModel]) -> str:
+def known_sentence(known_models: Sequence[KnownModel]) -> str:
     """How each known effect changes the error, which model has the lowest, and which pairs work only together.
 
     Empty if the board has no known effect.
     """
-    if len(known) < 2:
+    if len(known_models) < 2:
         return ""
-    errors = _ComparedError(known)
-    single_models = [model for model in known[1:] if len(model.effects) + len(model.without) == 1]
-    effect_clauses = [_effect_clause(model, known[0], errors) for model in single_models]
+    errors = _ComparedError(known_models)
+    single_models = [model for model in known_models[1:] if len(model.effects) + len(model.without) == 1]
+    effect_clauses = [_effect_clause(model, known_models[0], errors) for model in single_models]
     clauses = "; ".join(
         words.format(error=f"the {errors.name}" if i == 0 else "it") for i, (words, _) in enumerate(effect_clauses)
     )
     rises = _RISE_WORDS if any(is_rise for _, is_rise in effect_clauses) else ""
     further_sentences = (
-        *_best_sentences(known, errors),
-        *_pair_sentences(known, errors),
-        *_partial_error_sentences(known),
+        *_best_sentences(known_models, errors),
+        *_pair_sentences(known_models, errors),
+        *_partial_error_sentences(known_models),
     )
     return " ".join([f"{_COMPUTED_WORDS}{clauses}.{rises}", *further_sentences])
 
@@ -201,20 +201,20 @@ def _pair_sentences(known: Sequence[KnownModel], errors: _ComparedError) -> list
     return sentences
 
 
-def stated_sentence(one: StatedClaim) -> str:
+def stated_sentence(claim: StatedClaim) -> str:
     """The predicted setup, its error without and with the stated effects, and whether it is reduced, in words."""
-    subject = f"{effect_names(one.effects)}, as stated and not chosen by the readings,"
-    verb = "takes" if len(one.effects) == 1 else "take"
-    if one.predicts:
-        prediction = f"the error of setup '{one.predicts}', predicted by the constants of the first setup alone,"
+    subject = f"{effect_names(claim.effects)}, as stated and not chosen by the readings,"
+    verb = "takes" if len(claim.effects) == 1 else "take"
+    if claim.predicts:
+        prediction = f"the error of setup '{claim.predicts}', predicted by the constants of the first setup alone,"
     else:
         prediction = "the left-out error"
     sentence = (
-        f"{subject[0].upper()}{subject[1:]} {verb} {prediction} from {one.before_rms_cents:.1f} to "
-        f"{one.after_rms_cents:.1f} cents; the log score changes by {one.log_score_gain:+.1f} ± "
-        f"{one.standard_error:.1f} over {one.n_modes} modes"
+        f"{subject[0].upper()}{subject[1:]} {verb} {prediction} from {claim.before_rms_cents:.1f} to "
+        f"{claim.after_rms_cents:.1f} cents; the log score changes by {claim.log_score_gain:+.1f} ± "
+        f"{claim.standard_error:.1f} over {claim.n_modes} modes"
     )
-    if one.holds:
+    if claim.holds:
         return f"{sentence}: error reduced."
     condition = (
         f"that asks for a fall by {percent(LEAST_ERROR_FALL)} and a score that rises by more than two standard errors"

@@ -42,18 +42,20 @@ class FollowedShapes:
     block: ReducedClass
     # (n_modes, r) array: shape times mass of the lowest modes; the product with another shape is the share
     shapes: Floats
-    wanted: Indices  # (n_wanted,) array of int: indices of the labelled modes among them
-    # tuple of array of int: positions in `wanted` of the modes of one symmetry class, in the order of their ranks
+    labelled_rows: Indices  # (n_labelled,) array of int: indices of the labelled modes among them
+    # tuple of array of int: positions in `labelled_rows` of the modes of one symmetry class, in order of their ranks
     groups: tuple[Indices, ...]
 
     @classmethod
-    def of(cls, block: ReducedClass, without: Weights, wanted: Indices, groups: tuple[Indices, ...]) -> FollowedShapes:
+    def of(
+        cls, block: ReducedClass, bare_weights: Weights, labelled_rows: Indices, groups: tuple[Indices, ...]
+    ) -> FollowedShapes:
         """The shapes at the weights of one draw without the effect."""
-        _, vectors = block.modes(without, int(wanted.max()) + 1 + _N_SPARE_MODES)
-        return cls(block, vectors[0].T @ block.mass(without)[0], wanted, groups)
+        _, vectors = block.modes(bare_weights, int(labelled_rows.max()) + 1 + _N_SPARE_MODES)
+        return cls(block, vectors[0].T @ block.mass(bare_weights)[0], labelled_rows, groups)
 
     def eigenvalues(self, weights: Weights) -> Floats:
-        """Eigenvalue of each labelled mode for many draws: (n_draws, n_wanted) array, s^-2.
+        """Eigenvalue of each labelled mode for many draws: (n_draws, n_labelled) array, s^-2.
 
         Not a number where the weights are those of no material.
         """
@@ -61,9 +63,9 @@ class FollowedShapes:
 
         values, vectors = self.block.modes(weights, len(self.shapes) + _N_SPARE_MODES)
         shares = (self.shapes @ vectors) ** 2
-        eigenvalues = np.full((len(values), self.wanted.size), np.nan)
+        eigenvalues = np.full((len(values), self.labelled_rows.size), np.nan)
         for draw in np.flatnonzero(np.isfinite(values).all(axis=1)):
-            picked = linear_sum_assignment(shares[draw], maximize=True)[1][self.wanted]
+            picked = linear_sum_assignment(shares[draw], maximize=True)[1][self.labelled_rows]
             eigenvalues[draw] = values[draw, picked]
         for group in self.groups:
             eigenvalues[:, group] = np.sort(eigenvalues[:, group], axis=1)
@@ -94,15 +96,15 @@ class FormLaw:
 
     def log_frequencies(self, baseline: Baseline, log_rigidities: Floats, values: Mapping[str, Floats]) -> Floats:
         """ln f (Hz) of labelled modes, (n, n_modes), at (n, n_constants) ln D and (n,) free parameters, SI."""
-        return self.every_log_frequency(baseline, log_rigidities, values)[:, baseline.rows]
+        return self.mode_log_frequencies(baseline, log_rigidities, values)[:, baseline.rows]
 
-    def every_log_frequency(self, baseline: Baseline, log_rigidities: Floats, values: Mapping[str, Floats]) -> Floats:
-        """ln f (Hz) of all modes that the baseline's readings may be, at the same values: (n, n_every) array."""
+    def mode_log_frequencies(self, baseline: Baseline, log_rigidities: Floats, values: Mapping[str, Floats]) -> Floats:
+        """ln f (Hz) of all modes that the baseline's readings may be, at the same values: (n, n_modes) array."""
         all_values = _with_rigidities(baseline, _inputs(baseline, self.form) | dict(values), np.exp(log_rigidities).T)
-        by_setup = [model.every_log_frequency(all_values, "exact") for model in self.models]
-        return np.concatenate(by_setup, axis=1) + baseline.every.discrepancy
+        by_setup = [model.mode_log_frequencies(all_values, "exact") for model in self.models]
+        return np.concatenate(by_setup, axis=1) + baseline.possible_modes.discrepancy
 
-    def placed(self, baseline: Baseline) -> FormLaw:
+    def with_modes_of(self, baseline: Baseline) -> FormLaw:
         """The same law with the modes of a baseline, which may be another board of the same sizes.
 
         Where the effect keeps the symmetry, a mode keeps its class and its rank there. Elsewhere it is found by its
@@ -112,12 +114,12 @@ class FormLaw:
             [self._place_station(baseline, i, station) for station in model.stations]
             for i, model in enumerate(self.models)
         ]
-        return replace(self, models=tuple(replace(first, roved=tuple(rest)) for first, *rest in stations))
+        return replace(self, models=tuple(replace(first, roving_models=tuple(rest)) for first, *rest in stations))
 
     def _place_station(self, baseline: Baseline, setup: int, model: SetupModel) -> SetupModel:
         """One station of a setup with the modes of a baseline."""
         assert model.exact is not None
-        base_places, n_labelled = baseline.every.places[setup], len(model.setup.readings)
+        base_places, n_labelled = baseline.possible_modes.places[setup], len(model.setup.readings)
         if symmetry_of([model])[0] == baseline.symmetry[setup]:
             places = base_places
             exact = ExactLaw(replace(model.exact.reduced, places=places))
@@ -126,7 +128,7 @@ class FormLaw:
             reduced = replace(model.exact.reduced, places=places)
             exact = FollowedLaw(reduced, following=self._followed_shapes(baseline, model, reduced, base_places))
         others = tuple(OtherMode(place, None) for place in places[n_labelled:])
-        return replace(model, places=places[:n_labelled], others=others, exact=exact)
+        return replace(model, places=places[:n_labelled], other_modes=others, exact=exact)
 
     def _followed_shapes(
         self, baseline: Baseline, model: SetupModel, reduced: ReducedOrderModel, base_places: Sequence[ModePlace]
@@ -154,7 +156,11 @@ class FormLaw:
             for parameter in self.form.board.parameters
             if parameter.effect and parameter.effect not in baseline.board.effects
         ]
-        null_values = {parameter.name: np.full(1, parameter.null) for parameter in sizes if parameter.null is not None}
+        null_values = {
+            parameter.name: np.full(1, parameter.neutral_value)
+            for parameter in sizes
+            if parameter.neutral_value is not None
+        }
         free_rigidities = np.exp(baseline.log_rigidities)[:, None]
         return _with_rigidities(baseline, _inputs(baseline, self.form) | null_values, free_rigidities)
 
@@ -162,11 +168,11 @@ class FormLaw:
         """The places of the modes of a setup on the plate with the effect absent, each at a place of its own."""
         from scipy.optimize import linear_sum_assignment
 
-        base_places = baseline.every.places[setup]
+        base_places = baseline.possible_modes.places[setup]
         assert model.exact is not None
         weights = model.system.weights(self._values_without_effect(baseline))
-        start = baseline.every.starts[setup]
-        plate_log_frequency = baseline.every.log_frequency - baseline.every.discrepancy
+        start = baseline.possible_modes.starts[setup]
+        plate_log_frequency = baseline.possible_modes.log_frequency - baseline.possible_modes.discrepancy
         base_log_frequency = plate_log_frequency[start : start + len(base_places)]
         places: dict[int, ModePlace] = {}
         for block in model.exact.reduced.classes:
@@ -216,10 +222,10 @@ def merged_parity(parity: Parity, symmetry: tuple[bool, bool]) -> Parity:
 
 def _with_modes_of_baseline(model: SetupModel, baseline: Baseline, setup: int) -> SetupModel:
     """A model with as many modes of each class as the baseline has modes that fall into this class."""
-    if model.roved:
+    if model.roving_models:
         first, *rest = (_with_modes_of_baseline(station, baseline, setup) for station in model.stations)
-        return replace(first, roved=tuple(rest))
-    base_places = baseline.every.places[setup]
+        return replace(first, roving_models=tuple(rest))
+    base_places = baseline.possible_modes.places[setup]
     n_readings = len(model.setup.readings)
     if len(base_places) == n_readings:
         return model
@@ -228,7 +234,7 @@ def _with_modes_of_baseline(model: SetupModel, baseline: Baseline, setup: int) -
     other_places = [ModePlace(parity, rank, 0.0) for parity, n in counts.items() for rank in range(n)]
     if symmetry == baseline.symmetry[setup]:
         other_places = list(base_places[n_readings:])
-    return replace(model, others=tuple(OtherMode(place, None) for place in other_places))
+    return replace(model, other_modes=tuple(OtherMode(place, None) for place in other_places))
 
 
 def _with_rigidities(baseline: Baseline, values: Values, free: Floats) -> Values:

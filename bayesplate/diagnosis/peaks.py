@@ -35,7 +35,7 @@ _MOST_LABELLINGS, _LARGEST_DROP = 6, 5.0
 def with_own_labels(ground: SearchGround) -> SearchGround:
     """The ground with each hypothesis under the labels that the readings likely have if it holds."""
     baseline = ground.baseline
-    if not baseline.every.is_open:
+    if not baseline.possible_modes.is_open:
         return ground
     single_hypotheses = [hypothesis for hypothesis in ground.hypotheses if len(hypothesis.members) < 2]
     labellings = [
@@ -51,7 +51,7 @@ def with_own_labels(ground: SearchGround) -> SearchGround:
                 labelled_hypotheses[members] for members in ((), *((name,) for name in hypothesis.members))
             ]
             labelled_hypotheses[hypothesis.members] = _label_hypothesis(
-                ground, hypothesis, [member.own.rows for member in member_hypotheses]
+                ground, hypothesis, [member.baseline.rows for member in member_hypotheses]
             )
     return replace(
         ground, hypotheses=tuple(labelled_hypotheses[hypothesis.members] for hypothesis in ground.hypotheses)
@@ -61,27 +61,29 @@ def with_own_labels(ground: SearchGround) -> SearchGround:
 def log_likelihood_summed(baseline: Baseline, log_frequency: Floats, noise: Floats) -> Floats:
     """ln of the likelihood of all readings and peaks, summed over their assignments to modes: (n_draws,) array.
 
-    From ln f (Hz) of all modes, (n_draws, n_every), and the relative noise, (n_draws, n_setups).
+    From ln f (Hz) of all modes, (n_draws, n_modes), and the relative noise, (n_draws, n_setups).
     """
     total = np.zeros(len(log_frequency))
     for i, (setup, setup_log_frequency) in enumerate(
         zip(baseline.board.setups, _split_by_setup(baseline, log_frequency), strict=True)
     ):
         is_sure = np.array([reading.is_sure for reading in setup.readings], dtype=bool)
-        errors = ReadingErrors.of(setup).at(is_sure)
+        errors = ReadingErrors.of(setup).select(is_sure)
         total += errors.log_likelihood(setup_log_frequency[:, : is_sure.size][:, is_sure], noise[:, i]).sum(axis=1)
-        peaks = baseline.every.peaks[i]
+        peaks = baseline.possible_modes.peaks[i]
         if peaks is not None:
             total += peaks.log_likelihood(setup_log_frequency, noise[:, i])
     return total
 
 
-def log_likelihood_of_labels(own: Baseline, seen: Floats, drawn: TermDraws) -> Floats:
+def log_likelihood_of_labels(baseline: Baseline, log_readings: Floats, draws: TermDraws) -> Floats:
     """ln of the likelihood of readings (ln f) under the labels of a baseline, at draws of its terms: (n_draws,)
     array."""
-    is_mode = own.is_mode
-    variance = drawn.noise[:, own.setup_index[is_mode]] ** 2 + own.own_variance[is_mode]
-    squares = (seen[is_mode] - drawn.predicted[:, own.rows[is_mode]]) ** 2 / variance + np.log(2.0 * np.pi * variance)
+    is_mode = baseline.is_mode
+    variance = draws.noise[:, baseline.setup_index[is_mode]] ** 2 + baseline.own_variance[is_mode]
+    squares = (log_readings[is_mode] - draws.predicted[:, baseline.rows[is_mode]]) ** 2 / variance + np.log(
+        2.0 * np.pi * variance
+    )
     return np.asarray(-0.5 * squares.sum(axis=1))
 
 
@@ -99,7 +101,7 @@ def _annealed_labels(ground: SearchGround, hypothesis: Hypothesis) -> Iterator[M
         draws = _draw(ground, noisy_hypothesis, _N_WIDE)
         log_likelihoods = log_likelihood_summed(ground.baseline, draws.predicted, draws.noise)
         for best in np.argsort(-log_likelihoods)[:_N_BEST]:
-            yield _labels_at_draws(ground, draws.at(best[None]), rows)
+            yield _labels_at_draws(ground, draws.select(best[None]), rows)
         rows = _labels_at_draws(ground, draws, rows)
         yield rows
 
@@ -108,25 +110,27 @@ def _labels_at_draws(ground: SearchGround, draws: TermDraws, fallback: ModeIndic
     return likely_labels(ground.baseline, draws.predicted, draws.noise, fallback)
 
 
-def likely_labels(baseline: Baseline, log_frequency: Floats, noise: Floats, otherwise: ModeIndices) -> ModeIndices:
+def likely_labels(baseline: Baseline, log_frequency: Floats, noise: Floats, default: ModeIndices) -> ModeIndices:
     """Index of the likely mode of each reading at some draws: (n_modes,) array, -1 where there is none.
 
-    `otherwise` where too few readings have a likely mode.
+    `default` where too few readings have a likely mode.
     """
     rows = baseline.rows.copy()
     by_setup = _split_by_setup(baseline, log_frequency)
     n_before = 0
-    for i, (setup, peaks) in enumerate(zip(baseline.board.setups, baseline.every.peaks, strict=True)):
+    for i, (setup, peaks) in enumerate(zip(baseline.board.setups, baseline.possible_modes.peaks, strict=True)):
         if peaks is not None:
             likely = peaks.probabilities(by_setup[i], noise[:, i])
             for position, mode_probabilities in zip(peaks.readings, likely, strict=True):
                 if position >= 0:
                     best = int(np.argmax(mode_probabilities))
                     is_likely = mode_probabilities[best] > LIKELY_LABEL
-                    rows[n_before + position] = baseline.every.starts[i] + peaks.columns[best] if is_likely else -1
+                    rows[n_before + position] = (
+                        baseline.possible_modes.starts[i] + peaks.columns[best] if is_likely else -1
+                    )
         n_before += len(setup.readings)
     # A labelling needs one more reading than there are constants.
-    return rows if np.sum(rows >= 0) > baseline.log_rigidities.size else otherwise
+    return rows if np.sum(rows >= 0) > baseline.log_rigidities.size else default
 
 
 def _label_hypothesis(
@@ -163,7 +167,7 @@ def _sum_labellings(ground: SearchGround, hypotheses: Sequence[Hypothesis]) -> H
     log_readings = ground.baseline.log_readings
     labellings = zip(log_likelihoods, hypotheses, draws_by_labels, strict=True)
     estimates = evidence + [
-        log_mean(log_likelihood - log_likelihood_of_labels(hypothesis.own, log_readings, draws))
+        log_mean(log_likelihood - log_likelihood_of_labels(hypothesis.baseline, log_readings, draws))
         for log_likelihood, hypothesis, draws in labellings
     ]
     kept_indices = np.argsort(-estimates)[:_MOST_LABELLINGS]
@@ -172,7 +176,7 @@ def _sum_labellings(ground: SearchGround, hypotheses: Sequence[Hypothesis]) -> H
     log_weights = []
     for share, i in zip(log_share, kept_indices, strict=True):
         densities = [
-            log_likelihood_of_labels(hypotheses[j].own, log_readings, draws_by_labels[i]) - evidence[j]
+            log_likelihood_of_labels(hypotheses[j].baseline, log_readings, draws_by_labels[i]) - evidence[j]
             for j in kept_indices
         ]
         log_weights.append(share + log_likelihoods[i] - logsumexp(np.array(densities) + log_share[:, None], axis=0))
@@ -184,14 +188,18 @@ def _sum_labellings(ground: SearchGround, hypotheses: Sequence[Hypothesis]) -> H
         for name in ("predicted", "noise")
     )
     likeliest = hypotheses[kept_indices[0]]
-    rows = likely_labels(ground.baseline, predicted, noise, likeliest.own.rows)
+    rows = likely_labels(ground.baseline, predicted, noise, likeliest.baseline.rows)
     labelled_hypothesis = likeliest.labelled(ground.baseline, rows)
     return replace(labelled_hypothesis, log_labels=log_sum - _log_evidence(ground, labelled_hypothesis))
 
 
 def _log_evidence(ground: SearchGround, hypothesis: Hypothesis) -> float:
     """ln of the evidence of a hypothesis under its own labels alone, by its normal terms."""
-    return float(hypothesis.terms.log_evidence(hypothesis.seen(ground.baseline, ground.baseline.residual[None, :]))[0])
+    return float(
+        hypothesis.terms.log_evidence(
+            hypothesis.residual_under_labels(ground.baseline, ground.baseline.residual[None, :])
+        )[0]
+    )
 
 
 def log_mean(values: Floats) -> float:
@@ -206,4 +214,4 @@ def _draw(ground: SearchGround, hypothesis: Hypothesis, n_draws: int = _N_DRAWS)
 
 
 def _split_by_setup(baseline: Baseline, log_frequency: Floats) -> list[Floats]:
-    return np.split(log_frequency, baseline.every.starts[1:], axis=1)
+    return np.split(log_frequency, baseline.possible_modes.starts[1:], axis=1)

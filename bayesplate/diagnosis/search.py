@@ -51,7 +51,7 @@ class SearchGround:
     @property
     def n_directions(self) -> int:
         """Directions of the readings that the constants cannot reach, by which hypotheses are judged."""
-        return len(self.baseline.blind)
+        return len(self.baseline.residual_directions)
 
     @property
     def paired(self) -> tuple[str, ...]:
@@ -82,26 +82,26 @@ class SearchResult:
     probability: Floats
 
     @property
-    def none(self) -> float:
+    def probability_of_none(self) -> float:
         """Probability that no effect is lacking."""
         return float(self.probability[0])
 
     @property
-    def against_none(self) -> float:
+    def log_odds(self) -> float:
         """ln of the odds that an effect is lacking against that none is."""
-        if not self.none:  # less than any number: the logarithms still tell how much less
+        if not self.probability_of_none:  # less than any number: the logarithms still tell how much less
             return float(odds_against_none(self.ground.hypotheses, self.log_evidence))
         with np.errstate(divide="ignore"):
-            return float(np.log(self.probability[1:].sum()) - np.log(self.none))
+            return float(np.log(self.probability[1:].sum()) - np.log(self.probability_of_none))
 
     def inclusion(self, name: str) -> float:
         """Probability that an effect is present, alone or with another."""
         present = [name in hypothesis.members for hypothesis in self.ground.hypotheses]
         return float(self.probability[present].sum())
 
-    def seen(self, index: int) -> Floats:
+    def residual_under_labels(self, index: int) -> Floats:
         """The residual under the labels of a hypothesis: (1, n_modes) array."""
-        return self.ground.hypotheses[index].seen(self.ground.baseline, self.residual[None, :])
+        return self.ground.hypotheses[index].residual_under_labels(self.ground.baseline, self.residual[None, :])
 
     def cells(self, index: int) -> Floats:
         """Posterior probability of each cell of the table of a hypothesis: (n_cells,) array."""
@@ -123,17 +123,19 @@ class SearchResult:
 def prepare_search(
     baseline: Baseline,
     solve: Callable[[Baseline, Form], FormLaw] = form_law,
-    tried: Sequence[str] | None = None,
+    effects: Sequence[str] | None = None,
     tell: Callable[[float], None] | None = None,
 ) -> SearchGround:
     """Tabulate the candidates of a board, with forms solved by `solve`; without effects that no plate can have."""
     forms_by_effect = {
-        name: effect_forms for name, effect_forms in forms(baseline.board).items() if tried is None or name in tried
+        name: effect_forms for name, effect_forms in forms(baseline.board).items() if effects is None or name in effects
     }
     all_candidates = []
     for name, effect_forms in forms_by_effect.items():
         all_candidates.append(
-            _make_candidate(baseline, name, tuple(solve(baseline, form).placed(baseline) for form in effect_forms))
+            _make_candidate(
+                baseline, name, tuple(solve(baseline, form).with_modes_of(baseline) for form in effect_forms)
+            )
         )
         if tell is not None:
             tell(len(all_candidates) / len(forms_by_effect))
@@ -160,7 +162,7 @@ def _make_candidate(baseline: Baseline, name: str, laws: tuple[FormLaw, ...]) ->
         signatures.append(signature(baseline, name, free, log_frequency))
         z = np.array([[float(parameter.prior.standard(parameter.nominal)) for parameter in free]])
         shift = refitted_shifts(baseline, law, z)[0][0, baseline.rows]
-        traces.append(np.linalg.norm((shift - baseline.slopes @ (baseline.absorbing @ shift)) / baseline.scales))
+        traces.append(np.linalg.norm((shift - baseline.slopes @ (baseline.absorption @ shift)) / baseline.scales))
     strongest = int(np.argmax([np.nansum((signature.visible / signature.scales) ** 2) for signature in signatures]))
     fine, coarse = tabulate(baseline, laws), tabulate(baseline, laws, COARSE_CELLS)
     return Candidate(name, laws, fine, coarse, signatures[strongest], float(np.fmax.reduce(traces)))
@@ -177,7 +179,7 @@ def predictive_p_value(hypothesis: Hypothesis, baseline: Baseline, residuals: Fl
     Box, Sampling and Bayes' inference in scientific modelling and robustness, J. R. Stat. Soc. A 143, 383 (1980).
     """
     terms = hypothesis.terms
-    observed = terms.log_evidence(hypothesis.seen(baseline, residuals))
+    observed = terms.log_evidence(hypothesis.residual_under_labels(baseline, residuals))
     expected = _simulated_log_evidences(terms)
     return np.asarray((1.0 + np.searchsorted(expected, observed, side="right")) / (1.0 + expected.size))
 

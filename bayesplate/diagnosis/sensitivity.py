@@ -39,33 +39,33 @@ _OVERSAMPLING = 2
 """Draws for each one that is kept by its weight."""
 
 
-def variant_searches(found: SearchResult) -> Iterator[tuple[str, SearchResult]]:
+def variant_searches(result: SearchResult) -> Iterator[tuple[str, SearchResult]]:
     """The searches under other assumptions, in which a named effect has to stand out too, each with its words.
 
     The widths of the sizes' priors are halved and doubled, the noise prior is moved by 1.5 either way, and the exact
     law is used where it has a plate at some draw. Each search is run when the iterator reaches it.
     """
     for word, factor in PRIOR_WIDTH_FACTORS.items():
-        yield f"with the priors of the sizes {word}", vary_priors(found, width=factor)
+        yield f"with the priors of the sizes {word}", vary_priors(result, width=factor)
     for word, factor in NOISE_FACTORS.items():
-        yield f"if the noise is 1.5 times {word}", vary_priors(found, noise=factor)
-    exact = under_exact_law(found)
+        yield f"if the noise is 1.5 times {word}", vary_priors(result, noise=factor)
+    exact = under_exact_law(result)
     if exact is not None:
         yield "under the exact law", exact
 
 
 @lru_cache(maxsize=8)  # the verdict, the claim and the result use the same searches
-def vary_priors(found: SearchResult, *, width: float = 1.0, noise: float = 1.0) -> SearchResult:
+def vary_priors(result: SearchResult, *, width: float = 1.0, noise: float = 1.0) -> SearchResult:
     """The same search, the standard deviation of every size's prior and every noise prior multiplied by a factor.
 
     The cells reach three of the old standard deviations; sizes beyond them, which a wider prior allows, count as unable
     to explain the readings.
     """
-    ground = found.ground
+    ground = result.ground
     varied_ground = replace(
-        ground, hypotheses=tuple(_vary_hypothesis(found, i, width, noise) for i in range(len(ground.hypotheses)))
+        ground, hypotheses=tuple(_vary_hypothesis(result, i, width, noise) for i in range(len(ground.hypotheses)))
     )
-    return run_search(varied_ground, found.residual)
+    return run_search(varied_ground, result.residual)
 
 
 def _vary_hypothesis(result: SearchResult, index: int, width: float, noise: float) -> Hypothesis:
@@ -102,59 +102,62 @@ def _share_within_bounds(prior: Quantity, factor: float) -> float:
 
 
 @lru_cache(maxsize=2)  # the verdict and the averages use the same search
-def under_exact_law(found: SearchResult) -> SearchResult | None:
+def under_exact_law(result: SearchResult) -> SearchResult | None:
     """The same search, every evidence corrected to the exact law; None where no draw is a plate under that law."""
     rng = np.random.default_rng(0)
-    corrections = np.full(found.probability.size, _correction(found, 0, rng))
-    is_probable = found.probability > _LEAST_SHARE * found.probability.max()
+    corrections = np.full(result.probability.size, _correction(result, 0, rng))
+    is_probable = result.probability > _LEAST_SHARE * result.probability.max()
     for index in 1 + np.flatnonzero(is_probable[1:]):
-        corrections[index] = _correction(found, int(index), rng)
-    evidence = found.log_evidence + corrections
+        corrections[index] = _correction(result, int(index), rng)
+    evidence = result.log_evidence + corrections
     if not np.isfinite(evidence).any():
         return None
-    return replace(found, log_evidence=evidence, probability=probabilities(found.ground.hypotheses, evidence))
+    return replace(result, log_evidence=evidence, probability=probabilities(result.ground.hypotheses, evidence))
 
 
-def draw_exact(found: SearchResult, index: int, rng: np.random.Generator, n_draws: int) -> TermDraws:
+def draw_exact(result: SearchResult, index: int, rng: np.random.Generator, n_draws: int) -> TermDraws:
     """Draw under one hypothesis and the exact law."""
-    draws = draw_terms(found, index, rng, _OVERSAMPLING * n_draws)
-    log_weights = log_weights_of(found, index, draws)
+    draws = draw_terms(result, index, rng, _OVERSAMPLING * n_draws)
+    log_weights = log_weights_of(result, index, draws)
     if not np.isfinite(log_weights.max()):  # no draw is a plate under the exact law: only the linear terms are left
-        return draws.at(np.arange(0, draws.n_draws, _OVERSAMPLING))  # draws are in the order of their noise
-    return draws.at(rng.choice(draws.n_draws, size=n_draws, p=normalised_weights(log_weights)))
+        return draws.select(np.arange(0, draws.n_draws, _OVERSAMPLING))  # draws are in the order of their noise
+    return draws.select(rng.choice(draws.n_draws, size=n_draws, p=normalised_weights(log_weights)))
 
 
-def log_weights_of(found: SearchResult, index: int, drawn: TermDraws) -> Floats:
+def log_weights_of(result: SearchResult, index: int, draws: TermDraws) -> Floats:
     """ln of the likelihood under the exact law over that of the linear terms: (n_draws,) array.
 
     Where labels are uncertain, the former is summed over all assignments of peaks to modes.
     """
-    baseline, exact_log_frequency = found.ground.hypotheses[index].own, exact_log_frequencies(found, index, drawn)
-    log_readings = baseline.middle + found.seen(index)[0]
-    if baseline.every.is_open:
-        return log_likelihood_summed(baseline, exact_log_frequency, drawn.noise) - log_likelihood_of_labels(
-            baseline, log_readings, drawn
+    baseline, exact_log_frequency = (
+        result.ground.hypotheses[index].baseline,
+        exact_log_frequencies(result, index, draws),
+    )
+    log_readings = baseline.middle + result.residual_under_labels(index)[0]
+    if baseline.possible_modes.is_open:
+        return log_likelihood_summed(baseline, exact_log_frequency, draws.noise) - log_likelihood_of_labels(
+            baseline, log_readings, draws
         )
     squares = (
         (log_readings - exact_log_frequency[:, baseline.rows]) ** 2
-        - (log_readings - drawn.predicted[:, baseline.rows]) ** 2
-    ) / drawn.variance
+        - (log_readings - draws.predicted[:, baseline.rows]) ** 2
+    ) / draws.variance
     return np.nan_to_num(-0.5 * squares.sum(axis=1), nan=-np.inf, neginf=-np.inf)
 
 
-def exact_log_frequencies(found: SearchResult, index: int, drawn: TermDraws) -> Floats:
-    """ln f (Hz) of all modes that readings may be, at each draw: (n_draws, n_every) array."""
-    baseline = found.ground.baseline
-    n_members = len(found.ground.members(index))
-    total = np.zeros((drawn.n_draws, baseline.every.log_frequency.size))
+def exact_log_frequencies(result: SearchResult, index: int, draws: TermDraws) -> Floats:
+    """ln f (Hz) of all modes that readings may be, at each draw: (n_draws, n_modes) array."""
+    baseline = result.ground.baseline
+    n_members = len(result.ground.members(index))
+    total = np.zeros((draws.n_draws, baseline.possible_modes.log_frequency.size))
     if n_members != 1:
-        total += (1 - n_members) * baseline.every.predict(drawn.log_rigidities)
+        total += (1 - n_members) * baseline.possible_modes.predict(draws.log_rigidities)
     for member in range(n_members):
-        for _, law, rows, values in sizes_of(found, index, drawn, member):
-            total[rows] += law.every_log_frequency(baseline, drawn.log_rigidities[rows], values)
-    for law, rows, values in joint_sizes_of(found, index, drawn):
-        total[rows] = law.every_log_frequency(baseline, drawn.log_rigidities[rows], values)
-    return np.asarray(total + (drawn.inputs - baseline.every.inputs) @ baseline.every.input_slopes.T)
+        for _, law, rows, values in sizes_of(result, index, draws, member):
+            total[rows] += law.mode_log_frequencies(baseline, draws.log_rigidities[rows], values)
+    for law, rows, values in joint_sizes_of(result, index, draws):
+        total[rows] = law.mode_log_frequencies(baseline, draws.log_rigidities[rows], values)
+    return np.asarray(total + (draws.inputs - baseline.possible_modes.inputs) @ baseline.possible_modes.input_slopes.T)
 
 
 def _correction(result: SearchResult, index: int, rng: np.random.Generator) -> float:
@@ -162,11 +165,11 @@ def _correction(result: SearchResult, index: int, rng: np.random.Generator) -> f
     log_weights = log_weights_of(result, index, draws)
     if not np.isfinite(log_weights.max()):
         return -np.inf
-    baseline = result.ground.hypotheses[index].own
-    if not baseline.every.is_open:
+    baseline = result.ground.hypotheses[index].baseline
+    if not baseline.possible_modes.is_open:
         return log_mean(log_weights)
     # The evidence includes the sum over labels already: the correction is the ratio of both sums at the same draws.
-    by_terms = log_likelihood_of_labels(baseline, baseline.middle + result.seen(index)[0], draws)
+    by_terms = log_likelihood_of_labels(baseline, baseline.middle + result.residual_under_labels(index)[0], draws)
     return log_mean(log_weights) - log_mean(log_likelihood_summed(baseline, draws.predicted, draws.noise) - by_terms)
 
 
@@ -175,28 +178,28 @@ ConstantDraws = Mapping[str, Floats]
 
 
 def draw_constants(
-    found: SearchResult,
+    result: SearchResult,
     rng: np.random.Generator,
     n_draws: int,
-    among: Sequence[int] | None = None,
-    sampled: Mapping[int, ConstantDraws] | None = None,
+    hypothesis_indices: Sequence[int] | None = None,
+    sampler_draws: Mapping[int, ConstantDraws] | None = None,
 ) -> ConstantDraws:
     """Draws of the constants and inputs by name, (n_draws,) arrays, from the terms of hypotheses, weighted to the exact
     law.
 
-    The hypotheses `among` have their probability as weight; by default all have that under the exact law. Draws of a
-    hypothesis in `sampled` are taken from there.
+    The hypotheses `hypothesis_indices` have their probability as weight; by default all have that under the exact law.
+    Draws of a hypothesis in `sampler_draws` are taken from there.
     """
-    weighed_result = (under_exact_law(found) or found) if among is None else found
-    indices = np.arange(len(found.ground.hypotheses)) if among is None else np.asarray(among)
+    weighed_result = (under_exact_law(result) or result) if hypothesis_indices is None else result
+    indices = np.arange(len(result.ground.hypotheses)) if hypothesis_indices is None else np.asarray(hypothesis_indices)
     shares = weighed_result.probability[indices] / weighed_result.probability[indices].sum()
     parts: list[ConstantDraws] = []
     for index, n in zip(indices.tolist(), rng.multinomial(n_draws, shares).tolist(), strict=True):
-        if n and sampled and index in sampled:
-            picked_draws = rng.integers(next(iter(sampled[index].values())).size, size=n)
-            parts.append({name: np.ravel(values)[picked_draws] for name, values in sampled[index].items()})
+        if n and sampler_draws and index in sampler_draws:
+            picked_draws = rng.integers(next(iter(sampler_draws[index].values())).size, size=n)
+            parts.append({name: np.ravel(values)[picked_draws] for name, values in sampler_draws[index].items()})
         elif n:
-            parts.append(_draw_under(found, index, rng, n))
+            parts.append(_draw_under(result, index, rng, n))
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 

@@ -57,25 +57,25 @@ class Cells:
     def n_cells(self) -> int:
         return int(self.weights.size)
 
-    def some(self, cells: slice | Indices) -> Cells:
+    def select(self, cells: slice | Indices) -> Cells:
         """Some of the cells, with their weights unchanged."""
         return replace(self, **{key: getattr(self, key)[cells] for key in _PER_CELL})
 
-    def of(self, rows: Indices) -> Cells:
+    def at_modes(self, rows: Indices) -> Cells:
         """The same cells for some of the modes, by their indices."""
         if np.array_equal(rows, np.arange(self.shift.shape[1])):
             return self
         return replace(self, shift=self.shift[:, rows], slopes=self.slopes[:, rows])
 
-    def member(self, which: int, cells: Indices | None = None) -> tuple[Cells, Indices]:
+    def member(self, index: int, cells: Indices | None = None) -> tuple[Cells, Indices]:
         """The table of one of its effects, and the index there of each of some cells; by default of all cells."""
         cells = np.arange(self.n_cells) if cells is None else cells
-        return (self.parts[which], np.divmod(cells, self.parts[1].n_cells)[which]) if self.parts else (self, cells)
+        return (self.parts[index], np.divmod(cells, self.parts[1].n_cells)[index]) if self.parts else (self, cells)
 
-    def tangents(self, which: int) -> slice:
+    def tangents(self, index: int) -> slice:
         """The slice of the tangents of one of its effects."""
         ends = np.cumsum([0, *(part.slopes.shape[2] for part in self.parts or (self,))])
-        return slice(int(ends[which]), int(ends[which + 1]))
+        return slice(int(ends[index]), int(ends[index + 1]))
 
 
 _PER_CELL = ("weights", "shift", "slopes", "moved", "moved_slopes", "form", "z", "z_slopes")
@@ -103,7 +103,7 @@ def tabulate(baseline: Baseline, laws: Sequence[FormLaw], cells: tuple[int, int,
     return replace(tables[0], **columns | {"weights": columns["weights"] / len(laws)})
 
 
-def combine_cells(one: Cells, other: Cells) -> Cells:
+def combine_cells(first: Cells, second: Cells) -> Cells:
     """The table of two effects together: their shifts and refits add."""
 
     def add(first: Floats, second: Floats) -> Floats:
@@ -115,24 +115,24 @@ def combine_cells(one: Cells, other: Cells) -> Cells:
         return np.concatenate(parts, axis=2)
 
     return Cells(
-        weights=np.outer(one.weights, other.weights).ravel(),
-        shift=add(one.shift, other.shift),
-        slopes=join(one.slopes, other.slopes),
-        moved=add(one.moved, other.moved),
-        moved_slopes=join(one.moved_slopes, other.moved_slopes),
-        form=np.repeat(one.form, other.n_cells),
-        z=np.repeat(one.z, other.n_cells, axis=0),
-        z_slopes=np.repeat(one.z_slopes, other.n_cells, axis=0),
-        parts=(one, other),
+        weights=np.outer(first.weights, second.weights).ravel(),
+        shift=add(first.shift, second.shift),
+        slopes=join(first.slopes, second.slopes),
+        moved=add(first.moved, second.moved),
+        moved_slopes=join(first.moved_slopes, second.moved_slopes),
+        form=np.repeat(first.form, second.n_cells),
+        z=np.repeat(first.z, second.n_cells, axis=0),
+        z_slopes=np.repeat(first.z_slopes, second.n_cells, axis=0),
+        parts=(first, second),
     )
 
 
-def joint_law(baseline: Baseline, one: Form, other: Form) -> FormLaw:
+def joint_law(baseline: Baseline, first: Form, second: Form) -> FormLaw:
     """Solve a board with two effects around a baseline and over the priors of both."""
-    detail = ", ".join(form_detail for form_detail in (one.detail, other.detail) if form_detail)
-    board = with_forms(baseline.board, (one, other))
-    pair_form = Form(f"{one.effect} and {other.effect}", detail, board, (*one.free, *other.free))
-    return form_law(baseline, pair_form).placed(baseline)
+    detail = ", ".join(form_detail for form_detail in (first.detail, second.detail) if form_detail)
+    board = with_forms(baseline.board, (first, second))
+    pair_form = Form(f"{first.effect} and {second.effect}", detail, board, (*first.free, *second.free))
+    return form_law(baseline, pair_form).with_modes_of(baseline)
 
 
 def joint_table(baseline: Baseline, added: Cells, laws: JointLaws) -> Cells:
@@ -162,20 +162,22 @@ def joint_table(baseline: Baseline, added: Cells, laws: JointLaws) -> Cells:
 
 
 def refitted_shifts(baseline: Baseline, law: FormLaw, z: Floats) -> tuple[Floats, Floats]:
-    """Shifts, (n, n_every), with the constants refitted at (n, n_parameters) standard coordinates, and the changes of
+    """Shifts, (n, n_modes), with the constants refitted at (n, n_parameters) standard coordinates, and the changes of
     ln D.
 
     A shift is not a number where the law gives no frequency.
     """
     values = {free.name: free.prior.value(z[:, i]) for i, free in enumerate(law.form.free)}
     moved = np.zeros((len(z), baseline.log_rigidities.size))
-    shift = np.empty((len(z), baseline.every.log_frequency.size))
+    shift = np.empty((len(z), baseline.possible_modes.log_frequency.size))
     moving = np.arange(len(z))
     for n_done in range(_REFITS):
         moving_values = {name: value[moving] for name, value in values.items()}
         log_rigidities = baseline.log_rigidities + moved[moving]
-        shift[moving] = law.every_log_frequency(baseline, log_rigidities, moving_values) - baseline.every.log_frequency
-        step = -np.nan_to_num(shift[moving][:, baseline.rows]) @ baseline.absorbing.T
+        shift[moving] = (
+            law.mode_log_frequencies(baseline, log_rigidities, moving_values) - baseline.possible_modes.log_frequency
+        )
+        step = -np.nan_to_num(shift[moving][:, baseline.rows]) @ baseline.absorption.T
         longest = np.abs(step).max(axis=1)
         moving, step, longest = (array[longest > _SETTLED_STEP] for array in (moving, step, longest))
         if not moving.size or n_done == _REFITS - 1:
@@ -224,7 +226,7 @@ def _tabulate_form(baseline: Baseline, index: int, law: FormLaw, cells: tuple[in
         form=np.full(len(z), index),
         z=np.pad(z, ((0, 0), (0, n_unused))),
         z_slopes=np.pad(step, ((0, 0), (0, n_unused))),
-    ).some(np.flatnonzero(is_plate))
+    ).select(np.flatnonzero(is_plate))
 
 
 def cells_along(n_parameters: int, cells: tuple[int, int, int]) -> int:

@@ -134,7 +134,7 @@ def _solve_signature(baseline: Baseline, problem: PosedProblem, name: str) -> Si
     return signature(baseline, name, tuple(sizes.values()), np.concatenate(log_frequencies))
 
 
-def look_alikes(found: Sequence[Signature]) -> dict[str, tuple[str, ...]]:
+def look_alikes(signatures: Sequence[Signature]) -> dict[str, tuple[str, ...]]:
     """For each effect, the others with a like visible part, or an opposite one if one of the two acts either way."""
 
     def are_alike(first: Signature, second: Signature) -> bool:
@@ -142,14 +142,18 @@ def look_alikes(found: Sequence[Signature]) -> dict[str, tuple[str, ...]]:
         return (abs(likeness) if first.acts_both_ways or second.acts_both_ways else likeness) > LOOK_ALIKE_COSINE
 
     return {
-        first.effect: tuple(second.effect for second in found if second is not first and are_alike(first, second))
-        for first in found
+        first.effect: tuple(second.effect for second in signatures if second is not first and are_alike(first, second))
+        for first in signatures
     }
 
 
 def acts_both_ways(sizes: Iterable[Parameter]) -> bool:
     """Whether a size of an effect may be on either side of its null value."""
-    return any(_is_within(parameter.prior, parameter.null) for parameter in sizes if parameter.null is not None)
+    return any(
+        _is_within(parameter.prior, parameter.neutral_value)
+        for parameter in sizes
+        if parameter.neutral_value is not None
+    )
 
 
 def _is_within(prior: Quantity, value: float) -> bool:
@@ -158,12 +162,12 @@ def _is_within(prior: Quantity, value: float) -> bool:
     return inside and abs(float(prior.standard(value))) < _MOST_SD
 
 
-def cosine(one: Signature, other: Signature) -> float:
+def cosine(first: Signature, second: Signature) -> float:
     """Cosine of the visible parts of two effects; 0 if one has none but rounding."""
-    if any(signature.visible_rms <= _ROUNDING * signature.raw_rms for signature in (one, other)):
+    if any(signature.visible_rms <= _ROUNDING * signature.raw_rms for signature in (first, second)):
         return 0.0
-    first, second = one.visible / one.scales, other.visible / other.scales
-    return float(first @ second / (np.linalg.norm(first) * np.linalg.norm(second)))
+    first_shape, second_shape = first.visible / first.scales, second.visible / second.scales
+    return float(first_shape @ second_shape / (np.linalg.norm(first_shape) * np.linalg.norm(second_shape)))
 
 
 def _bias(baseline: Baseline, step: Floats) -> dict[str, float]:

@@ -17,39 +17,39 @@ LIMIT_PROBABILITY = 0.005
 _N_DRAWS = 2000
 
 
-def size_posterior(found: SearchResult, index: int, member: int, form: int, parameter: int) -> tuple[Floats, Floats]:
+def size_posterior(result: SearchResult, index: int, member: int, form: int, parameter: int) -> tuple[Floats, Floats]:
     """Probability and standard coordinate of each cell of a member's form, under one hypothesis."""
-    table, cells = found.ground.hypotheses[index].table.member(member)
-    by_cell = np.bincount(cells, weights=found.cells(index), minlength=table.n_cells)
+    table, cells = result.ground.hypotheses[index].table.member(member)
+    by_cell = np.bincount(cells, weights=result.cells(index), minlength=table.n_cells)
     of_form = table.form == form
     return by_cell[of_form], table.z[of_form, parameter]
 
 
-def likely_form(found: SearchResult, index: int, member: int) -> int:
+def likely_form(result: SearchResult, index: int, member: int) -> int:
     """Which form of one effect of a hypothesis is most probable."""
-    table, cells = found.ground.hypotheses[index].table.member(member)
-    laws = found.ground.members(index)[member].laws
-    return int(np.argmax(np.bincount(table.form[cells], weights=found.cells(index), minlength=len(laws))))
+    table, cells = result.ground.hypotheses[index].table.member(member)
+    laws = result.ground.members(index)[member].laws
+    return int(np.argmax(np.bincount(table.form[cells], weights=result.cells(index), minlength=len(laws))))
 
 
-def refit_board(found: SearchResult, index: int) -> Board:
+def refit_board(result: SearchResult, index: int) -> Board:
     """The board under a hypothesis: with its effects declared in their most probable forms, or two labels exchanged."""
-    hypothesis, board = found.ground.hypotheses[index], found.ground.baseline.board
+    hypothesis, board = result.ground.hypotheses[index], result.ground.baseline.board
     if hypothesis.swap is not None:
         return with_labels_exchanged(board, hypothesis.swap.first, hypothesis.swap.second)
-    members = enumerate(found.ground.members(index))
-    return with_forms(board, [candidate.laws[likely_form(found, index, member)].form for member, candidate in members])
+    members = enumerate(result.ground.members(index))
+    return with_forms(board, [candidate.laws[likely_form(result, index, member)].form for member, candidate in members])
 
 
-def size_at_limit(found: SearchResult, index: int) -> str:
+def size_at_limit(result: SearchResult, index: int) -> str:
     """The size of a hypothesis that is at the limit of its range, in words; empty if none is.
 
     Zero is no limit of a size that may be zero: it means no effect. The median is that of draws, because a cell of the
     table may be wider than the limit.
     """
-    draws = draw_terms(found, index, np.random.default_rng(0), _N_DRAWS)
-    for member in range(len(found.ground.members(index))):
-        for _, law, rows, z in standard_sizes_of(found, index, draws, member):
+    draws = draw_terms(result, index, np.random.default_rng(0), _N_DRAWS)
+    for member in range(len(result.ground.members(index))):
+        for _, law, rows, z in standard_sizes_of(result, index, draws, member):
             if 2 * rows.size < draws.n_draws:
                 continue
             for free, column in zip(law.form.free, z.T, strict=True):

@@ -106,9 +106,9 @@ def _claims_of_further_setups(
     return claims
 
 
-def scores_given(fit: Baseline, groups: Sequence[Sequence[int]], given: Iterable[int] | None = None) -> Floats:
-    """ln of the probability density of the readings of each group given the others, or those `given`: (n_groups,)
-    array.
+def scores_given(fit: Baseline, groups: Sequence[Sequence[int]], predictors: Iterable[int] | None = None) -> Floats:
+    """ln of the probability density of the readings of each group given the others, or given the
+    readings `predictors`: (n_groups,) array.
 
     To first order about a fit of fixed inputs. The constants are left open and the noise is averaged over its prior, so
     that neither a better fit to the reading itself nor a noise that follows it can raise its score.
@@ -121,7 +121,7 @@ def scores_given(fit: Baseline, groups: Sequence[Sequence[int]], given: Iterable
         rows = np.where(np.isin(np.arange(fit.n_modes), list(readings)), fit.rows, -1)
         return float(NormalTerms(empty, fit.labelled(rows), noise).log_evidence(fit.residual[None, :])[0])
 
-    given_readings = set(range(fit.n_modes) if given is None else given)
+    given_readings = set(range(fit.n_modes) if predictors is None else predictors)
     return np.array(
         [log_density(given_readings | set(group)) - log_density(given_readings - set(group)) for group in groups]
     )

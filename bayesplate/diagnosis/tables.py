@@ -68,7 +68,7 @@ def errors_table(diagnosis: Diagnosis) -> Table:
     else:
         title, columns = "Error", {"as it is": diagnosis.before}
     rows: list[Row] = [
-        (merit.title, *(merit.shown(merit.of(errors)) for errors in columns.values())) for merit in MERITS
+        (merit.title, *(merit.formatted(merit.value_of(errors)) for errors in columns.values())) for merit in MERITS
     ]
     return Table(f"{title}: {diagnosis.name}", ("", *columns), tuple(rows))
 
@@ -80,8 +80,8 @@ def claim_table(diagnosis: Diagnosis) -> Table | None:
     rows = []
     for condition in diagnosis.conditions:
         words = CONDITIONS[condition.name]
-        requirement = words.wanted.format(limit=words.shown(condition.limit))
-        value = str(words.shown(condition.value))
+        requirement = words.requirement.format(limit=words.formatted(condition.limit))
+        value = str(words.formatted(condition.value))
         if condition.name == "chance selection" and diagnosis.null_control.nested_ratio_percentile is not None:
             value += f", smaller than on {diagnosis.null_control.nested_ratio_percentile:.0f} % of them"
         rows.append((words.title, value, requirement, "yes" if condition.is_met else "no"))
@@ -221,7 +221,13 @@ def _size_words(amplitude: Amplitude | None) -> str | None:
 def before_after_table(diagnosis: Diagnosis) -> Table:
     """Errors, moduli in GPa and sizes of the added effects; without an added effect there is no column after."""
     rows: list[Row] = [
-        (merit.title, merit.shown(merit.of(diagnosis.before)), merit.shown(merit.of(diagnosis.after)), None, None)
+        (
+            merit.title,
+            merit.formatted(merit.value_of(diagnosis.before)),
+            merit.formatted(merit.value_of(diagnosis.after)),
+            None,
+            None,
+        )
         for merit in MERITS
     ]
     for name, averaged in diagnosis.elastic_averaged.items():

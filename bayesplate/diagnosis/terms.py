@@ -46,7 +46,7 @@ class NormalTerms:
     @cached_property
     def _whitening(self) -> Floats:
         """L^-1 B, with B the blind directions and L L' their covariance by noise and inputs: (n_levels, d, n) array."""
-        base, blind = self.baseline, self.baseline.blind
+        base, blind = self.baseline, self.baseline.residual_directions
         variances = self.noise.sd[:, base.setup_index] ** 2 + base.own_variance
         inputs = blind @ base.input_slopes
         covariance = np.einsum("di,li,ei->lde", blind, variances, blind) + inputs @ inputs.T
@@ -107,9 +107,9 @@ class NormalTerms:
         white, along = self._whitening, self._tangents[0] @ self._whitening[:, None]
         weighted_residuals = np.swapaxes(white, 1, 2) @ (white @ residuals.T)
         middles = self.table.shift @ (np.swapaxes(white, 1, 2) @ white)
-        log_mass = np.empty((len(self.baseline.same_modes), len(residuals)))
+        log_mass = np.empty((len(self.baseline.readings_by_mode), len(residuals)))
         errors = np.full((self.baseline.n_modes, len(residuals)), np.nan)
-        for i, mode in enumerate(self.baseline.same_modes):
+        for i, mode in enumerate(self.baseline.readings_by_mode):
             rows = [reading for reading in mode if self.baseline.is_mode[reading]]
             white_readings, tangents = white[:, :, rows], along[:, :, :, rows]
             weighted_errors = (
@@ -130,7 +130,7 @@ class NormalTerms:
         n_modes, n_tangents = self.table.slopes.shape[1:]
         step = max(1, _MOST_ARRAY_ELEMENTS // (self.noise.weights.size * max(n_sets, n_modes * n_tangents)))
         for first in range(0, self.table.n_cells, step):
-            part = self.table.some(slice(first, first + step))
+            part = self.table.select(slice(first, first + step))
             yield self if step >= self.table.n_cells else replace(self, table=part)
 
 
@@ -164,22 +164,22 @@ class NoiseGrid:
     weights: Floats  # (n_levels,) array: prior probability, summing to 1
 
 
-def noise_grid(board: Board, *, few: bool = False, reach: Sequence[float] = ()) -> NoiseGrid:
+def noise_grid(board: Board, *, is_coarse: bool = False, reach: Sequence[float] = ()) -> NoiseGrid:
     """A grid of noise levels, equidistant in ln noise, for one or two setups, and scattered points for more.
 
     The points are the first of Sobol's sequence (USSR Comput. Math. Math. Phys. 7, 1967), each in the middle of its
-    share of the prior: as many for twenty setups as for three, so that they are coarser with more setups. There are a
-    `few` levels or points for combinations of effects. The levels of one or two setups go up to `reach` at least, in
+    share of the prior: as many for twenty setups as for three, so that they are coarser with more setups. A coarse
+    grid, for combinations of effects, has a few of them. The levels of one or two setups go up to `reach` at least, in
     standard coordinates, so that a misfit of many times the noise has a level near it.
     """
     n_setups = len(board.setups)
-    counts = _FEW_LEVELS if few else _LEVELS
+    counts = _FEW_LEVELS if is_coarse else _LEVELS
     if n_setups in counts:
         axes = [_noise_levels(counts[n_setups], top) for top in reach or (_HIGH,) * n_setups]
         t = np.array(list(product(*axes)))
         weights = np.exp(-0.5 * (t**2).sum(axis=1))
     else:
-        t = _normal_points(_FEW_POINTS if few else _POINTS, n_setups)
+        t = _normal_points(_FEW_POINTS if is_coarse else _POINTS, n_setups)
         weights = np.ones(len(t))
     levels = [setup.noise.median * np.exp(setup.noise.log_sd * t[:, i]) for i, setup in enumerate(board.setups)]
     return NoiseGrid(np.stack(levels, axis=1), weights / weights.sum())

@@ -46,7 +46,7 @@ class Verdict:
     reason: str
     is_needed: bool = False  # whether the odds against no effect are larger than the null simulations leave to chance
     # the explanation that is named, or the alternatives of a group, the most probable first
-    stands_for: tuple[Explanation, ...] = ()
+    explanations: tuple[Explanation, ...] = ()
 
     @property
     def nearest(self) -> Explanation | None:
@@ -54,78 +54,78 @@ class Verdict:
         return self.best if self.word == "unexplained" and self.is_needed else None
 
     @property
-    def tried(self) -> int:
-        """Index of the hypothesis that is judged beside that of no effect: the best one fitted again, or 0."""
-        return self.fitted_again[0].index if self.fitted_again else 0
+    def judged_index(self) -> int:
+        """Index of the hypothesis judged beside that of no effect: that of the best refitted explanation, or 0."""
+        return self.refitted_explanations[0].index if self.refitted_explanations else 0
 
     @property
-    def fitted_again(self) -> tuple[Explanation, ...]:
-        """Explanations to fit again: those of the verdict, or the nearest one."""
-        return self.stands_for if self.nearest is None else (self.nearest,)
+    def refitted_explanations(self) -> tuple[Explanation, ...]:
+        """Explanations to refit: those of the verdict, or the nearest."""
+        return self.explanations if self.nearest is None else (self.nearest,)
 
 
-def rank_explanations(found: SearchResult) -> tuple[Explanation, ...]:
+def rank_explanations(result: SearchResult) -> tuple[Explanation, ...]:
     """Explanations by their support, best first.
 
     A pair is an explanation of its own only if it is three times as probable as its better effect alone, or if its
     effects are known ones that the card states; otherwise the better effect gets its probability.
     """
     support: dict[int, float] = {}
-    board = found.ground.baseline.board
+    board = result.ground.baseline.board
     singles = {
         hypothesis.members[0]: i
-        for i, hypothesis in enumerate(found.ground.hypotheses)
+        for i, hypothesis in enumerate(result.ground.hypotheses)
         if len(hypothesis.members) == 1 and not hypothesis.swap
     }
-    swaps = [i for i, hypothesis in enumerate(found.ground.hypotheses) if hypothesis.swap]
+    swaps = [i for i, hypothesis in enumerate(result.ground.hypotheses) if hypothesis.swap]
     for i in (*singles.values(), *swaps):
-        support[i] = float(found.probability[i])
-    for i, hypothesis in enumerate(found.ground.hypotheses):
+        support[i] = float(result.probability[i])
+    for i, hypothesis in enumerate(result.ground.hypotheses):
         if len(hypothesis.members) != 2:
             continue
-        better = max((singles[name] for name in hypothesis.members), key=lambda j: float(found.probability[j]))
-        share = float(found.probability[i])
-        if share >= CLEAR_FACTOR * float(found.probability[better]) or are_stated(board, hypothesis.members):
+        better = max((singles[name] for name in hypothesis.members), key=lambda j: float(result.probability[j]))
+        share = float(result.probability[i])
+        if share >= CLEAR_FACTOR * float(result.probability[better]) or are_stated(board, hypothesis.members):
             support[i] = share
         else:
             support[better] += share
-    explanations = [Explanation(found.ground.hypotheses[i].members, i, value) for i, value in support.items()]
+    explanations = [Explanation(result.ground.hypotheses[i].members, i, value) for i, value in support.items()]
     return tuple(sorted(explanations, key=lambda explanation: -explanation.support))
 
 
 def decide_verdict(
-    found: SearchResult, control: NullControl, others: Iterable[tuple[str, SearchResult]] | None = None
+    result: SearchResult, control: NullControl, variants: Iterable[tuple[str, SearchResult]] | None = None
 ) -> Verdict:
     """The verdict on one set of readings, with the null simulations of the same search.
 
-    An explanation is named only if it stands out in the `others` too, searches with the words of their assumptions; by
-    default those of `variant_searches`, which are run only if it stands out in the first.
+    An explanation is named only if it stands out in the `variants` too, searches with the words of their assumptions;
+    by default those of `variant_searches`, which are run only if it stands out in the first.
     """
-    explanations = rank_explanations(found)
+    explanations = rank_explanations(result)
     best = explanations[0] if explanations else None
-    if not found.ground.n_directions:
-        is_isotropic = found.ground.baseline.board.isotropic
+    if not result.ground.n_directions:
+        is_isotropic = result.ground.baseline.board.isotropic
         return Verdict(
             "undetectable", (), 0, best, NO_MODE_TO_JUDGE_BY_OF_ISOTROPIC if is_isotropic else NO_MODE_TO_JUDGE_BY
         )
-    if best is None or found.against_none <= control.needed_from:
-        return _verdict_without_effect(found, best)
-    p_value = found.p_value(best.index)
+    if best is None or result.log_odds <= control.needed_from:
+        return _verdict_without_effect(result, best)
+    p_value = result.p_value(best.index)
     if p_value < LEAST_P_VALUE:
-        reason = f"with {explanation_words(found, best)} the misfit is still too large ({p_value_words(p_value)})"
+        reason = f"with {explanation_words(result, best)} the misfit is still too large ({p_value_words(p_value)})"
         return Verdict("unexplained", (), 0, best, reason, is_needed=True)
-    limit = size_at_limit(found, best.index)
+    limit = size_at_limit(result, best.index)
     if limit:
-        reason = f"{explanation_words(found, best)} fits only at the limit of its range: {limit}"
+        reason = f"{explanation_words(result, best)} fits only at the limit of its range: {limit}"
         return Verdict("unexplained", (), 0, best, reason, is_needed=True)
-    contenders = alternatives(found, explanations)
+    contenders = alternatives(result, explanations)
     if stands_out(best, explanations):
-        rivalry = find_rivals(found, best, variant_searches(found) if others is None else others)
+        rivalry = find_rivals(result, best, variant_searches(result) if variants is None else variants)
         if not rivalry:
-            reason = f"{explanation_words(found, best)} has no rival within a factor 3, whatever is assumed"
+            reason = f"{explanation_words(result, best)} has no rival within a factor 3, whatever is assumed"
             return Verdict("named", best.members, best.index, best, reason, True, (best,))
         words, rivals = rivalry
-        reason = f"{words} {alternatives_words(found, rivals)} may be as probable"
+        reason = f"{words} {alternatives_words(result, rivals)} may be as probable"
         contenders = (best, *rivals)
     else:
         reason = "several explanations are about equally probable"
@@ -133,21 +133,25 @@ def decide_verdict(
     return Verdict("indistinguishable group", effects, best.index, best, reason, True, contenders)
 
 
-def stands_out(one: Explanation, ranked: Sequence[Explanation]) -> bool:
+def stands_out(explanation: Explanation, explanations: Sequence[Explanation]) -> bool:
     """Whether an explanation is three times as probable as every other one."""
-    return all(one.support >= CLEAR_FACTOR * other.support for other in ranked if other.index != one.index)
+    return all(
+        explanation.support >= CLEAR_FACTOR * other.support
+        for other in explanations
+        if other.index != explanation.index
+    )
 
 
 def find_rivals(
-    found: SearchResult, best: Explanation, others: Iterable[tuple[str, SearchResult]]
+    result: SearchResult, best: Explanation, variants: Iterable[tuple[str, SearchResult]]
 ) -> tuple[str, tuple[Explanation, ...]] | None:
     """The first assumption under which an explanation no longer stands out, and its rivals there; None if it always
     does.
 
     Rivals have the support of the first search.
     """
-    usual_explanations = {explanation.index: explanation for explanation in rank_explanations(found)}
-    for words, other in others:
+    usual_explanations = {explanation.index: explanation for explanation in rank_explanations(result)}
+    for words, other in variants:
         other_explanations = {explanation.index: explanation for explanation in rank_explanations(other)}
         own_explanation = other_explanations.get(best.index, Explanation(best.members, best.index, 0.0))
         rivals = [
@@ -174,18 +178,22 @@ def _verdict_without_effect(result: SearchResult, best: Explanation | None) -> V
     return Verdict("none needed", (), 0, best, f"the misfit is what the noise would leave ({p_value_words(p_value)})")
 
 
-def explanation_words(found: SearchResult, answer: Explanation) -> str:
+def explanation_words(result: SearchResult, explanation: Explanation) -> str:
     """An explanation in words: its effects, or the labels that it exchanges."""
-    swap = found.ground.hypotheses[answer.index].swap
+    swap = result.ground.hypotheses[explanation.index].swap
     if swap is None:
-        return effect_names(answer.members)
-    return f"{effect_name(RELABELLING)} {swap.words(found.ground.baseline)}"
+        return effect_names(explanation.members)
+    return f"{effect_name(RELABELLING)} {swap.words(result.ground.baseline)}"
 
 
-def alternatives_words(found: SearchResult, told: Sequence[Explanation]) -> str:
+def alternatives_words(result: SearchResult, explanations: Sequence[Explanation]) -> str:
     """Alternative explanations in words; the two effects of a pair stay together."""
-    words = [explanation_words(found, explanation) for explanation in told]
-    return ", or ".join(words) if any(len(explanation.members) > 1 for explanation in told) else join_words(words, "or")
+    words = [explanation_words(result, explanation) for explanation in explanations]
+    return (
+        ", or ".join(words)
+        if any(len(explanation.members) > 1 for explanation in explanations)
+        else join_words(words, "or")
+    )
 
 
 def p_value_words(p_value: float) -> str:
@@ -193,6 +201,10 @@ def p_value_words(p_value: float) -> str:
     return f"p = {p_value:.3f}" if p_value >= 0.001 else "p < 0.001"
 
 
-def alternatives(found: SearchResult, ranked: Sequence[Explanation]) -> tuple[Explanation, ...]:
+def alternatives(result: SearchResult, explanations: Sequence[Explanation]) -> tuple[Explanation, ...]:
     """Explanations within a factor ten of the best."""
-    return tuple(explanation for explanation in ranked if explanation.support * ALTERNATIVE_FACTOR >= ranked[0].support)
+    return tuple(
+        explanation
+        for explanation in explanations
+        if explanation.support * ALTERNATIVE_FACTOR >= explanations[0].support
+    )

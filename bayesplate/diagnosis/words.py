@@ -66,8 +66,8 @@ class FigureOfMerit:
     """A figure of merit."""
 
     words: str
-    of: Callable[[ModelErrors], float | None]
-    shown: Callable[[float | None], Value]
+    value_of: Callable[[ModelErrors], float | None]
+    formatted: Callable[[float | None], Value]
     is_rms: bool = False  # whether it is an error, rms cents, so that it can be drawn beside the others
 
     @property
@@ -112,7 +112,7 @@ def claim_sentence(diagnosis: Diagnosis) -> str:
     reasons = [
         (NO_MODE_LEFT if diagnosis.carrying_modes else TOO_FEW_READINGS)
         if condition.value is None
-        else CONDITIONS[condition.name].lacking
+        else CONDITIONS[condition.name].failure
         for condition in diagnosis.conditions
         if not condition.is_met
     ]
@@ -124,11 +124,11 @@ class ConditionWords:
     """A condition of the claim in words: its title, its requirement, and the reason where it is not met."""
 
     title: str
-    wanted: str
-    lacking: str
+    requirement: str
+    failure: str
     digits: int = 2
 
-    def shown(self, value: float | None) -> Value:
+    def formatted(self, value: float | None) -> Value:
         return number(value, self.digits)
 
 
@@ -166,9 +166,9 @@ def _error_change(diagnosis: Diagnosis) -> tuple[str, bool]:
     merits = [
         merit
         for merit in MERITS
-        if merit.is_rms and None not in (merit.of(diagnosis.before), merit.of(diagnosis.after))
+        if merit.is_rms and None not in (merit.value_of(diagnosis.before), merit.value_of(diagnosis.after))
     ]
-    before, after = (merits[-1].of(errors) or 0.0 for errors in (diagnosis.before, diagnosis.after))
+    before, after = (merits[-1].value_of(errors) or 0.0 for errors in (diagnosis.before, diagnosis.after))
     old, new = cents_texts(before, after)
     name = "left-out error" if len(merits) > 1 else "error in the fit"
     if old == new:

@@ -33,7 +33,7 @@ def effects_of(board: Board, setup: Setup) -> tuple[Effect, ...]:
     for name, effect in EFFECTS.items():
         if name not in board.effects:
             continue
-        if any(choice.name == name for choice in board.chosen):
+        if any(choice.name == name for choice in board.effect_forms):
             effects += _chosen_form(board, setup, name)
         elif not effect.refusal(board, setup):
             effects.append(effect.of(board, setup))
@@ -42,7 +42,7 @@ def effects_of(board: Board, setup: Setup) -> tuple[Effect, ...]:
 
 def _chosen_form(board: Board, setup: Setup, name: str) -> list[Effect]:
     """The form of an effect that was chosen for a setup, otherwise the form chosen for the board; none or one."""
-    forms = {form.owner: form for form in board.chosen if form.name == name}
+    forms = {form.owner: form for form in board.effect_forms if form.name == name}
     if setup.owner in forms:
         return [forms[setup.owner]]
     of_board = next((form for form in forms.values() if form.scope == "board"), None)
@@ -55,7 +55,7 @@ def implied_effects(board: Board) -> tuple[str, ...]:
 
     None where the card declares an empty list of effects.
     """
-    if not board.implies:
+    if not board.has_implied_effects:
         return ()
     return tuple(
         name

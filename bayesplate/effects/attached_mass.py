@@ -119,7 +119,7 @@ class AttachedMass(Effect):
         )
         return replace(self, owner=setup.owner, items=items)
 
-    def within(self, shaped: Effect) -> AttachedMass:
+    def within_outline(self, shaped: Effect) -> AttachedMass:
         return replace(self, items=tuple(_item_within(item, shaped) for item in self.items))
 
     def _places_on(self, board: Board) -> list[Places]:
@@ -205,7 +205,7 @@ def heaviest_roving(board: Board, setup: Setup) -> float:
 def _item_within(item: PlacedItem, shaped: Effect) -> PlacedItem:
     outline = shaped.outline()
     assert outline is not None
-    places = tuple(shaped.placed(*place) for place in item.places)
+    places = tuple(shaped.to_plate(*place) for place in item.places)
     low, high = outline(np.array([x for x, _ in places]))
     return replace(item, places=places, reach=tuple(zip(low.tolist(), high.tolist(), strict=True)))
 

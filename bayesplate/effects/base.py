@@ -223,22 +223,24 @@ class Effect(ABC):
     def parameters(self) -> tuple[Parameter, ...]:
         """The effect's parameters with their priors; `parameter` makes one."""
 
-    def parameter(self, key: str, prior: Quantity, unit: str, null: float, source: str, words: str = "") -> Parameter:
+    def parameter(
+        self, key: str, prior: Quantity, unit: str, neutral_value: float, source: str, display_name: str = ""
+    ) -> Parameter:
         """A parameter of the effect.
 
         Parameters
         ----------
         unit : str
             SI.
-        null : float
+        neutral_value : float
             The value at which the effect is absent.
         source : str
             Where the prior comes from; empty if the card states it.
-        words : str
-            What people call it, if not its key.
+        display_name : str
+            Its name in reports; empty where that is its key.
         """
-        phrase = f"{words or key} of {self.name.replace('_', ' ')}"
-        return Parameter(key, self.owner, prior, unit, null, self.name, source=source, words=phrase)
+        phrase = f"{display_name or key} of {self.name.replace('_', ' ')}"
+        return Parameter(key, self.owner, prior, unit, neutral_value, self.name, source=source, display_name=phrase)
 
     def value(self, values: Values, key: str) -> Floats:
         """Value of a parameter: a number or an (n_draws,) array."""
@@ -256,19 +258,19 @@ class Effect(ABC):
         """The plate's outline where it is not the whole rectangle."""
         return None
 
-    def placed(self, x: float, y: float) -> tuple[float, float]:
+    def to_plate(self, x: float, y: float) -> tuple[float, float]:
         """Where on the plate's rectangle a place lies, given and returned as fractions of the vibrating sides.
 
         x and y are fractions of the nominal sides from the corner of x0 and y0; a place off the plate moves to its rim.
         """
         return x, y
 
-    def as_stated(self, x: float, y: float) -> tuple[float, float]:
-        """The inverse of `placed`: how a place on the plate is stated."""
+    def from_plate(self, x: float, y: float) -> tuple[float, float]:
+        """The inverse of `to_plate`: a place on the plate as fractions of the nominal sides."""
         return x, y
 
-    def within(self, shaped: Effect) -> Effect:
-        """The effect on a plate whose outline another effect gives: its places lie on that, its own terms end there."""
+    def within_outline(self, shaped: Effect) -> Effect:
+        """The effect on a plate whose outline `shaped` gives: places move onto that plate, terms end at its outline."""
         return self
 
     def variations(self) -> Mapping[TermGroup, tuple[Variation, ...]]:
@@ -279,12 +281,12 @@ class Effect(ABC):
         return {}
 
     @property
-    def goes_with(self) -> tuple[str, ...]:
-        """Inputs of the board that its fields follow: another value of them is another plate, not the same scaled."""
+    def followed_inputs(self) -> tuple[str, ...]:
+        """Inputs of the board that its fields follow: each value of such an input needs a plate of its own."""
         return ()
 
-    def also_at(self) -> tuple[Mapping[str, float], ...]:
-        """Further points at which an exact law is made, beside the ends of each parameter: shares of reach by name."""
+    def law_points(self) -> tuple[Mapping[str, float], ...]:
+        """Further points at which an exact law is made, besides the ends of each parameter: shares of reach by name."""
         return ()
 
     def stations(self) -> tuple[Effect, ...]:

@@ -120,9 +120,9 @@ class Exciter(Effect):
             exciters, drives=tuple(replace(drive, places=drive.places or gauss_places) for drive in exciters.drives)
         )
 
-    def within(self, shaped: Effect) -> Exciter:
+    def within_outline(self, shaped: Effect) -> Exciter:
         drives = (
-            replace(drive, places=tuple(shaped.placed(*place) for place in drive.places)) for drive in self.drives
+            replace(drive, places=tuple(shaped.to_plate(*place) for place in drive.places)) for drive in self.drives
         )
         return replace(self, drives=tuple(drives))
 
@@ -153,14 +153,20 @@ class Exciter(Effect):
                 middle, words = 0.5 * (low + high), f"place along {axis}"
                 prior = Quantity.from_mean(middle, 2.0 * (high - low), "normal", lower=low, upper=high)
                 place = self._parameter(i, f"place_{axis}", (prior, _PLACE_SOURCE), "1", middle, words)
-                parameters.append(replace(place, usual=middle))
+                parameters.append(replace(place, typical_value=middle))
         return tuple(parameters)
 
     def _parameter(
-        self, i: int, key: str, prior_and_source: tuple[Quantity, str], unit: str, null: float, words: str
+        self,
+        i: int,
+        key: str,
+        prior_and_source: tuple[Quantity, str],
+        unit: str,
+        neutral_value: float,
+        display_name: str,
     ) -> Parameter:
         prior, source = prior_and_source
-        return self.parameter(self._key(i, key), prior, unit, null, source, words)
+        return self.parameter(self._key(i, key), prior, unit, neutral_value, source, display_name)
 
     def _key(self, i: int, key: str) -> str:
         return key if len(self.drives) == 1 else f"{key}_{i + 1}"
@@ -179,7 +185,7 @@ class Exciter(Effect):
             for (low, high), order in zip(self._side_ranges, self.orders, strict=True)
         )
 
-    def also_at(self) -> tuple[Mapping[str, float], ...]:
+    def law_points(self) -> tuple[Mapping[str, float], ...]:
         """Places all over the range of an exciter, on its stiffest spring, which changes the plate's shapes most there.
 
         The ends of the range alone would leave out the shapes of its middle, and a usual spring most of those of a
@@ -216,7 +222,7 @@ class Exciter(Effect):
         ranges = self._place_ranges(drive)
 
         node_motions = [PointMotion(((1.0, x, y),)) for x in ranges[0].nodes.tolist() for y in ranges[1].nodes.tolist()]
-        magnet_rises = PointMotion(beside=coordinate)
+        magnet_rises = PointMotion(coordinate=coordinate)
         squares = tuple(PointTerm(((1.0, motion, motion),)) for motion in node_motions)
         couplings = tuple(PointTerm(((2.0, magnet_rises, motion),)) for motion in node_motions)
         magnet_square = PointTerm(((1.0, magnet_rises, magnet_rises),))

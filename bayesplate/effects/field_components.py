@@ -48,7 +48,7 @@ class FieldProfile:
     """A profile 1 + d(x, y), with no mean of d over the board: its expected course and its uncertain components."""
 
     expected: Surface
-    with_mean: Surface | None  # change of d where the board's mean is one of its standard deviations higher
+    mean_gain: Surface | None  # change of d where the board's mean is one of its standard deviations higher
     components: tuple[Surface, ...]  # change of d where a parameter of standard normal prior is one
     mean: float  # over the board, SI
     mean_sd: float
@@ -56,12 +56,12 @@ class FieldProfile:
     @property
     def is_uniform(self) -> bool:
         """Whether the profile is flat and certain: no expected course, and no component."""
-        return self.expected.size < SMALLEST_SURFACE and not self.open
+        return self.expected.size < SMALLEST_SURFACE and not self.uncertain_changes
 
     @property
-    def open(self) -> tuple[Surface, ...]:
+    def uncertain_changes(self) -> tuple[Surface, ...]:
         """All uncertain changes of d: first the one that goes with the mean, if there is one, then the components."""
-        return self.components if self.with_mean is None else (self.with_mean, *self.components)
+        return self.components if self.mean_gain is None else (self.mean_gain, *self.components)
 
 
 @dataclass(frozen=True)
@@ -82,21 +82,23 @@ def mountings(board: Board) -> tuple[Mounting, ...]:
 
 
 @lru_cache(maxsize=64)
-def field_profile(found: ConditionedField, held: tuple[Mounting, ...], power: int, mean_is_known: bool) -> FieldProfile:
-    """The profile of a conditioned field, with the components on which frequencies under the mountings `held` depend.
+def field_profile(
+    field: ConditionedField, mountings: tuple[Mounting, ...], power: int, mean_is_known: bool
+) -> FieldProfile:
+    """The profile of a conditioned field, with the components on which frequencies under the mountings depend.
 
     The stiffness goes with the `power` of the field, the mass with its first power: 3 for a thickness, 1 for a width. A
     mean that is known is no parameter, so that nothing can go with it.
     """
 
     def surface(coefficients: Floats) -> Surface:
-        return Surface(found.degrees, tuple(float(c) for c in coefficients))
+        return Surface(field.degrees, tuple(float(c) for c in coefficients))
 
-    with_mean = np.zeros_like(found.shape) if mean_is_known else found.with_mean
+    with_mean = np.zeros_like(field.shape) if mean_is_known else field.mean_gain
     if np.linalg.norm(with_mean) < SMALLEST_SURFACE:
-        with_mean = np.zeros_like(found.shape)
-    covariance = found.covariance - np.outer(with_mean, with_mean)
-    shifts_by_coefficient = np.concatenate([_energy_shifts(found.degrees, mounting, power) for mounting in held])
+        with_mean = np.zeros_like(field.shape)
+    covariance = field.covariance - np.outer(with_mean, with_mean)
+    shifts_by_coefficient = np.concatenate([_energy_shifts(field.degrees, mounting, power) for mounting in mountings])
     variances, directions = np.linalg.eigh(covariance)
     root = directions * np.sqrt(np.maximum(variances, 0.0))
     _, shifts, turns = np.linalg.svd(shifts_by_coefficient @ root, full_matrices=False)
@@ -104,11 +106,11 @@ def field_profile(found: ConditionedField, held: tuple[Mounting, ...], power: in
     n_open = min(int(np.searchsorted(carried, CARRIED_VARIANCE)) + 1, MOST_COMPONENTS - bool(with_mean.any()))
     components = (surface(root @ turn) for turn in turns[:n_open])
     return FieldProfile(
-        surface(found.shape),
+        surface(field.shape),
         surface(with_mean) if with_mean.any() else None,
         tuple(component for component in components if component.size >= SMALLEST_SURFACE),
-        found.mean,
-        found.sd,
+        field.mean,
+        field.sd,
     )
 
 
@@ -152,32 +154,35 @@ def _weighted_energies(ends: EdgeConditions, part: VibratingPart, highest: int) 
     return zeroth, first, second
 
 
-def field_parameters(effect: Effect, profile: FieldProfile, source: str, more: str) -> tuple[Parameter, ...]:
+def field_parameters(effect: Effect, profile: FieldProfile, source: str, comparative: str) -> tuple[Parameter, ...]:
     """The components' parameters: standard normal, zero where the profile is the expected one.
 
-    `more` is the word for the board where the field is high: "thicker".
+    `comparative` is the word for the board where the field is high: "thicker".
     """
     standard = Quantity.from_mean(0.0, 1.0, "normal")
     return tuple(
         replace(
             effect.parameter(f"field_{k}", standard, "1", 0.0, source, f"shape {k}"),
-            look=surface_words(component, profile.mean, more),
+            description=surface_words(component, profile.mean, comparative),
         )
         for k, component in enumerate(profile.components, start=1)
     )
 
 
-def surface_words(surface: Surface, mean: float, more: str) -> str:
-    """Words for where a surface, a fraction of a mean in m, is high, and for its rms; `more`: "thicker" or "wider"."""
+def surface_words(surface: Surface, mean: float, comparative: str) -> str:
+    """Words for where a surface, a fraction of a mean in m, is high, and for its rms.
+
+    `comparative` is "thicker" or "wider".
+    """
     terms = sorted(zip(surface.coefficients, surface.degrees, strict=True), key=lambda term: -abs(term[0]))
     named = [(value, degrees) for value, degrees in terms[:_MOST_NAMED] if value**2 >= _NAMED_SHARE * surface.size**2]
     places = [_PLACE_WORDS[degrees][value > 0] if degrees in _PLACE_WORDS else "in waves" for value, degrees in named]
     where = " and ".join(dict.fromkeys(places)) or "in waves"
-    return f"at +1 {more} {where}, {1e3 * mean * surface.size:.2g} mm rms"
+    return f"at +1 {comparative} {where}, {1e3 * mean * surface.size:.2g} mm rms"
 
 
 def standard_coordinates(profile: FieldProfile, mean: Floats, components: Sequence[Floats]) -> list[Floats]:
     """Standard coordinates of all uncertain changes: the mean's, where d goes with it, then the components'."""
-    if profile.with_mean is None:
+    if profile.mean_gain is None:
         return list(components)
     return [(np.asarray(mean) - profile.mean) / profile.mean_sd, *components]

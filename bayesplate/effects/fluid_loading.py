@@ -90,7 +90,7 @@ class FluidLoading(Effect):
             self.parameter("baffle", self.baffle, "1", 0.0, baffle_source),
         )
 
-    def within(self, shaped: Effect) -> FluidLoading:
+    def within_outline(self, shaped: Effect) -> FluidLoading:
         return replace(self, edge=shaped.outline())
 
     def contributions(self) -> tuple[Contribution, ...]:

@@ -69,7 +69,7 @@ class GrainAngle(Effect):
     @classmethod
     def notes(cls, board: Board) -> tuple[str, ...]:
         """A sentence that the other sign of the angle is another board, where the plate has no mirror line."""
-        are_both_tried = any(form.sign for form in board.chosen if isinstance(form, cls))
+        are_both_tried = any(form.sign for form in board.effect_forms if isinstance(form, cls))
         if cls.name not in board.effects or are_both_tried or not _signs_differ(board):
             return ()
         return (

@@ -69,9 +69,9 @@ class MembraneTension(Effect):
         return "" if self.axis == "both" else f"along {self.axis}"
 
     def parameters(self) -> tuple[Parameter, ...]:
-        return (self.parameter("N", _PRIOR, "N/m", 0.0, _SOURCE, words="tension"),)
+        return (self.parameter("N", _PRIOR, "N/m", 0.0, _SOURCE, display_name="tension"),)
 
-    def within(self, shaped: Effect) -> MembraneTension:
+    def within_outline(self, shaped: Effect) -> MembraneTension:
         return replace(self, edge=shaped.outline())
 
     def contributions(self) -> tuple[Contribution, ...]:

@@ -134,14 +134,14 @@ class OutlineProfile(Effect):
         """1 where a component widens the board, -1 where it narrows it."""
         return np.sign(self._step(self.part_x.on_whole(x), k)) + 0.0 * y
 
-    def placed(self, x: float, y: float) -> tuple[float, float]:
+    def to_plate(self, x: float, y: float) -> tuple[float, float]:
         """The corner of x0 and y0 is that of the outline."""
         if self.profile is None:
             return x, y
         (low,), (high,) = self.limits(np.array([x]))
         return x, float(np.clip(self._corner + y * self.part_y.share / self._widest_part, low, high))
 
-    def as_stated(self, x: float, y: float) -> tuple[float, float]:
+    def from_plate(self, x: float, y: float) -> tuple[float, float]:
         if self.profile is None:
             return x, y
         return x, float((y - self._corner) * self._widest_part / self.part_y.share)
@@ -167,10 +167,10 @@ class OutlineProfile(Effect):
         """Vibrating width at the widest place, over the mean width: the clamps cover the same width everywhere."""
         return self._widest - 1.0 + self.part_y.share
 
-    def limits(self, x: Floats, inside: int | None = None) -> tuple[Floats, Floats]:
+    def limits(self, x: Floats, component: int | None = None) -> tuple[Floats, Floats]:
         """The outline, or the one inside it by the strip of a component."""
         at = self.part_x.on_whole(x)
-        strip = 0.0 if inside is None else self._strip_steps * np.abs(self._step(at, inside))
+        strip = 0.0 if component is None else self._strip_steps * np.abs(self._step(at, component))
         missing = (self._widest - np.minimum(self._widths(at), self._widest) + strip) / self._widest_part
         low, high = {
             ("free", True): (0.5 * missing, 1.0 - 0.5 * missing),
@@ -194,10 +194,10 @@ class _ProfileOutline:
     """The outline of an effect, or the one inside it by the strip of a component; equal where the effects are."""
 
     effect: OutlineProfile
-    inside: int | None = None
+    component: int | None = None
 
     def __call__(self, x: Floats) -> tuple[Floats, Floats]:
-        return self.effect.limits(x, self.inside)
+        return self.effect.limits(x, self.component)
 
 
 @dataclass(frozen=True)

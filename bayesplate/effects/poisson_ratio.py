@@ -51,4 +51,4 @@ class PoissonRatio(Effect):
         """The Poisson ratio nu_xy, in the place of the board's own; the card's number is its null value."""
         prior, source = (FREE_ISOTROPIC, _ISOTROPIC_SOURCE) if self.is_isotropic else (FREE_POISSON, _SOURCE)
         free = self.parameter("nu_xy", prior, "1", self.stated, source)
-        return (replace(free, replaces="poisson_xy", words="Poisson ratio nu_xy"),)
+        return (replace(free, replaces="poisson_xy", display_name="Poisson ratio nu_xy"),)

@@ -53,7 +53,7 @@ class SupportMass(Effect):
         """The frame's mass; one of a thousand tons stands still."""
         return (self.parameter("mass", _PRIOR, "kg", 1e6, _SOURCE),)
 
-    def within(self, shaped: Effect) -> SupportMass:
+    def within_outline(self, shaped: Effect) -> SupportMass:
         edge = shaped.outline()
         assert edge is not None
         low, high = edge((np.arange(_N_POINTS) + 0.5) / _N_POINTS)

@@ -60,7 +60,7 @@ class SupportStiffness(Effect):
         source = _SOURCE if self.stiffness is _PRIOR else ""
         return (self.parameter("stiffness", self.stiffness, "N/m^3", 0.0, source),)
 
-    def within(self, shaped: Effect) -> SupportStiffness:
+    def within_outline(self, shaped: Effect) -> SupportStiffness:
         return replace(self, edge=shaped.outline())
 
     def contributions(self) -> tuple[Contribution, ...]:

@@ -109,8 +109,8 @@ class ThicknessProfile(Effect):
         return is_uniform, is_uniform
 
     @property
-    def goes_with(self) -> tuple[str, ...]:
-        return ("thickness",) if self.profile is not None and self.profile.with_mean is not None else ()
+    def followed_inputs(self) -> tuple[str, ...]:
+        return ("thickness",) if self.profile is not None and self.profile.mean_gain is not None else ()
 
     def variations(self) -> Mapping[TermGroup, tuple[Variation, ...]]:
         """Powers of the expanded field, or of a taper: (c + a u + b v)^n by the multinomial theorem."""
@@ -135,7 +135,7 @@ class ThicknessProfile(Effect):
         products = [
             chosen
             for k in range(min(n, _MOST_FACTORS) + 1)
-            for chosen in combinations_with_replacement(range(len(self.profile.open)), k)
+            for chosen in combinations_with_replacement(range(len(self.profile.uncertain_changes)), k)
         ]
         keys = tuple(parameter.key for parameter in self.parameters())
 
@@ -191,7 +191,7 @@ class _ExpandedField:
 
     def __call__(self, x: Floats, y: Floats) -> Floats:
         at = self.part_x.on_whole(x), self.part_y.on_whole(y)
-        factors = [self.profile.open[k](*at) for k in self.chosen]
+        factors = [self.profile.uncertain_changes[k](*at) for k in self.chosen]
         return prod(factors, start=(1.0 + self.profile.expected(*at)) ** self.power)
 
 

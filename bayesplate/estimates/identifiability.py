@@ -59,7 +59,7 @@ class Identifiability:
         """Standard errors of ln D_x, ln D_y, ln D_s: (3,) array."""
         return np.sqrt(np.diagonal(self.of_rigidities))
 
-    def blind(self) -> tuple[str, ...]:
+    def undetermined_constants(self) -> tuple[str, ...]:
         """Constants that the readings do not determine within the factor `IDENTIFIABLE_FACTOR`."""
         limit = np.log(IDENTIFIABLE_FACTOR) / 1.96
         return tuple(n for n, error in zip(self.symmetry.free, self.standard_errors, strict=True) if not error <= limit)
@@ -113,30 +113,38 @@ def require_labels(board: Board) -> None:
         )
 
 
-def require_identifiable(board: Board, found: Identifiability) -> None:
+def require_identifiable(board: Board, identifiability: Identifiability) -> None:
     """Refuse (NotIdentifiableError) readings that leave a constant open, naming it and what would help."""
-    if not found.blind():
+    if not identifiability.undetermined_constants():
         return
-    joint_reaches = _interval_factors(found.standard_errors)
-    reaches = joint_reaches if found.errors_beside_known is None else _interval_factors(found.errors_beside_known)
-    well_known = {n for n, factor in zip(found.symmetry.free, reaches, strict=True) if factor <= IDENTIFIABLE_FACTOR}
-    if len(well_known) == found.symmetry.n:  # each is known beside the others, but not all of them together
+    joint_reaches = _interval_factors(identifiability.standard_errors)
+    reaches = (
+        joint_reaches
+        if identifiability.errors_beside_known is None
+        else _interval_factors(identifiability.errors_beside_known)
+    )
+    well_known = {
+        n for n, factor in zip(identifiability.symmetry.free, reaches, strict=True) if factor <= IDENTIFIABLE_FACTOR
+    }
+    if len(well_known) == identifiability.symmetry.n:  # each is known beside the others, but not all of them together
         well_known, reaches = set(), joint_reaches
     clauses = []
-    for name, modulus, factor in zip(found.symmetry.free, found.symmetry.moduli, reaches, strict=True):
+    for name, modulus, factor in zip(
+        identifiability.symmetry.free, identifiability.symmetry.moduli, reaches, strict=True
+    ):
         if name not in well_known:
             reach = f"only within a factor {factor:.3g}" if np.isfinite(factor) and factor < 1e6 else "not at all"
             clauses.append(f"{name} (so {modulus}) {reach}; add {_HELPFUL_MODES[name]}")
     known_clauses = [
         f"{modulus} they tell"
-        for n, modulus in zip(found.symmetry.free, found.symmetry.moduli, strict=True)
+        for n, modulus in zip(identifiability.symmetry.free, identifiability.symmetry.moduli, strict=True)
         if n in well_known
     ]
     raise NotIdentifiableError(
         f"{board.name}: the modes {_mode_names(board)} determine "
         + "; ".join([*clauses, *known_clauses])
         + f" (condition number "
-        f"{found.condition_number:.3g})"
+        f"{identifiability.condition_number:.3g})"
     )
 
 
@@ -154,27 +162,33 @@ def _mode_names(board: Board) -> str:
     return join_words([f"{labels} of {name}" for name, labels in by_setup.items()])
 
 
-def identifiability_remarks(board: Board, found: Identifiability, carrying: str | None = None) -> tuple[str, ...]:
+def identifiability_remarks(
+    board: Board, identifiability: Identifiability, carrying: str | None = None
+) -> tuple[str, ...]:
     """Sentences on constants that are weakly known, for the table and the summary.
 
     `carrying` is the sentence of a fit on modes that alone carry a parameter; None before a fit: then the leverages of
-    `found` give it.
+    `identifiability` give it.
     """
-    sentences = [_weakest_constant_sentence(found)]
+    sentences = [_weakest_constant_sentence(identifiability)]
     names = [
         (f"{label}" if len(board.setups) == 1 else f"{label} of {setup.name}")
         for setup in board.setups
         for label in setup.labels
     ]
-    if len(names) == found.symmetry.n:
-        clause = "one mode fixes the one constant" if found.symmetry.is_isotropic else "three modes fix three constants"
+    if len(names) == identifiability.symmetry.n:
+        clause = (
+            "one mode fixes the one constant"
+            if identifiability.symmetry.is_isotropic
+            else "three modes fix three constants"
+        )
         sentences.append(
             f"{clause} exactly: nothing is left to check the model with, and the noise comes from its prior alone"
         )
     elif carrying is not None:
         sentences += [carrying] if carrying else []
     else:
-        for name, leverage in zip(names, found.leverages, strict=True):
+        for name, leverage in zip(names, identifiability.leverages, strict=True):
             if leverage > HIGH_LEVERAGE:
                 sentences.append(
                     f"mode {name} alone carries a constant (leverage {leverage:.2f}): an error in it cannot be seen"
@@ -182,7 +196,7 @@ def identifiability_remarks(board: Board, found: Identifiability, carrying: str 
     if all(set(setup.edges.values()) <= _HELD_EDGES for setup in board.setups):
         for setup in board.setups:
             held = "clamped" if set(setup.edges.values()) == {"clamped"} else "held"
-            sentences.append(f"setup {setup.name} is {held} all round: {_held_edges_clause(found.symmetry)}")
+            sentences.append(f"setup {setup.name} is {held} all round: {_held_edges_clause(identifiability.symmetry)}")
     return tuple(sentences)
 
 

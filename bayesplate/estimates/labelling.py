@@ -21,15 +21,15 @@ LIKELY_LABEL = 0.5
 """Probability above which a label is proposed: no two peaks can each be the same mode with more."""
 
 
-def label_likely_peaks(setup: Setup, peaks: PeakLikelihood, probabilities: Floats, least: float) -> Setup:
-    """A setup with labels for the peaks that are one mode with a probability above `least`.
+def label_likely_peaks(setup: Setup, peaks: PeakLikelihood, probabilities: Floats, threshold: float) -> Setup:
+    """A setup with labels for the peaks that are one mode with a probability above `threshold`.
 
-    Earlier proposed labels are dropped; `probabilities` is (n_peaks, n_modes), and `least` is one half or more, so that
-    no two peaks have the same label.
+    Earlier proposed labels are dropped; `probabilities` is (n_peaks, n_modes), and `threshold` is one half or more, so
+    that no two peaks have the same label.
     """
-    proposals = [_likely_label(peaks.labels, row, least) for row in probabilities]
+    proposals = [_likely_label(peaks.labels, row, threshold) for row in probabilities]
     reading_labels = {int(i): label for i, label in zip(peaks.readings, proposals, strict=True) if i >= 0}
-    bare_labels = {int(i): label for i, label in zip(peaks.bare, proposals, strict=True) if i >= 0}
+    bare_labels = {int(i): label for i, label in zip(peaks.unlabelled, proposals, strict=True) if i >= 0}
     stated_readings = {i: reading for i, reading in enumerate(setup.readings) if reading.confidence > 0}
     stated_labels = {i: reading.stated or reading.label for i, reading in stated_readings.items()}
     labels = _unique_labels(
@@ -67,6 +67,6 @@ def _relabel(setup: Setup, reading: Reading, label: Label) -> Reading:
     return replace(reading, label=label, beams=(label.m - setup.first_label.m, label.n - setup.first_label.n))
 
 
-def _likely_label(labels: Sequence[Label | None], probabilities: Floats, least: float) -> Label | None:
+def _likely_label(labels: Sequence[Label | None], probabilities: Floats, threshold: float) -> Label | None:
     best = int(np.argmax(probabilities))
-    return labels[best] if probabilities[best] > least else None
+    return labels[best] if probabilities[best] > threshold else None

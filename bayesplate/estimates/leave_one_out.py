@@ -105,19 +105,21 @@ def leverages_of(
     return Leverages(values, carries)
 
 
-def carrying_modes(board: Board, found: Leverages, names: Sequence[str]) -> tuple[CarryingMode, ...]:
+def carrying_modes(board: Board, leverages: Leverages, names: Sequence[str]) -> tuple[CarryingMode, ...]:
     """The modes of a board that alone carry one of the named parameters, of which the constants come first."""
     return tuple(
         CarryingMode(setup, label, float(leverage), names[column])
-        for (setup, label), leverage, column in zip(_reading_names(board), found.values, found.carries, strict=True)
+        for (setup, label), leverage, column in zip(
+            _reading_names(board), leverages.values, leverages.carries, strict=True
+        )
         if column >= 0
     )
 
 
-def unite_carrying_modes(*found: Iterable[CarryingMode]) -> tuple[CarryingMode, ...]:
+def unite_carrying_modes(*mode_sets: Iterable[CarryingMode]) -> tuple[CarryingMode, ...]:
     """Modes that alone carry a parameter under any of several models, each as under the first: none of them counts."""
     modes: dict[tuple[str, str], CarryingMode] = {}
-    for mode in chain.from_iterable(found):
+    for mode in chain.from_iterable(mode_sets):
         modes.setdefault((mode.setup, mode.label), mode)
     return tuple(modes.values())
 

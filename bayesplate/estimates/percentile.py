@@ -28,7 +28,7 @@ class PercentileEstimate:
     """Mean and spread of the trimmed estimates of each modulus, Pa."""
 
     estimates: Floats  # (n_subsets, 3) E_x, E_y, G_xy, before trimming
-    kept: Bools  # (n_subsets, 3)
+    is_kept: Bools  # (n_subsets, 3)
     mean: Mapping[str, float]
     sd: Mapping[str, float]
 

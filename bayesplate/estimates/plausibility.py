@@ -48,7 +48,7 @@ class CardMistake:
         wrong = dict(self.wrong)
         return float(self.frequency * wrong.get("length_x", 1.0) ** 2 / wrong.get("thickness", 1.0))
 
-    def mended(self, values: Mapping[str, Floats]) -> dict[str, Floats]:
+    def corrected(self, values: Mapping[str, Floats]) -> dict[str, Floats]:
         stated_values = {name: value for name, value in values.items() if name not in RIGIDITIES or "E_x" not in values}
         inputs = with_rigidities(stated_values | {name: values[name] / factor for name, factor in self.wrong})
         coupling = inputs["poisson_xy"] * inputs["D_y"]
@@ -144,25 +144,25 @@ class PriorPredictive:
 
 
 def prior_predictive(
-    board: Board, prior: PriorCard, rng: np.random.Generator, suspects: Sequence[CardMistake] = (_NO_MISTAKE,)
+    board: Board, prior: PriorCard, rng: np.random.Generator, mistakes: Sequence[CardMistake] = (_NO_MISTAKE,)
 ) -> list[PriorPredictive | None]:
     """Frequencies of a board's labelled modes under its prior, from Rayleigh quotients of beam-function products.
 
     Frequencies are those of the bare thin plate and err by a few per cent; uncertain inputs are drawn too. One result
-    for each of the `suspects`, whose mistake is corrected first; None where a label would name no mode, or too few
+    for each of the `mistakes`, which is corrected first; None where a label would name no mode, or too few
     draws are a material.
     """
     values = prior_draws(board, prior, rng, _N_DRAWS)
     products = [product_coefficients(setup.ends_x, setup.ends_y) for setup in board.setups]
-    return [_predict_readings(board, products, values, suspect) for suspect in suspects]
+    return [_predict_readings(board, products, values, mistake) for mistake in mistakes]
 
 
 def _predict_readings(
     board: Board, products: Sequence[Floats], values: Mapping[str, Floats], mistake: CardMistake
 ) -> PriorPredictive | None:
-    mended, columns = mistake.mended(values), []
+    corrected, columns = mistake.corrected(values), []
     for setup, coefficients in zip(board.setups, products, strict=True):
-        weights = term_weights(mended, setup).stiffness
+        weights = term_weights(corrected, setup).stiffness
         for reading in setup.readings:
             i, j = mistake.beams(reading, setup.first_label)
             if min(i, j) < 0 or max(i, j) >= N_BEAMS:

@@ -219,7 +219,9 @@ class _SetupModes:
         other_modes = tuple(OtherMode(place, None) for place in places)
         peaks = []
         for setup, bare_setup in zip(setups, bare_setups, strict=True):
-            likelihood = PeakLikelihood.of(replace(model, system=replace(system, setup=bare_setup), others=other_modes))
+            likelihood = PeakLikelihood.of(
+                replace(model, system=replace(system, setup=bare_setup), other_modes=other_modes)
+            )
             assert likelihood is not None
             peaks.append(_limit_to_classes(likelihood, setup, model, places))
         return cls(system, nominal, reduced, scale, tuple(peaks))
@@ -243,7 +245,7 @@ class _TabledLikelihood:
     """The likelihood of the peaks of all setups where a population is."""
 
     # frequencies of setups that are alike, and the peaks of each
-    every: tuple[tuple[RegularGridInterpolator, tuple[PeakLikelihood, ...]], ...]
+    tables: tuple[tuple[RegularGridInterpolator, tuple[PeakLikelihood, ...]], ...]
 
     def log_likelihood(self, x: Floats, noise: float) -> Floats:
         """ln of the likelihood of all peaks at (n, 3) ln D: (n,), minus infinity where the table has no plate."""
@@ -266,7 +268,7 @@ class _TabledLikelihood:
         return np.concatenate(modes).T
 
     def _tabled_frequencies(self, x: Floats) -> Iterator[tuple[Floats, tuple[PeakLikelihood, ...]]]:
-        for table, peaks in self.every:
+        for table, peaks in self.tables:
             ends = np.array([[axis[0], axis[-1]] for axis in table.grid]).T
             positions = np.clip(_ratios(x), *ends)
             yield np.asarray(table(positions) + 0.5 * x[:, 2:]), peaks
@@ -337,7 +339,7 @@ def _limit_to_classes(
     of_peak: dict[int, Parity] = {
         i: model.plate.parity(reading.beams) for i, reading in enumerate(setup.readings) if reading.is_sure
     }
-    for row, bare in enumerate(peaks.bare):
+    for row, bare in enumerate(peaks.unlabelled):
         if int(bare) in of_peak:
             log_prior[row, [place.parity != of_peak[int(bare)] for place in places]] = -np.inf
     return replace(peaks, log_prior=log_prior)

@@ -109,7 +109,7 @@ class Assignments:
     The draws are the last axis: a run over modes then adds contiguous rows of draws.
     """
 
-    near: Sequence[NearPeaks]  # of each row
+    near_peaks: Sequence[NearPeaks]  # of each row
     ratios: Sequence[Floats]  # (n_pairs, n_draws): r_ij of the pairs of each row
     unsigned: Sequence[tuple[int, int]] = ()  # places in both rows of each peak of unknown sign
 
@@ -202,7 +202,7 @@ class Assignments:
     @property
     def _table_shape(self) -> tuple[int, int]:
         """Size of the table: along each row, the numbers of peaks from none to all."""
-        a, *b = (near.n_peaks + 1 for near in self.near)
+        a, *b = (near.n_peaks + 1 for near in self.near_peaks)
         return a, b[0] if b else 1
 
     @property
@@ -215,7 +215,7 @@ class Assignments:
     def _spans(self) -> list[tuple[int, int] | None]:
         """The first and the last mode near each peak of unknown sign; None where no mode is near."""
         near_modes = (
-            [j for near, peak in zip(self.near, peaks, strict=True) for j in near.modes(peak)]
+            [j for near, peak in zip(self.near_peaks, peaks, strict=True) for j in near.modes(peak)]
             for peaks in self.unsigned
         )
         return [(min(modes), max(modes)) if modes else None for modes in near_modes]
@@ -234,7 +234,7 @@ class Assignments:
         ends = [(last, peak) for _, last, peak in spans]
         doubtful: tuple[int, ...] = ()
         log_growths = [np.log1p(ratios.max(axis=1, initial=0.0)).tolist() for ratios in self.ratios]
-        bounds_by_row = (zip(near.first, near.end, near.low, near.starts[:-1], strict=True) for near in self.near)
+        bounds_by_row = (zip(near.first, near.end, near.low, near.starts[:-1], strict=True) for near in self.near_peaks)
         for mode, mode_bounds in enumerate(zip(*bounds_by_row, strict=True)):
             (top_a, top_b), log_growth, near_rows = tops, 0.0, []
             for row, (first, end, low, start) in enumerate(mode_bounds):

@@ -60,9 +60,13 @@ def log_frequency(squared: Floats) -> Floats:
     return 0.5 * np.log(np.where(squared > 0, squared, np.nan)) - np.log(2.0 * np.pi)
 
 
-def mean_log_frequency(each: Sequence[Floats]) -> Floats:
+def mean_log_frequency(log_frequencies: Sequence[Floats]) -> Floats:
     """ln of the mean of several frequencies, from the ln of each: arrays of one shape."""
-    return each[0] if len(each) == 1 else np.asarray(np.log(np.mean(np.exp(each), axis=0)))
+    return (
+        log_frequencies[0]
+        if len(log_frequencies) == 1
+        else np.asarray(np.log(np.mean(np.exp(log_frequencies), axis=0)))
+    )
 
 
 def cents(log_ratio: Floats) -> Floats:

@@ -35,9 +35,9 @@ class OtherMode:
     beams: Beams | None  # orders of the beam functions that its shape resembles; None: it clearly resembles none
 
 
-def every_label(setup: Setup, others: Sequence[OtherMode]) -> tuple[Label | None, ...]:
+def mode_labels(setup: Setup, other_modes: Sequence[OtherMode]) -> tuple[Label | None, ...]:
     """Labels of a setup's readings, then of other modes; None where a shape clearly resembles no beam functions."""
-    first, all_beams = setup.first_label, (other.beams for other in others)
+    first, all_beams = setup.first_label, (other.beams for other in other_modes)
     return (
         *setup.labels,
         *(None if beams is None else Label(beams[0] + first.m, beams[1] + first.n) for beams in all_beams),
@@ -55,16 +55,16 @@ class SetupModel:
     linear: LinearLaw
     exact: ExactLaw | None = None  # None until `with_exact_law`
     # modes without a label, up to above the highest peak; none until `with_other_modes`
-    others: tuple[OtherMode, ...] = ()
-    # (n_modes + n_others,), over the largest that each shape could give; None: places not known
+    other_modes: tuple[OtherMode, ...] = ()
+    # (n_modes,), over the largest that each shape could give; None: places not known
     residues: Floats | None = None
     # models with the roving item at its further places: a frequency is the mean over all places
-    roved: tuple[SetupModel, ...] = ()
+    roving_models: tuple[SetupModel, ...] = ()
 
     @property
     def stations(self) -> tuple[SetupModel, ...]:
         """The model with the roving item at each of its places; itself where nothing roved."""
-        return (replace(self, roved=()), *self.roved)
+        return (replace(self, roving_models=()), *self.roving_models)
 
     @property
     def worst_cents(self) -> float:
@@ -83,33 +83,33 @@ class SetupModel:
         return self.exact
 
     @property
-    def every_place(self) -> tuple[ModePlace, ...]:
-        return (*self.places, *(other.place for other in self.others))
+    def mode_places(self) -> tuple[ModePlace, ...]:
+        return (*self.places, *(other.place for other in self.other_modes))
 
     def log_frequencies(self, values: Values, law: LawName) -> Floats:
-        """ln f of each labelled mode: (n_draws, n_modes) array; not a number where the law gives no frequency."""
-        return self.every_log_frequency(values, law)[:, : len(self.places)]
+        """ln f of each labelled mode: (n_draws, n_labelled) array; not a number where the law gives no frequency."""
+        return self.mode_log_frequencies(values, law)[:, : len(self.places)]
 
-    def every_log_frequency(self, values: Values, law: LawName) -> Floats:
-        """ln f of the labelled modes, then of the others: (n_draws, n_modes + n_others) array."""
+    def mode_log_frequencies(self, values: Values, law: LawName) -> Floats:
+        """ln f of the labelled modes, then of the others: (n_draws, n_modes) array."""
         log_frequencies = log_frequency(self.law(law).squared(self.system.weights(values)))
         return mean_log_frequency(
-            [log_frequencies, *(station.every_log_frequency(values, law) for station in self.roved)]
+            [log_frequencies, *(station.mode_log_frequencies(values, law) for station in self.roving_models)]
         )
 
     @cached_property
     def _discrepancy_names(self) -> dict[int, tuple[str, str]]:
         """Names of the two parameters whose product is the discrepancy of a mode, by mode."""
-        names_by_mode = {i: discrepancy_names(self.setup, label) for i, label in enumerate(self.every_label) if label}
+        names_by_mode = {i: discrepancy_names(self.setup, label) for i, label in enumerate(self.mode_labels) if label}
         return {i: names for i, names in names_by_mode.items() if names is not None}
 
     def discrepancies(self, values: Values) -> Floats:
-        """ln f of the board less that of its plate, (n_draws, n_every); one zero where sessions share none."""
+        """ln f of the board less that of its plate, (n_draws, n_modes); one zero where sessions share none."""
         shared = {i: names for i, names in self._discrepancy_names.items() if names[1] in values}
         if not shared:
             return np.zeros((1, 1))
         shifts = {i: np.ravel(values[scale] * values[standard]) for i, (scale, standard) in shared.items()}
-        discrepancies = np.zeros((max(shift.size for shift in shifts.values()), len(self.every_place)))
+        discrepancies = np.zeros((max(shift.size for shift in shifts.values()), len(self.mode_places)))
         for i, shift in shifts.items():
             discrepancies[:, i] = shift
         return discrepancies
@@ -118,25 +118,27 @@ class SetupModel:
         """The model with the linear law of the exact law's modes at one draw of values."""
         assert self.exact is not None
         linear = self.exact.tangent(self.system.weights(values))
-        return replace(self, linear=linear, roved=tuple(station.tangent(values) for station in self.roved))
+        return replace(
+            self, linear=linear, roving_models=tuple(station.tangent(values) for station in self.roving_models)
+        )
 
     @cached_property
-    def every_label(self) -> tuple[Label | None, ...]:
-        return every_label(self.setup, self.others)
+    def mode_labels(self) -> tuple[Label | None, ...]:
+        return mode_labels(self.setup, self.other_modes)
 
     @property
-    def every_beams(self) -> tuple[Beams | None, ...]:
+    def mode_beams(self) -> tuple[Beams | None, ...]:
         """Orders of the beam functions of the labelled modes, then of the others."""
-        return (*(reading.beams for reading in self.setup.readings), *(other.beams for other in self.others))
+        return (*(reading.beams for reading in self.setup.readings), *(other.beams for other in self.other_modes))
 
     def labelled_as(self, setup: Setup) -> SetupModel:
         """The same modes for a setup with other labels, all of modes that this model has: nothing is solved again."""
-        beams = self.every_beams
+        beams = self.mode_beams
         labelled = [beams.index(reading.beams) for reading in setup.readings]
         return self._labelled_as(setup, labelled, [i for i in range(len(beams)) if i not in labelled])
 
     def _labelled_as(self, setup: Setup, labelled: list[int], unlabelled: list[int]) -> SetupModel:
-        beams, order, places = self.every_beams, [*labelled, *unlabelled], self.every_place
+        beams, order, places = self.mode_beams, [*labelled, *unlabelled], self.mode_places
         exact = self.exact
         if exact is not None:
             exact = ExactLaw(replace(exact.reduced, places=tuple(places[i] for i in order)))
@@ -146,17 +148,17 @@ class SetupModel:
             places=tuple(places[i] for i in labelled),
             linear=LinearLaw(self.linear.stiffness[order], self.linear.mass[order]),
             exact=exact,
-            others=tuple(OtherMode(places[i], beams[i]) for i in unlabelled),
+            other_modes=tuple(OtherMode(places[i], beams[i]) for i in unlabelled),
             residues=None if self.residues is None else self.residues[order],
-            roved=tuple(station._labelled_as(setup, labelled, unlabelled) for station in self.roved),
+            roving_models=tuple(station._labelled_as(setup, labelled, unlabelled) for station in self.roving_models),
         )
 
     def sensitivities(self, values: Values) -> Floats:
-        """d ln f / d ln D at the point where the modes were computed: (n_modes, 3) array, columns D_x, D_y, D_s.
+        """d ln f / d ln D at the point where the modes were computed: (n_labelled, 3) array, columns D_x, D_y, D_s.
 
         It is half the share of each constant in the mode's energy: for the bare thin plate rows sum to one half.
         """
-        if self.roved:
+        if self.roving_models:
             return np.asarray(np.mean([station.sensitivities(values) for station in self.stations], axis=0))
         total, without = squared_frequencies_by_rigidity(self.system, values, self.linear.stiffness[: len(self.places)])
         return 0.5 * (1.0 - without / total[:, None])
@@ -177,7 +179,7 @@ def setup_model(
         _setup_model(station, values, station.plate(values) if plate is None or k else plate, places)
         for k, (station, places) in enumerate(zip(system.stations, previous, strict=True))
     )
-    return replace(first, roved=tuple(further))
+    return replace(first, roving_models=tuple(further))
 
 
 def _setup_model(system: System, values: Values, plate: Plate, places: tuple[ModePlace, ...] | None) -> SetupModel:
@@ -213,10 +215,14 @@ def _ranked_model(system: System, values: Values, plate: Plate, places: tuple[Mo
 def with_other_modes(model: SetupModel, values: Values) -> SetupModel:
     """Add the modes without a label, up to above the highest peak and at least one, with their linear law."""
     extended, modes = _with_other_modes(model, values)
-    roved = tuple(_with_other_modes(station, values, len(modes.eigenvalues))[0] for station in model.roved)
-    n_labelled, n_others = len(model.places), min(len(station.others) for station in (extended, *roved))
+    roving_models = tuple(
+        _with_other_modes(station, values, len(modes.eigenvalues))[0] for station in model.roving_models
+    )
+    n_labelled, n_others = len(model.places), min(len(station.other_modes) for station in (extended, *roving_models))
     unlabelled = range(n_labelled, n_labelled + n_others)
-    return replace(extended, roved=roved)._labelled_as(model.setup, list(range(n_labelled)), list(unlabelled))
+    return replace(extended, roving_models=roving_models)._labelled_as(
+        model.setup, list(range(n_labelled)), list(unlabelled)
+    )
 
 
 def _with_other_modes(model: SetupModel, values: Values, n_least: int = 0) -> tuple[SetupModel, Modes]:
@@ -229,7 +235,7 @@ def _with_other_modes(model: SetupModel, values: Values, n_least: int = 0) -> tu
     unlabelled = [i for i in range(len(modes.eigenvalues)) if i not in labelled]
     names = name_modes(modes)
     labelled_beams = {reading.beams for reading in setup.readings}
-    others = tuple(
+    other_modes = tuple(
         OtherMode(
             ModePlace(modes.parities[i], int(modes.ranks[i]), names[i][1]),
             names[i][0] if names[i][1] >= CERTAIN_CORRELATION and names[i][0] not in labelled_beams else None,
@@ -245,12 +251,12 @@ def _with_other_modes(model: SetupModel, values: Values, n_least: int = 0) -> tu
     residues = None
     if by_mode is not None:
         residues = np.array([np.nan if i is None else by_mode[i] for i in [*labelled, *unlabelled]])
-    return replace(model, linear=linear, exact=None, others=others, residues=residues), modes
+    return replace(model, linear=linear, exact=None, other_modes=other_modes, residues=residues), modes
 
 
 def log_frequencies_of_board(models: Sequence[SetupModel], values: Values, law: LawName) -> list[Floats]:
-    """ln f of all modes of each setup, (n_draws, n_every), with the discrepancies that sessions share."""
-    return [model.every_log_frequency(values, law) + model.discrepancies(values) for model in models]
+    """ln f of all modes of each setup, (n_draws, n_modes), with the discrepancies that sessions share."""
+    return [model.mode_log_frequencies(values, law) + model.discrepancies(values) for model in models]
 
 
 def with_exact_law(
@@ -259,19 +265,21 @@ def with_exact_law(
     """Add the exact law, trained at `centre` and `around` it and checked at the points `held_out`, in cents."""
     reduced = reduced_order_model(
         model.plate,
-        model.every_place,
+        model.mode_places,
         model.system.weights(centre).at(0),
         [model.system.weights(values).at(0) for values in around],
         [model.system.weights(values).at(0) for values in held_out],
         tolerance,
     )
-    roved = tuple(with_exact_law(station, centre, around, held_out, tolerance) for station in model.roved)
-    return replace(model, exact=ExactLaw(reduced), roved=roved)
+    roving_models = tuple(
+        with_exact_law(station, centre, around, held_out, tolerance) for station in model.roving_models
+    )
+    return replace(model, exact=ExactLaw(reduced), roving_models=roving_models)
 
 
 def full_log_frequencies(model: SetupModel, values: Values) -> Floats:
-    """ln f (Hz) of a setup's labelled modes, (n_modes,), solved at given constants instead of taken from a law."""
-    if model.roved:
+    """ln f (Hz) of a setup's labelled modes, (n_labelled,), solved at given constants instead of taken from a law."""
+    if model.roving_models:
         return mean_log_frequency([full_log_frequencies(station, values) for station in model.stations])
     classes = solve_classes(model.plate, model.system.weights(values).at(0), modes_to_hold(model.places))
     return log_frequency(np.array([classes[place.parity].eigenvalues[place.rank] for place in model.places]))

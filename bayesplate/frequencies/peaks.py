@@ -12,7 +12,7 @@ from bayesplate.arrays import Floats, Indices
 from bayesplate.board.reading import Peak, Reading
 from bayesplate.board.setup import Setup
 from bayesplate.frequencies.assignment import LOG_NEGLIGIBLE, Assignments, NearPeaks
-from bayesplate.frequencies.model import SetupModel, every_label
+from bayesplate.frequencies.model import SetupModel, mode_labels
 from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.frequencies.residues import detection_share, sign_probabilities
 from bayesplate.labels import Label
@@ -55,11 +55,11 @@ class PeakLikelihood:
 
     errors: ReadingErrors  # of the peaks, in the order of frequency
     readings: Integers  # (n_peaks,): index of each peak among the setup's readings; -1: it is none of them
-    bare: Integers  # (n_peaks,): index among the setup's peaks without a label; -1: it has a label
+    unlabelled: Integers  # (n_peaks,): index among the setup's peaks without a label; -1: it has a label
     columns: Integers  # (n_modes,): indices in the model of the modes that peaks may be, the labelled ones first
     labels: tuple[Label | None, ...]
     log_prior: Floats  # (n_peaks, n_modes): ln prior of a pair: mode detected, peak not spurious, its label
-    log_alone: Floats  # (n_peaks,): ln of the probability of each peak if it is spurious
+    log_spurious: Floats  # (n_peaks,): ln of the probability of each peak if it is spurious
     missed: Floats  # (n_modes,): probability that a mode below the highest peak left no peak
     orders: tuple[OrderedPeaks, ...]  # one for all peaks, or one for each sign; peaks of unknown sign are in both
     log_highest: float  # ln of the highest measured frequency, Hz
@@ -71,15 +71,15 @@ class PeakLikelihood:
         if not needs_assignment(setup):
             return None
         doubtful = np.flatnonzero([not reading.is_sure for reading in setup.readings])
-        n_bare = len(setup.peaks)
-        readings = np.concatenate([np.full(n_bare, -1), doubtful]).astype(np.intp)
-        bare = np.concatenate([np.arange(n_bare), np.full(doubtful.size, -1)]).astype(np.intp)
+        n_unlabelled = len(setup.peaks)
+        readings = np.concatenate([np.full(n_unlabelled, -1), doubtful]).astype(np.intp)
+        unlabelled = np.concatenate([np.arange(n_unlabelled), np.full(doubtful.size, -1)]).astype(np.intp)
         errors = ReadingErrors.of_peaks(setup, doubtful, robust)
         order = np.argsort(errors.frequency, kind="stable")
-        errors, readings, bare = errors.at(order), readings[order], bare[order]
+        errors, readings, unlabelled = errors.select(order), readings[order], unlabelled[order]
         peaks: list[Peak | Reading] = [*setup.peaks, *(setup.readings[i] for i in doubtful)]
         signs = np.array([_SIGNS[peak.sign] for peak in peaks])[order]
-        other_modes = np.arange(len(setup.readings), len(model.every_place))
+        other_modes = np.arange(len(setup.readings), len(model.mode_places))
         columns = np.concatenate([doubtful, other_modes]).astype(np.intp)
         residues = None if model.residues is None else model.residues[columns]
         detection = np.full(columns.size, 1.0 - setup.missed)
@@ -87,7 +87,7 @@ class PeakLikelihood:
             detection = detection * np.where(np.isnan(residues), 1.0, detection_share(np.nan_to_num(residues)))
         spurious = np.array([setup.spurious if peak.spurious is None else peak.spurious for peak in peaks])[order]
         log_pair = np.log(detection) + np.log1p(-spurious)[:, None]
-        all_labels = every_label(setup, model.others)
+        all_labels = mode_labels(setup, model.other_modes)
         labels = tuple(all_labels[column] for column in columns)
         log_label = _log_labels(setup, readings, labels)
         highest = max([*setup.measured, *setup.unlabelled])
@@ -95,26 +95,26 @@ class PeakLikelihood:
         orders = tuple(_orders(signs, columns.size, residues))
         is_split = len(orders) > 1
         log_sign = np.where(((signs != 0) & (residues is not None)) | is_split, -np.log(2.0), 0.0)
-        log_alone = np.log(spurious * spurious.size * relative_width) + log_label[:, -1] + log_sign
+        log_spurious = np.log(spurious * spurious.size * relative_width) + log_label[:, -1] + log_sign
         return cls(
             errors=errors,
             readings=readings,
-            bare=bare,
+            unlabelled=unlabelled,
             columns=columns,
             labels=labels,
             log_prior=log_pair + log_label[:, :-1],
-            log_alone=log_alone,
+            log_spurious=log_spurious,
             missed=1.0 - detection,
             orders=orders,
             log_highest=float(np.log(highest)),
         )
 
-    def log_likelihood(self, every_log_frequency: Floats, noise: Floats) -> Floats:
-        """ln of the probability of all peaks together, (n_draws,), from ln f (Hz) of all modes: (n_draws, n_every).
+    def log_likelihood(self, mode_log_frequencies: Floats, noise: Floats) -> Floats:
+        """ln of the probability of all peaks together, (n_draws,), from ln f (Hz) of all modes: (n_draws, n_modes).
 
         Minus infinity where a mode has no frequency.
         """
-        log_frequency = every_log_frequency[:, self.columns]
+        log_frequency = mode_log_frequencies[:, self.columns]
         complete = np.flatnonzero(np.isfinite(log_frequency).all(axis=1))
         result = np.full(len(log_frequency), -np.inf)
         if complete.size > _DRAWS_AT_ONCE:  # similar draws go together, so that fewer pairs are near at any of them
@@ -128,31 +128,31 @@ class PeakLikelihood:
     def _log_sum(self, log_frequency: Floats, noise: Floats) -> Floats:
         """`log_likelihood` of a batch of draws at which every mode has a frequency."""
         _, log_missed, assignments = self._assignments(log_frequency, noise)
-        return np.asarray(assignments.log_sum() + log_missed.sum(axis=0) + self.log_alone.sum())
+        return np.asarray(assignments.log_sum() + log_missed.sum(axis=0) + self.log_spurious.sum())
 
-    def probabilities(self, every_log_frequency: Floats, noise: Floats) -> Floats:
+    def probabilities(self, mode_log_frequencies: Floats, noise: Floats) -> Floats:
         """Probability that each peak is each mode, averaged over draws: (n_peaks, n_modes); the rest: spurious."""
         total = np.zeros(self.log_prior.shape)
         for start in range(0, len(noise), _DRAWS_AT_ONCE):
             batch = slice(start, start + _DRAWS_AT_ONCE)
-            total += self.probabilities_of_each(every_log_frequency[batch], noise[batch]).sum(axis=2)
+            total += self.probabilities_of_each(mode_log_frequencies[batch], noise[batch]).sum(axis=2)
         return total / len(noise)
 
-    def probabilities_of_each(self, every_log_frequency: Floats, noise: Floats) -> Floats:
+    def probabilities_of_each(self, mode_log_frequencies: Floats, noise: Floats) -> Floats:
         """Probability that each peak is each mode at each draw: (n_peaks, n_modes, n_draws) array."""
-        modes, _, assignments = self._assignments(every_log_frequency[:, self.columns], noise)
+        modes, _, assignments = self._assignments(mode_log_frequencies[:, self.columns], noise)
         result = np.zeros((*self.log_prior.shape, len(noise)))
         for row, (order, pairs) in enumerate(zip(self.orders, assignments.pairs(), strict=True)):
-            peaks, ranks = assignments.near[row].pairs()
+            peaks, ranks = assignments.near_peaks[row].pairs()
             result[order.peaks[peaks][:, None], modes[ranks], np.arange(len(noise))] += pairs
         return result
 
-    def log_density_alone(self, reading: int) -> float:
+    def log_density_spurious(self, reading: int) -> float:
         """ln of the density, in ln f, of one of the setup's readings if it is spurious."""
         peak = int(np.flatnonzero(self.readings == reading)[0])
-        errors = self.errors.at(np.array([peak]))
+        errors = self.errors.select(np.array([peak]))
         width = errors.resolution[0] / errors.frequency[0] if errors.rounded[0] else 1.0
-        return float(self.log_alone[peak] - np.log(width))
+        return float(self.log_spurious[peak] - np.log(width))
 
     def _assignments(self, log_frequency: Floats, noise: Floats) -> tuple[Integers, Floats, Assignments]:
         """Modes in order of frequency, ln of the probability that each left no peak, and the ratios r_ij of pairs.
@@ -194,7 +194,7 @@ class PeakLikelihood:
 
     def _log_ratio_bound(self, ordered: Floats, log_missed: Floats, noise: Floats) -> Floats:
         """Upper bound over draws of ln of the likelihood ratio of each pair, without its prior: (n_own, n_modes)."""
-        bound = self.errors.log_most(ordered.min(axis=1), ordered.max(axis=1), noise.min(), noise.max())
+        bound = self.errors.log_upper_bound(ordered.min(axis=1), ordered.max(axis=1), noise.min(), noise.max())
         return np.asarray((bound - log_missed.min(axis=1))[self._peaks])
 
     def _log_missed(self, log_frequency: Floats, noise: Floats) -> Floats:
@@ -222,7 +222,9 @@ class PeakLikelihood:
     @cached_property
     def _log_prior_ratio(self) -> Floats:
         """ln of the prior of each pair over that of a spurious peak, the rows of peaks one after the other."""
-        log_ratios = [(self.log_prior - self.log_alone[:, None])[order.peaks] + order.log_sign for order in self.orders]
+        log_ratios = [
+            (self.log_prior - self.log_spurious[:, None])[order.peaks] + order.log_sign for order in self.orders
+        ]
         return np.concatenate(log_ratios)
 
     @cached_property

@@ -34,13 +34,15 @@ class Predictor:
         return replace(self, rows=rows)
 
     def of_labelled(self) -> Predictor:
-        starts = np.cumsum([0, *(len(model.every_place) for model in self.models)])[:-1]
+        starts = np.cumsum([0, *(len(model.mode_places) for model in self.models)])[:-1]
         setups = zip(starts, self.models, strict=True)
         return self.of(np.concatenate([start + np.arange(len(model.places)) for start, model in setups]))
 
-    def with_fixed(self, rest: Floats) -> Predictor:
+    def with_fixed(self, fixed_values: Floats) -> Predictor:
         """A predictor as a function of the first parameters only, the (n_rest,) others held fixed."""
-        return replace(self, values=lambda x: self.values(np.concatenate([x, np.tile(rest, (len(x), 1))], axis=1)))
+        return replace(
+            self, values=lambda x: self.values(np.concatenate([x, np.tile(fixed_values, (len(x), 1))], axis=1))
+        )
 
     def tangent(self, at: Floats) -> Predictor:
         """The linear law of the modes at a point: equal to the exact one there, with the same slopes.

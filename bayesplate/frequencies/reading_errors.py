@@ -107,8 +107,10 @@ class ReadingErrors:
             np.array([f.mean for f in frequencies]), own_sd, np.where(own_sd == 0, setup.resolution, 0.0), robust
         )
 
-    def at(self, kept: NDArray[Any]) -> ReadingErrors:
-        return replace(self, frequency=self.frequency[kept], own_sd=self.own_sd[kept], resolution=self.resolution[kept])
+    def select(self, indices: NDArray[Any]) -> ReadingErrors:
+        return replace(
+            self, frequency=self.frequency[indices], own_sd=self.own_sd[indices], resolution=self.resolution[indices]
+        )
 
     @cached_property
     def log_frequency(self) -> Floats:
@@ -154,13 +156,13 @@ class ReadingErrors:
     def log_likelihood_of_pairs(self, readings: Indices, predicted: Floats, noise: Floats) -> Floats:
         """ln of the probability of (n_pairs,) readings, each paired with a mode: (n_pairs, n_draws), as its ln f."""
         if self.rounded.any():
-            return np.ascontiguousarray(self.at(readings).log_likelihood(predicted.T, noise).T)
+            return np.ascontiguousarray(self.select(readings).log_likelihood(predicted.T, noise).T)
         scale = np.ascontiguousarray(_total_sd(noise, self.own_sd).T)
         z = self.log_frequency[readings, None] - predicted
         z /= scale[readings]
         return np.asarray(self._density.log(z) - np.log(scale)[readings])
 
-    def log_most(self, lowest: Floats, highest: Floats, least_noise: float, most_noise: float) -> Floats:
+    def log_upper_bound(self, lowest: Floats, highest: Floats, least_noise: float, most_noise: float) -> Floats:
         """Upper bound of `log_likelihood_of_pairs` for ln f and noise within ranges: (n_readings, n_modes)."""
         distance = np.maximum(lowest - self.log_high[:, None], self.log_low[:, None] - highest)
         z = np.maximum(distance, 0.0) / _total_sd(most_noise, self.own_sd)[:, None]

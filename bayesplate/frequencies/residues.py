@@ -46,7 +46,7 @@ def deflections(
     """Deflection of each mode at a place (m from the board's corner) over its largest: (n_modes,) array, -1 to 1."""
     x, y = fractions_of(setup, place, values)
     if shaped is not None:
-        x, y = shaped.placed(x, y)
+        x, y = shaped.to_plate(x, y)
     deflection = modes.displacement(np.array([x]), np.array([y]))[:, 0, 0]
     return np.asarray(deflection / _largest_deflections(modes, shaped))
 

@@ -101,7 +101,7 @@ class System:
     def _acting_effects(self) -> tuple[Effect, ...]:
         """The effects as they act within the true outline, where an effect gives one."""
         shaped = self.shaped
-        return self.effects if shaped is None else tuple(effect.within(shaped) for effect in self.effects)
+        return self.effects if shaped is None else tuple(effect.within_outline(shaped) for effect in self.effects)
 
     def adjusted(self, values: Values) -> Values:
         """Values for all weights: sizes and density corrected by effects, shear moduli where the plate has them."""

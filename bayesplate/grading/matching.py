@@ -73,9 +73,9 @@ class Grading:
     log_mean : (n, 7) array
         Mean of ln E_x, E_y, G_xy, D_x, D_y, D_s and density, SI.
     log_covariance : (n, 7, 7) array
-    meets : dict of (n,) array
+    limit_probabilities : dict of (n,) array
         Probability that each limit is met, by the name of its figure.
-    meets_all : (n,) array or None
+    all_limits_probability : (n,) array or None
         Probability that all limits are met; None without limits.
     pairs : tuple of BoardPair
         None of them with a board in doubt.
@@ -86,8 +86,8 @@ class Grading:
     doubts: tuple[str, ...]
     log_mean: Floats
     log_covariance: Floats
-    meets: Mapping[str, Floats]
-    meets_all: Floats | None
+    limit_probabilities: Mapping[str, Floats]
+    all_limits_probability: Floats | None
     pairs: tuple[BoardPair, ...]
 
     def log(self, figure: LogFigure, boards: slice | Sequence[int] = slice(None)) -> tuple[Floats, Floats]:
@@ -120,7 +120,7 @@ def grade(rows: Sequence[BoardRow], request: GradingRequest) -> Grading:
     log_mean = np.array([joint.log_mean for _, joint in fitted]).reshape(-1, 7)
     covariance = np.array([joint.log_covariance for _, joint in fitted]).reshape(-1, 7, 7)
     trusted = np.flatnonzero([not row.doubt for row, _ in fitted])
-    meets, meets_all = _limit_probabilities(log_mean, covariance, request.limits)
+    limit_probabilities, all_limits_probability = _limit_probabilities(log_mean, covariance, request.limits)
     pairs = proposed_pairs(log_mean[trusted], covariance[trusted], request.match_percent)
     return Grading(
         request=request,
@@ -128,8 +128,8 @@ def grade(rows: Sequence[BoardRow], request: GradingRequest) -> Grading:
         doubts=tuple(row.doubt for row, _ in fitted),
         log_mean=log_mean,
         log_covariance=covariance,
-        meets=meets,
-        meets_all=meets_all,
+        limit_probabilities=limit_probabilities,
+        all_limits_probability=all_limits_probability,
         pairs=tuple(BoardPair(int(trusted[pair.first]), int(trusted[pair.second]), pair.probability) for pair in pairs),
     )
 

@@ -20,7 +20,7 @@ _DOUBT_MARK = "?"
 
 def rank_boards(graded: Grading) -> list[int]:
     """Indices of the boards by the probability of meeting the limits, without limits by E_x; boards in doubt last."""
-    score = graded.log_mean[:, 0] if graded.meets_all is None else graded.meets_all
+    score = graded.log_mean[:, 0] if graded.all_limits_probability is None else graded.all_limits_probability
     return sorted(range(len(graded.names)), key=lambda i: (bool(graded.doubts[i]), -float(score[i]), graded.names[i]))
 
 
@@ -36,7 +36,7 @@ def grading_tables(graded: Grading, most: int = MOST_LISTED) -> dict[str, Table]
         "makers": _figures_table(graded, listed, f"What makers compare, median ± sd{excerpt}", graded.request.figures),
     }
     trusted = [i for i in order if not graded.doubts[i]]
-    if graded.meets_all is not None and trusted:
+    if graded.all_limits_probability is not None and trusted:
         tables["limits"] = _limits_table(graded, trusted[:most], _excerpt_note(most, len(trusted)))
     if graded.pairs:
         tables["pairs"] = _pairs_table(graded, most)
@@ -91,11 +91,11 @@ def _figure_column(graded: Grading, boards: list[int], figure: LogFigure) -> lis
 
 
 def _limits_table(graded: Grading, boards: list[int], excerpt: str) -> Table:
-    assert graded.meets_all is not None
+    assert graded.all_limits_probability is not None
     limits = [limit_text(name, limit) for name, limit in graded.request.limits.items()]
-    probabilities = list(graded.meets.values())
+    probabilities = list(graded.limit_probabilities.values())
     if len(limits) > 1:
-        limits, probabilities = [*limits, "all of them"], [*probabilities, graded.meets_all]
+        limits, probabilities = [*limits, "all of them"], [*probabilities, graded.all_limits_probability]
     rows: list[Row] = [(graded.names[i], *(percent(float(p[i])) for p in probabilities)) for i in boards]
     return Table(f"Probability that a board meets the limits{excerpt}", ("board", *limits), tuple(rows))
 
@@ -125,10 +125,10 @@ def write_grading(folder: Path, graded: Grading) -> None:
     for name, figure in figures.items():
         for quantile, values in zip(("q50", "q05", "q95"), graded.spread(figure), strict=True):
             columns[f"{name}_{quantile}"] = (values * figure.per_unit).tolist()
-    for name, probability in graded.meets.items():
+    for name, probability in graded.limit_probabilities.items():
         columns[f"probability_{name}"] = probability.tolist()
-    if graded.meets_all is not None:
-        columns["probability_all_limits"] = graded.meets_all.tolist()
+    if graded.all_limits_probability is not None:
+        columns["probability_all_limits"] = graded.all_limits_probability.tolist()
     partners = graded.partners
     matches = [partners.get(i, (None, None)) for i in range(len(graded.names))]
     columns["partner"] = [None if partner is None else graded.names[partner] for partner, _ in matches]

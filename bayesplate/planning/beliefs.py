@@ -49,7 +49,8 @@ class ReadingsAtHand:
 
     shift: Floats  # (n_terms, n_readings) array: ln f (Hz) where u is zero; NaN of a reading that is no mode
     slopes: Floats  # (n_terms, n_readings, n_u) array
-    taken: IndexArray  # (n_readings,) array of int: the reading that has each label under the explanation; -1 for none
+    # (n_readings,) array of int: the reading that has each label under the explanation; -1 for none
+    reading_index: IndexArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,13 +63,13 @@ class ExplanationTerms:
     mean: Floats  # (n_terms, n_u) array
     covariance: Floats  # (n_terms, n_u, n_u) array
     noise: Floats  # (n_terms, n_setups) array: relative, of the setups of all boards in turn
-    # (n_terms, n_wanted) array: standard coordinates of the shared parameters, then ln of E_x, E_y, G_xy (Pa), board
+    # (n_terms, n_targets) array: standard coordinates of the shared parameters, then ln of E_x, E_y, G_xy (Pa), board
     # after board; where u is zero
     middle: Floats
-    wanted: Floats  # (n_terms, n_wanted, n_u) array: their slopes
+    target_slopes: Floats  # (n_terms, n_targets, n_u) array: their slopes
     forms: tuple[FormTerms, ...] = ()
     # the expected readings at hand; by default those of the laws of the stations
-    again: ReadingsAtHand | None = None
+    readings_at_hand: ReadingsAtHand | None = None
 
     @property
     def n_terms(self) -> int:
@@ -76,8 +77,8 @@ class ExplanationTerms:
 
     @property
     def expected(self) -> Floats:
-        """Mean of the wanted quantities in each term: (n_terms, n_wanted) array."""
-        return np.asarray(self.middle + np.einsum("twu,tu->tw", self.wanted, self.mean))
+        """Mean of the target quantities in each term: (n_terms, n_targets) array."""
+        return np.asarray(self.middle + np.einsum("twu,tu->tw", self.target_slopes, self.mean))
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +91,7 @@ class KnownBoard:
     columns: Floats  # (n_fitted, n_u) array: derivatives of its constants and inputs by the columns of u
     first_setup: int = 0  # index of its first setup among those of all boards
     # (n_shared, n_shared) array: its precision of the shared parameters, its own parameters integrated out
-    pull: Floats | None = None
+    shared_precision: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +105,7 @@ class Beliefs:
     basis: str = "readings"
     notes: tuple[str, ...] = ()  # limits of a plan that rests on them
     # where nothing explains the readings, what to do about a wrong reading before anything else
-    wrong: str | None = None
+    wrong_reading: str | None = None
 
     @property
     def is_prior(self) -> bool:
@@ -119,8 +120,8 @@ class Beliefs:
         return float(entropy(self.probabilities[:, None])[0])
 
     @property
-    def free(self) -> list[int]:
-        """Indices of the wanted quantities whose information is counted: the shared ones, or else the free moduli.
+    def counted_targets(self) -> list[int]:
+        """Indices of the target quantities whose information is counted: the shared ones, or else the free moduli.
 
         The moduli of an isotropic board follow from its first one.
         """
@@ -138,11 +139,11 @@ def entropy(probabilities: Floats) -> Floats:
 
 
 def station_laws(
-    board: Board, values: Values, prior: PriorCard | None, drawn: Sequence[Values] = (), *, is_elsewhere: bool = True
+    board: Board, values: Values, prior: PriorCard | None, plates: Sequence[Values] = (), *, is_elsewhere: bool = True
 ) -> tuple[BareLaw, ...]:
     """The laws of a board's old stations and, if `is_elsewhere`, of its new ones; see `bare_law`."""
     stations = [*old_stations(board, values), *(new_stations(board, values, prior) if is_elsewhere else ())]
-    return tuple(bare_law(board, station, values, drawn) for station in stations)
+    return tuple(bare_law(board, station, values, plates) for station in stations)
 
 
 def prior_levels(prior: Quantity, n: int, rng: np.random.Generator) -> Floats:
@@ -205,7 +206,7 @@ def prior_explanation(board: Board, prior: PriorCard, rng: np.random.Generator) 
         covariance=np.tile(root @ root.T, (N_TERMS, 1, 1)),
         noise=np.stack([prior_levels(setup.noise, N_TERMS, rng) for setup in board.setups], axis=1),
         middle=np.tile(middle, (N_TERMS, 1)),
-        wanted=np.tile(gradient, (N_TERMS, 1, 1)),
+        target_slopes=np.tile(gradient, (N_TERMS, 1, 1)),
     )
 
 

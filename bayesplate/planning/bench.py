@@ -44,17 +44,23 @@ class Bench:
 
 def make_benches(beliefs: Beliefs, steps: Sequence[Proposal]) -> tuple[Bench, ...]:
     """The bench of each way to hold a board that proposals ask for, two at most."""
-    likely = "over all explanations that survive" if len(beliefs.explanations) > 1 else "by what is known now"
+    basis = "over all explanations that survive" if len(beliefs.explanations) > 1 else "by what is known now"
     benches: list[Bench] = []
     for step in steps:
         if (
-            step.known is not None
-            and step.read is not None
+            step.known_board is not None
+            and step.station_readings is not None
             and step.entry.what != "again"
             and len(benches) < _MOST_BENCHES
         ):
             benches.append(
-                make_bench(step.known, step.read.law, step.rows, reading_bands(beliefs, step.readings), likely)
+                make_bench(
+                    step.known_board,
+                    step.station_readings.law,
+                    step.rows,
+                    reading_bands(beliefs, step.readings),
+                    basis,
+                )
             )
     return tuple(benches)
 
@@ -64,29 +70,31 @@ def reading_bands(beliefs: Beliefs, readings: PlannedReadings) -> Floats:
     from scipy.special import ndtri
 
     levels = ndtri((np.arange(_N_LEVELS) + 0.5) / _N_LEVELS)[:, None, None]
-    drawn, weights = [], []
+    frequencies, weights = [], []
     for k, explanation in enumerate(beliefs.explanations):
         slopes = readings.slopes[k]
         variance = np.einsum("tnu,tuv,tnv->tn", slopes, explanation.covariance, slopes) + readings.variance[k]
         expected = readings.shift[k] + np.einsum("tnu,tu->tn", slopes, explanation.mean)
-        drawn.append((expected + np.sqrt(variance) * levels).reshape(-1, readings.n))
-        weights.append(np.full(len(drawn[-1]), explanation.probability / len(drawn[-1])))
-    values, shares = np.concatenate(drawn), np.concatenate(weights)
+        frequencies.append((expected + np.sqrt(variance) * levels).reshape(-1, readings.n))
+        weights.append(np.full(len(frequencies[-1]), explanation.probability / len(frequencies[-1])))
+    values, shares = np.concatenate(frequencies), np.concatenate(weights)
     ends = np.empty((readings.n, len(BAND)))
     for i, order in enumerate(np.argsort(values, axis=0).T):
         ends[i] = np.interp(BAND, np.cumsum(shares[order]) - 0.5 * shares[order], values[order, i])
     return ends
 
 
-def make_bench(known: KnownBoard, law: BareLaw, rows: Sequence[int], ends: Floats, likely: str) -> Bench:
+def make_bench(known_board: KnownBoard, law: BareLaw, rows: Sequence[int], ends: Floats, basis: str) -> Bench:
     """The bench for some modes of a board; `ends` are ln of their frequencies (Hz) at the probabilities of `BAND`.
 
     In a session that goes on the sensor stays where it is.
     """
-    board, station = known.board, law.station
+    board, station = known_board.board, law.station
     system = station.system(board)
     numbers = (*NUMBERS_OF_MODES, N_SEARCHED_MODES)
-    full_sheet = sheet(board, system, station.values(system, known.values), "where they are expected", numbers=numbers)
+    full_sheet = sheet(
+        board, system, station.values(system, known_board.values), "where they are expected", numbers=numbers
+    )
     by_name = {mode.name: mode for mode in full_sheet.modes}
     names = [str(station.setup.labels[i]) for i in rows]
     mode_ends = [(by_name[name], end) for name, end in zip(names, np.exp(ends), strict=True) if name in by_name]
@@ -98,7 +106,7 @@ def make_bench(known: KnownBoard, law: BareLaw, rows: Sequence[int], ends: Float
     sensor = None if station.is_new else _sensor_place(board, station, full_sheet, system.shaped)
     placing = choose_places(shapes, grid_points()[::_GRID_STEP], sensor)
     spots = (full_sheet.drawn_at(*place) for place in (placing.sensor, placing.hammer, *placing.taps))
-    board_spots = spots if system.shaped is None else (system.shaped.as_stated(*place) for place in spots)
+    board_spots = spots if system.shaped is None else (system.shaped.from_plate(*place) for place in spots)
     places = places_on(board, station.setup, tuple(board_spots))
     sensor_mm, hammer_mm, *taps = ((round(1e3 * x), round(1e3 * y)) for x, y in places)
     modes = tuple(
@@ -107,7 +115,7 @@ def make_bench(known: KnownBoard, law: BareLaw, rows: Sequence[int], ends: Float
     )
     edges = dict(station.setup.edges)
     entry = BenchEntry(board.name, station.setup.name, edges, sensor_mm, hammer_mm, tuple(taps), modes)
-    return Bench(entry, replace(full_sheet, modes=sheet_modes, combined=(), likely=likely), placing)
+    return Bench(entry, replace(full_sheet, modes=sheet_modes, combined=(), likely=basis), placing)
 
 
 def _sensor_place(
@@ -118,7 +126,7 @@ def _sensor_place(
         return None
     ((x, y),) = fractions_on(board, station.setup, (station.base.sensor,))
     if shaped is not None:
-        x, y = shaped.placed(x, y)
+        x, y = shaped.to_plate(x, y)
     low, high = full_sheet.drawn_at(x, 0.0)[1], full_sheet.drawn_at(x, 1.0)[1]
     return x, (y - low) / (high - low)
 
@@ -188,7 +196,7 @@ def draw_up_plan(
     shared: Sequence[SharedParameter] = (),
 ) -> tuple[Plan, tuple[Bench, ...]]:
     """The plan as plan.json holds it, and the benches."""
-    beliefs, proposals = planner.beliefs, planner.ranked(priors, shared)
+    beliefs, proposals = planner.beliefs, planner.rank_proposals(priors, shared)
     sequences = planner.sequences(proposals)
     benches = make_benches(beliefs, sequences[-1][0] if sequences else proposals[:1])
     plan = Plan(
@@ -211,13 +219,13 @@ def draw_up_plan(
     return plan, benches
 
 
-def plan_first_line(planner: Planner, listed: Sequence[Proposal]) -> str:
+def plan_first_line(planner: Planner, proposals: Sequence[Proposal]) -> str:
     """The first line of a plan: what to do next; empty where nothing would help."""
     beliefs = planner.beliefs
-    if beliefs.wrong is not None:
-        return beliefs.wrong
+    if beliefs.wrong_reading is not None:
+        return beliefs.wrong_reading
     return first_line(
-        [proposal.entry for proposal in listed], _explanation_entries(beliefs), beliefs.entropy, planner.goal
+        [proposal.entry for proposal in proposals], _explanation_entries(beliefs), beliefs.entropy, planner.goal
     )
 
 

@@ -49,51 +49,60 @@ MOST_EXPLANATIONS = 4
 
 
 def search_beliefs(
-    found: SearchResult, prior: PriorCard | None, rng: np.random.Generator, among: Sequence[Explanation] | None = None
+    result: SearchResult, prior: PriorCard | None, rng: np.random.Generator, among: Sequence[Explanation] | None = None
 ) -> Beliefs:
     """Beliefs about a board after a search: with the explanations `among` which to choose, or with the surviving ones.
 
     No effect alone where nothing explains the readings. The prior is for the noise of new stations.
     """
-    base, is_failed = found.ground.baseline, among is None and is_unexplained(found)
+    base, is_failed = result.ground.baseline, among is None and is_unexplained(result)
     candidates = (
-        [Explanation((), 0, found.none)] if is_failed else surviving_explanations(found) if among is None else among
+        [Explanation((), 0, result.probability_of_none)]
+        if is_failed
+        else surviving_explanations(result)
+        if among is None
+        else among
     )
     n_fitted, explanations = (
         base.slopes.shape[1] + base.input_slopes.shape[1],
-        explanation_terms(found, candidates, rng),
+        explanation_terms(result, candidates, rng),
     )
     known_board = KnownBoard(base.board, base.values, station_laws(base.board, base.values, prior), np.eye(n_fitted))
     if is_failed:
         return Beliefs(
-            (known_board,), explanations, notes=(UNEXPLAINED_NOTE, *base.board.notes), wrong=wrong_reading(found)
+            (known_board,),
+            explanations,
+            notes=(UNEXPLAINED_NOTE, *base.board.notes),
+            wrong_reading=wrong_reading(result),
         )
     return Beliefs((known_board,), explanations, notes=base.board.notes)
 
 
-def is_unexplained(found: SearchResult) -> bool:
+def is_unexplained(result: SearchResult) -> bool:
     """Whether the readings have too small a p-value both without an effect and with the best explanation."""
-    if not found.ground.n_directions or found.p_value(0) >= LEAST_P_VALUE:
+    if not result.ground.n_directions or result.p_value(0) >= LEAST_P_VALUE:
         return False
-    ranked = rank_explanations(found)
-    return not ranked or found.p_value(ranked[0].index) < LEAST_P_VALUE
+    explanations = rank_explanations(result)
+    return not explanations or result.p_value(explanations[0].index) < LEAST_P_VALUE
 
 
 def explanation_terms(
-    found: SearchResult, left: Sequence[Explanation], rng: np.random.Generator
+    result: SearchResult, explanations: Sequence[Explanation], rng: np.random.Generator
 ) -> tuple[ExplanationTerms, ...]:
     """Explanations of a search, that of no effect with index 0, as terms; their probabilities sum to one."""
-    total = sum(explanation.support for explanation in left)
-    return tuple(_explanation_terms(found, explanation, explanation.support / total, rng) for explanation in left)
+    total = sum(explanation.support for explanation in explanations)
+    return tuple(
+        _explanation_terms(result, explanation, explanation.support / total, rng) for explanation in explanations
+    )
 
 
 def _explanation_terms(
-    search: SearchResult, explanation: Explanation, probability: float, rng: np.random.Generator
+    result: SearchResult, explanation: Explanation, probability: float, rng: np.random.Generator
 ) -> ExplanationTerms:
     """An explanation of a search as terms: cells and levels of noise drawn by their posterior weights."""
-    base, hypothesis = search.ground.baseline, search.ground.hypotheses[explanation.index]
+    base, hypothesis = result.ground.baseline, result.ground.hypotheses[explanation.index]
     terms = hypothesis.terms
-    residuals = hypothesis.seen(base, search.residual[None, :])
+    residuals = hypothesis.residual_under_labels(base, result.residual[None, :])
     picked = resample(normalised_weights(terms.log_densities(residuals)[:, 0]), N_TERMS, rng)
     levels, cells = np.divmod(picked, terms.table.n_cells)
     noise = terms.noise.sd[levels]
@@ -102,10 +111,10 @@ def _explanation_terms(
     design = np.concatenate([np.tile(sides, (N_TERMS, 1, 1)), table.slopes[cells]], axis=2)
     variance = noise[:, terms_baseline.setup_index] ** 2 + terms_baseline.own_variance
     mean, covariance = _condition_on_readings(
-        design, variance, residuals - table.shift[cells], terms_baseline.used, terms_baseline.slopes.shape[1]
+        design, variance, residuals - table.shift[cells], terms_baseline.mode_readings, terms_baseline.slopes.shape[1]
     )
     n, n_u = terms_baseline.slopes.shape[1], mean.shape[1]
-    forms, z, step = _effect_sizes(search, explanation, cells, n_u - table.slopes.shape[2])
+    forms, z, step = _effect_sizes(result, explanation, cells, n_u - table.slopes.shape[2])
     first = n_u - z.shape[1]
     # from places in the cells to sizes, and to the constants that move with them: u = start + turn u
     turn, start = np.tile(np.eye(n_u), (N_TERMS, 1, 1)), np.zeros((N_TERMS, n_u))
@@ -117,15 +126,15 @@ def _explanation_terms(
     middle, gradient = log_moduli(base.board, base.log_rigidities)
     return ExplanationTerms(
         members=hypothesis.members,
-        words=explanation_words(search, explanation) if explanation.members else NO_EFFECT,
+        words=explanation_words(result, explanation) if explanation.members else NO_EFFECT,
         probability=probability,
         mean=start + np.einsum("tuv,tv->tu", turn, mean),
         covariance=turn @ covariance @ np.swapaxes(turn, 1, 2),
         noise=noise,
         middle=np.tile(middle, (N_TERMS, 1)),
-        wanted=np.tile(np.pad(gradient, ((0, 0), (0, n_u - first))), (N_TERMS, 1, 1)),
+        target_slopes=np.tile(np.pad(gradient, ((0, 0), (0, n_u - first))), (N_TERMS, 1, 1)),
         forms=forms,
-        again=_readings_at_hand(terms_baseline, base, shift, slopes),
+        readings_at_hand=_readings_at_hand(terms_baseline, base, shift, slopes),
     )
 
 
@@ -137,14 +146,14 @@ def _readings_at_hand(terms_baseline: Baseline, base: Baseline, shift: Floats, s
 
 
 def _effect_sizes(
-    search: SearchResult, explanation: Explanation, cells: IndexArray, first: int
+    result: SearchResult, explanation: Explanation, cells: IndexArray, first: int
 ) -> tuple[tuple[FormTerms, ...], Floats, Floats]:
     """The forms of the effects in some cells of an explanation's table; standard coordinates of their sizes, and steps.
 
     Coordinates and their changes over one standard deviation of the cell are (n_cells, n_tangents) arrays. Unlikely
     forms are replaced by the likeliest.
     """
-    ground, joint_table = search.ground, search.ground.hypotheses[explanation.index].table
+    ground, joint_table = result.ground, result.ground.hypotheses[explanation.index].table
     candidates = ground.members(explanation.index)
     if not candidates:
         return (), np.zeros((len(cells), 0)), np.zeros((len(cells), 0))
@@ -160,14 +169,14 @@ def _effect_sizes(
     which = np.where(counts[which] < _LIKELY_SHARE * len(cells), counts.argmax(), which)
     forms = []
     for i in np.unique(which):
-        chosen = [candidate.laws[int(k)].form for candidate, k in zip(candidates, keys[:, i], strict=True)]
-        listed = [
+        likely_forms = [candidate.laws[int(k)].form for candidate, k in zip(candidates, keys[:, i], strict=True)]
+        size_columns = [
             (form.effect, free, start + j)
-            for form, start in zip(chosen, starts, strict=False)
+            for form, start in zip(likely_forms, starts, strict=False)
             for j, free in enumerate(form.free)
         ]
-        effects, parameters, columns = zip(*listed, strict=True) if listed else ((), (), ())
-        board = with_forms(ground.baseline.board, chosen)
+        effects, parameters, columns = zip(*size_columns, strict=True) if size_columns else ((), (), ())
+        board = with_forms(ground.baseline.board, likely_forms)
         rows = np.flatnonzero(which == i)
         forms.append(FormTerms(rows, board, effects, parameters, np.array(columns, dtype=np.intp)))
     return tuple(forms), z, step
@@ -185,31 +194,34 @@ def _condition_on_readings(
     return np.einsum("tuv,tnv,tn->tu", covariance, weighted, residuals), covariance
 
 
-def surviving_explanations(found: SearchResult, rivals: Collection[tuple[str, ...]] = ()) -> tuple[Explanation, ...]:
+def surviving_explanations(result: SearchResult, rivals: Collection[tuple[str, ...]] = ()) -> tuple[Explanation, ...]:
     """No effect, and the explanations of a search within a factor ten of the best of them, the most probable first.
 
     No effect is left out where it is ten times less probable than the best explanation. Rivals survive in any case: a
     verdict lists them because another assumption favours them.
     """
     return survivors_by_support(
-        found,
-        {explanation.members: explanation.support for explanation in rank_explanations(found)},
-        found.none,
+        result,
+        {explanation.members: explanation.support for explanation in rank_explanations(result)},
+        result.probability_of_none,
         rivals,
     )
 
 
 def survivors_by_support(
-    found: SearchResult, support: Mapping[tuple[str, ...], float], none: float, rivals: Collection[tuple[str, ...]] = ()
+    result: SearchResult,
+    support: Mapping[tuple[str, ...], float],
+    probability_of_none: float,
+    rivals: Collection[tuple[str, ...]] = (),
 ) -> tuple[Explanation, ...]:
     """The surviving explanations by the probabilities of a finished diagnosis: of sets of effects, and of no effect.
 
     Effects that the search has not tried are left out.
     """
     index: dict[tuple[str, ...], int] = {}
-    for i, hypothesis in enumerate(found.ground.hypotheses):
+    for i, hypothesis in enumerate(result.ground.hypotheses):
         best = index.get(hypothesis.members)
-        if best is None or (hypothesis.swap is None and found.probability[i] > found.probability[best]):
+        if best is None or (hypothesis.swap is None and result.probability[i] > result.probability[best]):
             index[hypothesis.members] = i
     ranked = [Explanation(members, index[members], p) for members, p in support.items() if members in index and p > 0.0]
     ranked.sort(key=lambda explanation: -explanation.support)
@@ -218,24 +230,28 @@ def survivors_by_support(
         for explanation in ranked
         if explanation.support * ALTERNATIVE_FACTOR >= ranked[0].support or explanation.members in rivals
     ][:MOST_EXPLANATIONS]
-    survivors = near if near and none * ALTERNATIVE_FACTOR < near[0].support else [*near, Explanation((), 0, none)]
+    survivors = (
+        near
+        if near and probability_of_none * ALTERNATIVE_FACTOR < near[0].support
+        else [*near, Explanation((), 0, probability_of_none)]
+    )
     return tuple(sorted(survivors, key=lambda explanation: -explanation.support))
 
 
-def explanations_of_effects(found: SearchResult, effects: Sequence[str]) -> tuple[Explanation, ...]:
+def explanations_of_effects(result: SearchResult, effects: Sequence[str]) -> tuple[Explanation, ...]:
     """Explanations by effects that a user names: no effect, each effect alone, and likely pairs of them.
 
     Their probabilities are those of the search. A pair ten times less probable than the best explanation is left out.
     """
-    listed = [
-        Explanation(hypothesis.members, i, float(found.probability[i]))
-        for i, hypothesis in enumerate(found.ground.hypotheses)
+    explanations = [
+        Explanation(hypothesis.members, i, float(result.probability[i]))
+        for i, hypothesis in enumerate(result.ground.hypotheses)
         if set(hypothesis.members) <= set(effects) and hypothesis.swap is None
     ]
-    highest = max(explanation.support for explanation in listed)
+    highest = max(explanation.support for explanation in explanations)
     likely = [
         explanation
-        for explanation in listed
+        for explanation in explanations
         if len(explanation.members) < 2 or explanation.support * ALTERNATIVE_FACTOR >= highest
     ]
     return tuple(sorted(likely, key=lambda explanation: -explanation.support))

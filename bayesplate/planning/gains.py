@@ -42,23 +42,23 @@ class PlannedReadings:
     variance: tuple[Floats, ...]  # (n_terms, n) arrays: of the noise
 
     @classmethod
-    def of(cls, every: Iterable[tuple[Floats, Floats, Floats]]) -> PlannedReadings:
+    def of(cls, by_explanation: Iterable[tuple[Floats, Floats, Floats]]) -> PlannedReadings:
         """From shift, slopes and variance under each explanation."""
-        return cls(*zip(*every, strict=True))
+        return cls(*zip(*by_explanation, strict=True))
 
     @property
     def n(self) -> int:
         return int(self.shift[0].shape[1])
 
-    def some(self, rows: Sequence[int]) -> PlannedReadings:
+    def select(self, rows: Sequence[int]) -> PlannedReadings:
         """The readings with some indices."""
         fields = (self.shift, self.slopes, self.variance)
         return PlannedReadings(*(tuple(values[:, list(rows)] for values in arrays) for arrays in fields))
 
 
-def join_readings(every: Sequence[PlannedReadings]) -> PlannedReadings:
+def join_readings(reading_sets: Sequence[PlannedReadings]) -> PlannedReadings:
     """Several sets of readings as one."""
-    fields = zip(*((readings.shift, readings.slopes, readings.variance) for readings in every), strict=True)
+    fields = zip(*((readings.shift, readings.slopes, readings.variance) for readings in reading_sets), strict=True)
     return PlannedReadings(
         *(tuple(np.concatenate(arrays, axis=1) for arrays in zip(*sets, strict=True)) for sets in fields)
     )
@@ -77,14 +77,17 @@ def expected_gain(
     The score counts the goal, one of `GOALS`. By default it is the drop of the explanations' entropy plus the mean
     logarithmic shrinkage of the shared parameters of the boards, or of the constants where they share none.
     """
-    updates = [_Update.of(explanation, readings, k, beliefs.free) for k, explanation in enumerate(beliefs.explanations)]
+    updates = [
+        _Update.of(explanation, readings, k, beliefs.counted_targets)
+        for k, explanation in enumerate(beliefs.explanations)
+    ]
     weights = beliefs.probabilities
     doubt, between_terms = _simulate_readings(beliefs, updates, rng, n_draws)
     shares = np.concatenate(
         [np.full(terms.n_terms, terms.probability / terms.n_terms) for terms in beliefs.explanations]
     )
     variance_now = _variance_between_terms(
-        shares[:, None], np.concatenate([update.wanted for update in updates])[:, None]
+        shares[:, None], np.concatenate([update.target_means for update in updates])[:, None]
     )[0]
     variance_before = variance_now + sum(
         p * update.before.mean(axis=0) for p, update in zip(weights, updates, strict=True)
@@ -115,10 +118,13 @@ def expected_gain(
     )
 
 
-def probabilities_after(beliefs: Beliefs, readings: PlannedReadings, read: Floats) -> Floats:
+def probabilities_after(beliefs: Beliefs, readings: PlannedReadings, values: Floats) -> Floats:
     """Probability of each explanation after some readings: (n_explanations, n_draws) array from (n_draws, n)."""
-    updates = [_Update.of(explanation, readings, k, beliefs.free) for k, explanation in enumerate(beliefs.explanations)]
-    return _explanation_probabilities(_log_joint(beliefs, updates, read))
+    updates = [
+        _Update.of(explanation, readings, k, beliefs.counted_targets)
+        for k, explanation in enumerate(beliefs.explanations)
+    ]
+    return _explanation_probabilities(_log_joint(beliefs, updates, values))
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,32 +152,37 @@ class _Update:
     factor: Floats
     whitening: Floats
     log_size: Floats  # (n_terms,) array: ln of the determinant of L
-    pull: Floats  # (n_terms, n_wanted, n) array: from whitened misses to changes of the wanted quantities
-    # wanted, before, after: (n_terms, n_wanted) array: means of the wanted quantities, their variances before and after
-    wanted: Floats
+    regression: Floats  # (n_terms, n_targets, n) array: from whitened misses to changes of the target quantities
+    # target_means, before, after: (n_terms, n_targets) array: means of the target quantities, their variances before
+    # and after
+    target_means: Floats
     before: Floats
     after: Floats
     information: Floats
 
     @classmethod
-    def of(cls, explanation: ExplanationTerms, readings: PlannedReadings, k: int, free: Sequence[int]) -> _Update:
+    def of(
+        cls, explanation: ExplanationTerms, readings: PlannedReadings, k: int, counted_targets: Sequence[int]
+    ) -> _Update:
         slopes, variance = readings.slopes[k], readings.variance[k]
         expected = readings.shift[k] + np.einsum("tnu,tu->tn", slopes, explanation.mean)
         cross_covariance = slopes @ explanation.covariance
         covariance = cross_covariance @ np.swapaxes(slopes, 1, 2) + variance[:, :, None] * np.eye(readings.n)
         factor = np.asarray(np.linalg.cholesky(covariance))
         whitening = np.asarray(np.linalg.inv(factor))
-        pull: Floats = explanation.wanted @ np.swapaxes(cross_covariance, 1, 2) @ np.swapaxes(whitening, 1, 2)
-        before = explanation.wanted @ explanation.covariance @ np.swapaxes(explanation.wanted, 1, 2)
-        after = before - pull @ np.swapaxes(pull, 1, 2)
-        rows, columns = np.ix_(free, free)
+        regression: Floats = (
+            explanation.target_slopes @ np.swapaxes(cross_covariance, 1, 2) @ np.swapaxes(whitening, 1, 2)
+        )
+        before = explanation.target_slopes @ explanation.covariance @ np.swapaxes(explanation.target_slopes, 1, 2)
+        after = before - regression @ np.swapaxes(regression, 1, 2)
+        rows, columns = np.ix_(counted_targets, counted_targets)
         information = np.asarray(
             0.5 * (np.linalg.slogdet(before[:, rows, columns])[1] - np.linalg.slogdet(after[:, rows, columns])[1])
         )
         sizes, var_before, var_after = (np.diagonal(matrix, axis1=1, axis2=2) for matrix in (factor, before, after))
         log_size = np.log(sizes).sum(axis=1)
         return cls(
-            expected, factor, whitening, log_size, pull, explanation.expected, var_before, var_after, information
+            expected, factor, whitening, log_size, regression, explanation.expected, var_before, var_after, information
         )
 
     def draw_readings(self, rng: np.random.Generator, n_draws: int) -> Floats:
@@ -193,7 +204,10 @@ def _simulate_readings(
     counts = [max(round(n_draws * p), _FEWEST_DRAWS) for p in weights]
     observed = np.concatenate([update.draw_readings(rng, n) for update, n in zip(updates, counts, strict=True)])
     logs = _log_joint(beliefs, updates, observed)
-    means = [update.wanted[:, None, :] + update.misses(observed) @ np.swapaxes(update.pull, 1, 2) for update in updates]
+    means = [
+        update.target_means[:, None, :] + update.misses(observed) @ np.swapaxes(update.regression, 1, 2)
+        for update in updates
+    ]
     between = _variance_between_terms(normalised_weights(np.concatenate(logs)), np.concatenate(means))
     ends = np.cumsum(counts)[:-1]
     doubt, spread = (np.split(values, ends) for values in (entropy(_explanation_probabilities(logs))[:, None], between))

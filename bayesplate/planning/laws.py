@@ -55,7 +55,7 @@ class SolvedStation:
         return cls(station, station_values, modes, [row_of.get(label, -1) for label in station.setup.labels], share)
 
     @property
-    def bare_and_added(self) -> Floats:
+    def log_hertz_and_mass_shifts(self) -> Floats:
         """ln f (Hz) of the station's modes, and its shift by a known mass at each spot: (1 + n_spots, n_modes) array.
 
         NaN where a mode has lost its name.
@@ -65,7 +65,7 @@ class SolvedStation:
         return np.concatenate([log_hertz[None, :], self._mass_shifts(self.station.spots)])[:, self.rows] + lost
 
     @property
-    def off_place(self) -> Floats:
+    def mass_shift_sd(self) -> Floats:
         """Standard deviation of the shift by a known mass from its error of place: (n_spots, n_modes) array."""
         variance = np.zeros((len(self.station.spots), len(self.modes.eigenvalues)))
         for axis, side in enumerate(vibrating_lengths(self.values, self.station.setup)):
@@ -108,30 +108,30 @@ class BareLaw:
     """The modes of a station without further effects, linear in constants and inputs."""
 
     station: Station
-    solved: Floats  # (1 + n_spots, n_modes) array: `SolvedStation.bare_and_added` at the estimate
+    solved: Floats  # (1 + n_spots, n_modes) array: `SolvedStation.log_hertz_and_mass_shifts` at the estimate
     middle: Floats  # (n_modes,) array: ln f (Hz) with the inputs at the middle of their priors
     # (n_plates, n_modes, n_constants + n_inputs) array: by the logarithms of the free rigidities and the inputs'
     # standard coordinates, at the estimate; where nothing was read, at plates drawn from the prior
     slopes: Floats
-    off_place: Floats  # (n_spots, n_modes) array: `SolvedStation.off_place` at the estimate
+    mass_shift_sd: Floats  # (n_spots, n_modes) array: `SolvedStation.mass_shift_sd` at the estimate
 
 
-def bare_law(board: Board, station: Station, values: Values, drawn: Sequence[Values] = ()) -> BareLaw:
+def bare_law(board: Board, station: Station, values: Values, plates: Sequence[Values] = ()) -> BareLaw:
     """Solve a station at an estimate; its slopes are taken there, or at those drawn plates that have all its modes.
 
     KeyError where the estimate has not all modes of the station.
     """
     slopes, inputs, offset = _linearise(board, station, values)
     solved_station = SolvedStation.of(station, board, values)
-    solved, n = solved_station.bare_and_added, board.symmetry.n
+    solved, n = solved_station.log_hertz_and_mass_shifts, board.symmetry.n
     middle = solved[0] + offset - slopes[:, n:] @ inputs
     drawn_slopes = []
-    for plate in drawn:
+    for plate in plates:
         try:
             drawn_slopes.append(_linearise(board, station, plate)[0])
         except (KeyError, BayesplateError):
             continue
-    return BareLaw(station, solved, middle, np.stack(drawn_slopes or [slopes]), solved_station.off_place)
+    return BareLaw(station, solved, middle, np.stack(drawn_slopes or [slopes]), solved_station.mass_shift_sd)
 
 
 def _linearise(board: Board, station: Station, values: Values) -> tuple[Floats, Floats, Floats]:

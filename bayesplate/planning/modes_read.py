@@ -28,22 +28,24 @@ class StationReadings:
     further: PlannedReadings
     rows: tuple[int, ...]  # their indices among the station's modes
     # indices of the readings at hand that can be taken once more: those which every explanation takes for a mode
-    old: tuple[int, ...]
+    repeatable_rows: tuple[int, ...]
     # these in another session; None where there are none, or where the beliefs are those of the prior
-    again: PlannedReadings | None
+    repeats: PlannedReadings | None
     # these with a known mass, in the session that goes on, by the index of its spot; none with a single explanation:
     # the shifts by a known mass only distinguish explanations
     with_mass: Mapping[int, PlannedReadings]
 
 
-def station_readings(beliefs: Beliefs, known: KnownBoard, law: BareLaw, rng: np.random.Generator) -> StationReadings:
+def station_readings(
+    beliefs: Beliefs, known_board: KnownBoard, law: BareLaw, rng: np.random.Generator
+) -> StationReadings:
     """All readings that could be taken in a station of a board, as each explanation expects them."""
-    station, board = law.station, known.board
+    station, board = law.station, known_board.board
     n, n_old = len(station.setup.readings), station.n_old
-    expected = [_expected_modes(explanation, known, law) for explanation in beliefs.explanations]
+    expected = [_expected_modes(explanation, known_board, law) for explanation in beliefs.explanations]
     is_followed = np.all([np.isfinite(shift).all(axis=0) for shift, _ in expected], axis=0)
     own_variance = ReadingErrors.of(station.setup).own_variance + unknown_discrepancy_variance(board, station.setup)
-    setup_index = known.first_setup + [setup.name for setup in board.setups].index(station.base.name)
+    setup_index = known_board.first_setup + [setup.name for setup in board.setups].index(station.base.name)
     kept_variances = [explanation.noise[:, setup_index] ** 2 for explanation in beliefs.explanations]
     new_variances = [
         prior_levels(station.setup.noise, explanation.n_terms, rng) ** 2 for explanation in beliefs.explanations
@@ -58,38 +60,47 @@ def station_readings(beliefs: Beliefs, known: KnownBoard, law: BareLaw, rng: np.
         )
 
     rows = [i for i in range(n_old, n) if is_followed[i]]
-    old = [i for i in range(n_old) if is_followed[i]]
+    repeatable_rows = [i for i in range(n_old) if is_followed[i]]
     further = readings(rows, new_variances if station.is_new else kept_variances)
     repeated, with_mass = None, {}
-    if old and not beliefs.is_prior:
+    if repeatable_rows and not beliefs.is_prior:
         other_day = [np.full(len(level), shared_variance_share(station.base)) for level in kept_variances]
-        repeated = repeat_readings(station, old, readings(old, new_variances), kept_variances, other_day)
+        repeated = repeat_readings(
+            station, repeatable_rows, readings(repeatable_rows, new_variances), kept_variances, other_day
+        )
     if repeated and len(beliefs.explanations) > 1:
         same_day = [np.maximum(1.0 - REPEAT_SCATTER**2 / level, 0.0) for level in kept_variances]
-        once_more = repeat_readings(station, old, readings(old, kept_variances), kept_variances, same_day)
-        for spot, off_place in enumerate(law.off_place[:, old]):
-            added = readings(old, kept_variances, 1 + spot)
+        once_more = repeat_readings(
+            station, repeatable_rows, readings(repeatable_rows, kept_variances), kept_variances, same_day
+        )
+        for spot, mass_shift_sd in enumerate(law.mass_shift_sd[:, repeatable_rows]):
+            added = readings(repeatable_rows, kept_variances, 1 + spot)
             if all(np.isfinite(values).all() for values in added.shift):
                 shift = tuple(a + b for a, b in zip(once_more.shift, added.shift, strict=True))
-                variance = tuple(level + off_place**2 for level in once_more.variance)
+                variance = tuple(level + mass_shift_sd**2 for level in once_more.variance)
                 slopes = tuple(a + b for a, b in zip(once_more.slopes, added.slopes, strict=True))
                 with_mass[spot] = PlannedReadings(shift, slopes, variance)
-    return StationReadings(law, further, tuple(rows), tuple(old), repeated, with_mass)
+    return StationReadings(law, further, tuple(rows), tuple(repeatable_rows), repeated, with_mass)
 
 
 def repeat_readings(
-    station: Station, old: Sequence[int], readings: PlannedReadings, kept: Sequence[Floats], shares: Sequence[Floats]
+    station: Station,
+    indices: Sequence[int],
+    readings: PlannedReadings,
+    first_variances: Sequence[Floats],
+    shares: Sequence[Floats],
 ) -> PlannedReadings:
-    """Repeats of the readings at hand, rows `old`, conditional on the first readings, whose noise they share in part.
+    """Repeats of some readings at hand, by their indices, conditional on the first readings.
 
-    `readings` are the repeats with independent noise; `kept` is the variance of the first readings' noise and `shares`
-    the part of it that a repeat shares, (n_terms,) arrays by explanation.
+    A repeat shares a part of the first reading's noise. `readings` are the repeats with independent noise;
+    `first_variances` is the variance of the first readings' noise and `shares` the part of it that a repeat shares,
+    (n_terms,) arrays by explanation.
     """
-    rows = list(old)
+    rows = list(indices)
     first, own_variance = np.log(station.base.measured)[rows], ReadingErrors.of(station.base).own_variance[rows]
     new = ReadingErrors.of(station.setup).own_variance[rows]
     by_explanation = []
-    for k, (first_variance, terms_share) in enumerate(zip(kept, shares, strict=True)):
+    for k, (first_variance, terms_share) in enumerate(zip(first_variances, shares, strict=True)):
         share = terms_share[:, None]
         common = share * first_variance[:, None]
         weight = common / (first_variance[:, None] + own_variance)
@@ -111,16 +122,23 @@ def _expected_modes(explanation: ExplanationTerms, known_board: KnownBoard, law:
     own_slopes = law.slopes @ known_board.columns
     slopes[:, :n, : own_slopes.shape[2]] = own_slopes[np.arange(explanation.n_terms) % len(own_slopes)]
     add_effects(explanation, known_board, law, shift, slopes)
-    if explanation.again is None or not station.n_old:
+    if explanation.readings_at_hand is None or not station.n_old:
         return shift, slopes
-    taken, setups, old = np.arange(n), known_board.board.setups, slice(station.n_old)
+    reading_index, setups, read_rows = np.arange(n), known_board.board.setups, slice(station.n_old)
     start = sum(len(setup.readings) for setup in setups[: [setup.name for setup in setups].index(station.base.name)])
     at_hand = slice(start, start + station.n_old)
-    taken[old] = np.where(explanation.again.taken[at_hand] < 0, -1, explanation.again.taken[at_hand] - start)
-    columns = np.arange(shift.shape[1]).reshape(-1, n)[:, taken].ravel()
+    reading_index[read_rows] = np.where(
+        explanation.readings_at_hand.reading_index[at_hand] < 0,
+        -1,
+        explanation.readings_at_hand.reading_index[at_hand] - start,
+    )
+    columns = np.arange(shift.shape[1]).reshape(-1, n)[:, reading_index].ravel()
     shift, slopes = shift[:, columns], slopes[:, columns]
-    shift[:, old], slopes[:, old] = explanation.again.shift[:, at_hand], explanation.again.slopes[:, at_hand]
-    return np.where(np.tile(taken < 0, len(law.solved)), np.nan, shift), slopes
+    shift[:, read_rows], slopes[:, read_rows] = (
+        explanation.readings_at_hand.shift[:, at_hand],
+        explanation.readings_at_hand.slopes[:, at_hand],
+    )
+    return np.where(np.tile(reading_index < 0, len(law.solved)), np.nan, shift), slopes
 
 
 _SIZE_QUANTILES = (0.03, 0.97)
@@ -129,7 +147,9 @@ _MOST_SHIFT = 0.4
 """A shift of ln f beyond which a mode has lost its name."""
 
 
-def add_effects(one: ExplanationTerms, known: KnownBoard, law: BareLaw, shift: Floats, slopes: Floats) -> None:
+def add_effects(
+    explanation: ExplanationTerms, known_board: KnownBoard, law: BareLaw, shift: Floats, slopes: Floats
+) -> None:
     """Add the effects of an explanation to the expected modes of a station, in place.
 
     They are added to the shift where u is zero, (n_terms, (1 + n_spots) n_modes), of the modes, then of the shifts by a
@@ -141,9 +161,9 @@ def add_effects(one: ExplanationTerms, known: KnownBoard, law: BareLaw, shift: F
     linear about its own place on the parabola.
     """
     n = len(law.middle)
-    for form in one.forms:
-        mean = one.mean[form.rows]
-        sizes, covariance = mean[:, form.columns], one.covariance[form.rows][:, form.columns, form.columns]
+    for form in explanation.forms:
+        mean = explanation.mean[form.rows]
+        sizes, covariance = mean[:, form.columns], explanation.covariance[form.rows][:, form.columns, form.columns]
         centre, narrow = sizes.mean(axis=0), np.sqrt(covariance.mean(axis=0))
         low, high = np.quantile(sizes, _SIZE_QUANTILES, axis=0)
         ends = np.stack([np.minimum(low, centre - narrow), np.maximum(high, centre + narrow)])
@@ -151,13 +171,13 @@ def add_effects(one: ExplanationTerms, known: KnownBoard, law: BareLaw, shift: F
         reach = np.clip(ends, *bounds) - centre
         # regression of the constants on the sizes
         design = np.column_stack([np.ones(len(mean)), sizes - centre])
-        constants = np.linalg.lstsq(design, mean[:, : known.board.symmetry.n], rcond=None)[0]
+        constants = np.linalg.lstsq(design, mean[:, : known_board.board.symmetry.n], rcond=None)[0]
 
         to_either_side = (np.outer(sides, unit) for sides, unit in zip(reach.T, np.eye(centre.size), strict=True))
         steps = np.concatenate([[0.0 * centre], *to_either_side])
         followed = np.column_stack([np.ones(len(steps)), steps]) @ constants
         pairs = zip(centre + steps, followed, strict=True)
-        solved = np.stack([_form_shift(known, law, form, point, moved) for point, moved in pairs])
+        solved = np.stack([_form_shift(known_board, law, form, point, moved) for point, moved in pairs])
         shift[form.rows] += solved[0]
         for j, column in enumerate(form.columns):
             sides, pair = reach[:, j], solved[1 + 2 * j : 3 + 2 * j] - solved[0]
@@ -187,7 +207,7 @@ def _form_shift(known_board: KnownBoard, law: BareLaw, form: FormTerms, sizes: F
         {**values, **symmetry.rigidities(np.exp(logs), values["poisson_xy"])}
         for logs in (log_constants + constants, log_constants)
     )
-    shift = SolvedStation.of(law.station, form.board, moved_values, mesh_values).bare_and_added - law.solved
+    shift = SolvedStation.of(law.station, form.board, moved_values, mesh_values).log_hertz_and_mass_shifts - law.solved
     shift[0] -= law.slopes[0, :, : log_constants.size] @ constants
     shift[:, np.abs(shift[0]) > _MOST_SHIFT] = np.nan
     return np.asarray(shift.ravel())

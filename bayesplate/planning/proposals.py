@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields, replace
 from bayesplate.board.prior import PriorCard
 from bayesplate.campaign.shared import SharedParameter
 from bayesplate.planning.beliefs import Beliefs, KnownBoard
+from bayesplate.planning.campaign import further_boards
 from bayesplate.planning.gains import N_DRAWS, PlannedReadings, expected_gain, join_readings
 from bayesplate.planning.laws import known_mass
 from bayesplate.planning.modes_read import StationReadings, station_readings
@@ -19,7 +20,6 @@ from bayesplate.planning.sizes_read import (
     parameter_column,
     size_measurements,
 )
-from bayesplate.planning.together import further_boards
 from bayesplate.streams import random_stream
 
 BELIEFS_STREAM = "what is believed now"
@@ -58,8 +58,8 @@ class Proposal:
     entry: ProposalEntry
     readings: PlannedReadings
     about: str  # the setup, the input, the effect or the board that it asks for
-    known: KnownBoard | None = None  # the board; None for a further one
-    read: StationReadings | None = None  # all readings of its station; None where no frequency is read
+    known_board: KnownBoard | None = None  # the board; None for a further one
+    station_readings: StationReadings | None = None  # all readings of its station; None where no frequency is read
     rows: tuple[int, ...] = ()  # indices of the station's modes that are read
     spot: int = 0  # index of the spot of the station where a known mass stands
 
@@ -77,24 +77,26 @@ class Planner:
         rng = random_stream(self.seed, "gains of further readings")
         return expected_gain(self.beliefs, readings, rng, self.goal, minutes, n_draws)
 
-    def ranked(
-        self, priors: Sequence[PriorCard] = (), shared: Sequence[SharedParameter] = (), least: float = FAINT_GAIN
+    def rank_proposals(
+        self, priors: Sequence[PriorCard] = (), shared: Sequence[SharedParameter] = (), least_gain: float = FAINT_GAIN
     ) -> tuple[Proposal, ...]:
-        """All proposals that gain more than the least (nats), the best first.
+        """All proposals that gain more than `least_gain` (nats), the best first.
 
         The priors are one per board, where more boards could be measured; `shared` are the parameters that these share.
         """
-        listed = [
+        proposals = [
             proposal
             for board in self.beliefs.boards
             for proposal in (*self._mode_proposals(board), *self._size_proposals(board))
         ]
-        listed += self._inspection_proposals()
+        proposals += self._inspection_proposals()
         for board in further_boards(self.beliefs, priors, shared):
             minutes = self.costs.board + len(board.labels) * self.costs.reading
-            setup, sentence = board.like.setups[0].name, board.sentence
-            listed.append(self._proposal("board", "", setup, sentence, minutes, board.readings, sentence, board.labels))
-        worthwhile = [proposal for proposal in listed if proposal.entry.gain.score > least]
+            setup, sentence = board.template.setups[0].name, board.sentence
+            proposals.append(
+                self._proposal("board", "", setup, sentence, minutes, board.readings, sentence, board.labels)
+            )
+        worthwhile = [proposal for proposal in proposals if proposal.entry.gain.score > least_gain]
         return tuple(sorted(worthwhile, key=lambda proposal: -proposal.entry.gain.score))
 
     def _proposal(
@@ -108,7 +110,7 @@ class Planner:
         """Proposals of frequencies: further modes, repeats, repeats with a known mass, and new stations."""
         rng = random_stream(self.seed, "noise of a further session")
         for law in known_board.laws:
-            if law.station.goes_on(known_board.board):
+            if law.station.takes_readings(known_board.board):
                 yield from self._station_proposals(known_board, station_readings(self.beliefs, known_board, law, rng))
 
     def _station_proposals(self, known_board: KnownBoard, available: StationReadings) -> Iterator[Proposal]:
@@ -126,13 +128,17 @@ class Planner:
         ) -> Proposal:
             labels, minutes = tuple(str(station.setup.labels[i]) for i in rows), minutes + len(rows) * costs.reading
             proposal = self._proposal(what, name, station.setup.name, sentence, minutes, readings, about, labels)
-            return replace(proposal, known=known_board, read=available, rows=rows, spot=spot)
+            return replace(proposal, known_board=known_board, station_readings=available, rows=rows, spot=spot)
 
         for chosen in self._best_modes(available):
-            rows, readings = tuple(available.rows[i] for i in chosen), available.further.some(chosen)
+            rows, readings = tuple(available.rows[i] for i in chosen), available.further.select(chosen)
             if station.is_new:
                 yield make_proposal(
-                    "edges", f"Measure {board_words} {station.held}, {mode_words(rows)}", costs.clamping, readings, rows
+                    "edges",
+                    f"Measure {board_words} {station.mounting_words}, {mode_words(rows)}",
+                    costs.clamping,
+                    readings,
+                    rows,
                 )
             elif station.n_old and not self.beliefs.is_prior:
                 yield make_proposal(
@@ -141,11 +147,11 @@ class Planner:
             else:
                 sentence = f"Measure {mode_words(rows)}{of_board} in setup {station.base.name}"
                 yield make_proposal("modes", sentence, costs.clamping, readings, rows)
-        old = available.old
-        if available.again is not None:
+        old = available.repeatable_rows
+        if available.repeats is not None:
             modes = mode_words(old) if is_alone else f"all {len(old)} modes{of_board}"
             sentence = f"Measure {modes}{where} again on another day, the board taken out and put back"
-            yield make_proposal("again", sentence, costs.clamping, available.again, old)
+            yield make_proposal("again", sentence, costs.clamping, available.repeats, old)
         if available.with_mass:
             spot = max(available.with_mass, key=lambda spot: self.gain(available.with_mass[spot]).score)
             (x, y), grams = station.places(known_board.board)[spot], 1e3 * known_mass(known_board.board)
@@ -164,15 +170,15 @@ class Planner:
         )
         if available.law.station.is_new and not self.beliefs.is_prior:
             return [tuple(range(n))] if n else []
-        chosen: list[int] = []
+        best_modes: list[int] = []
         for _ in range(min(max(sizes), n)):
-            remaining = [i for i in range(n) if i not in chosen]
+            remaining = [i for i in range(n) if i not in best_modes]
             scores = {
-                i: self.gain(available.further.some([*chosen, i]), n_draws=_N_MODE_DRAWS).score for i in remaining
+                i: self.gain(available.further.select([*best_modes, i]), n_draws=_N_MODE_DRAWS).score for i in remaining
             }
-            chosen.append(max(remaining, key=lambda i: scores[i]))
+            best_modes.append(max(remaining, key=lambda i: scores[i]))
         listed_sizes = sizes if len(self.beliefs.boards) == 1 else sizes[1:]
-        return list(dict.fromkeys(tuple(sorted(chosen[:size])) for size in listed_sizes)) if chosen else []
+        return list(dict.fromkeys(tuple(sorted(best_modes[:size])) for size in listed_sizes)) if best_modes else []
 
     def _size_proposals(self, known_board: KnownBoard) -> Iterator[Proposal]:
         """Proposals of readings of the sizes of a board; a size that all boards share is read once, on the first."""
@@ -200,25 +206,29 @@ class Planner:
                 minutes = inspection.n * self.costs.reading
                 yield self._proposal("size", name, "", inspection.sentence, minutes, readings, effect)
 
-    def sequences(self, listed: Sequence[Proposal]) -> tuple[tuple[tuple[Proposal, ...], SequenceEntry], ...]:
+    def sequences(self, proposals: Sequence[Proposal]) -> tuple[tuple[tuple[Proposal, ...], SequenceEntry], ...]:
         """The best two and the best three together, chosen one by one: each is the best beside those chosen before it.
 
         They stand in the order in which they can be done: proposals that go on in a session come before the board is
         taken out. Two that read modes in one station, or the same size, are not put together.
         """
-        chosen, sequences = list(listed[:1]), []
-        while chosen and len(chosen) < _LONGEST_SEQUENCE:
-            remaining = [candidate for candidate in listed if candidate.about not in {other.about for other in chosen}]
+        steps_so_far, sequences = list(proposals[:1]), []
+        while steps_so_far and len(steps_so_far) < _LONGEST_SEQUENCE:
+            remaining = [
+                candidate for candidate in proposals if candidate.about not in {other.about for other in steps_so_far}
+            ]
             if not remaining:
                 break
-            minutes = [sum(step.entry.cost_minutes for step in (*chosen, candidate)) for candidate in remaining]
+            minutes = [sum(step.entry.cost_minutes for step in (*steps_so_far, candidate)) for candidate in remaining]
             gains = [
-                self.gain(join_readings([step.readings for step in (*chosen, candidate)]), cost, _N_SEQUENCE_DRAWS)
+                self.gain(
+                    join_readings([step.readings for step in (*steps_so_far, candidate)]), cost, _N_SEQUENCE_DRAWS
+                )
                 for candidate, cost in zip(remaining, minutes, strict=True)
             ]
             best = max(range(len(remaining)), key=lambda i: gains[i].score)
-            chosen.append(remaining[best])
-            steps = tuple(sorted(chosen, key=lambda step: step.entry.what in _SESSION_ENDS))
+            steps_so_far.append(remaining[best])
+            steps = tuple(sorted(steps_so_far, key=lambda step: step.entry.what in _SESSION_ENDS))
             sentences = tuple(step.entry.sentence for step in steps)
             sequences.append((steps, SequenceEntry(sentences, minutes[best], gains[best])))
         return tuple(sequences)

@@ -66,7 +66,7 @@ def _parameter_measurements(board: Board, parameter: Parameter) -> Iterator[Size
         yield SizeMeasurement(parameter, _WEIGHING, 1, _SCALE_SD)
     if parameter.name not in _READABLE_SIZES and not parameter.key.startswith("clamped_"):
         return
-    words = {"length_x": "length", "length_y": "width"}.get(parameter.name, parameter.words or parameter.name)
+    words = {"length_x": "length", "length_y": "width"}.get(parameter.name, parameter.display_name or parameter.name)
     for sd, n, where in _field_measurements(board, parameter):
         yield SizeMeasurement(parameter, f"Read the {words} at {n} more places {where}", n, sd)
     if prior.has_profile:
@@ -103,19 +103,19 @@ def _field_measurements(board: Board, parameter: Parameter) -> Iterator[tuple[fl
         yield sd_after_readings(field, x, y) * prior.sd / max(condition_field(field).sd, 1e-300), len(places), where
 
 
-def parameter_column(known: KnownBoard, parameter: Parameter) -> Floats:
+def parameter_column(known_board: KnownBoard, parameter: Parameter) -> Floats:
     """Derivatives of the standard coordinate of a board's uncertain parameter by the columns of u: (n_u,) array."""
-    board = known.board
-    return np.asarray(known.columns[board.symmetry.n + [p.name for p in board.uncertain].index(parameter.name)])
+    board = known_board.board
+    return np.asarray(known_board.columns[board.symmetry.n + [p.name for p in board.uncertain].index(parameter.name)])
 
 
-def input_readings(beliefs: Beliefs, known: KnownBoard, one: SizeMeasurement) -> PlannedReadings:
+def input_readings(beliefs: Beliefs, known_board: KnownBoard, measurement: SizeMeasurement) -> PlannedReadings:
     """A measurement of an input of a board as one reading of its standard coordinate."""
-    column = parameter_column(known, one.parameter)
+    column = parameter_column(known_board, measurement.parameter)
     by_explanation = []
     for n_terms, n_u in (explanation.mean.shape for explanation in beliefs.explanations):
         slopes = np.tile(np.pad(column, (0, n_u - column.size)), (n_terms, 1, 1))
-        by_explanation.append((np.zeros((n_terms, 1)), slopes, np.full((n_terms, 1), 1.0 / one.precision)))
+        by_explanation.append((np.zeros((n_terms, 1)), slopes, np.full((n_terms, 1), 1.0 / measurement.precision)))
     return PlannedReadings.of(by_explanation)
 
 
@@ -126,7 +126,7 @@ class EffectInspection:
     sentence: str
     n: int  # number of readings
     sd: Callable[[Board], float]  # from the board to the standard deviation of each of the effect's parameters, SI
-    can: Callable[[Board], bool]  # whether the effect can be inspected on a board
+    is_possible: Callable[[Board], bool]  # whether the effect can be inspected on a board
 
 
 def _has_unweighed_item(board: Board) -> bool:
@@ -160,12 +160,12 @@ def inspection_readings(beliefs: Beliefs, effect: str) -> PlannedReadings | None
     """Readings by an inspection of an effect; None where no explanation has it, or where it cannot be inspected."""
     inspection, board = INSPECTIONS[effect], beliefs.boards[0].board
     forms = [form for explanation in beliefs.explanations for form in explanation.forms if effect in form.effects]
-    if not forms or not inspection.can(board):
+    if not forms or not inspection.is_possible(board):
         return None
     free = [parameter for parameter, name in zip(forms[0].parameters, forms[0].effects, strict=True) if name == effect]
     by_explanation = []
     for terms in beliefs.explanations:
-        value = np.tile([0.0 if p.null is None else p.null for p in free], (terms.n_terms, 1))
+        value = np.tile([0.0 if p.neutral_value is None else p.neutral_value for p in free], (terms.n_terms, 1))
         slopes = np.zeros((terms.n_terms, len(free), terms.mean.shape[1]))
         for form in terms.forms:
             columns = [int(c) for c, name in zip(form.columns, form.effects, strict=True) if name == effect]

@@ -45,11 +45,11 @@ class Station:
         return self.setup.name != self.base.name
 
     @property
-    def held(self) -> str:
+    def mounting_words(self) -> str:
         """How the board is held where it was never held so, in words."""
         return "with all edges free" if self.setup.is_free else "clamped along x0 alone"
 
-    def goes_on(self, board: Board) -> bool:
+    def takes_readings(self, board: Board) -> bool:
         """Whether more can be read in this station: of several sessions of one setup, in the last only."""
         if self.is_new or self.base.group is None:
             return True
@@ -71,9 +71,11 @@ class Station:
     def system(self, board: Board) -> System:
         """The setup with the effects of a board, which were declared for its base."""
         if all(setup.name != self.setup.name for setup in board.setups):
-            acting = (effect.in_setup(board, self.setup) for effect in board.chosen if effect.scope == "setup")
+            acting = (effect.in_setup(board, self.setup) for effect in board.effect_forms if effect.scope == "setup")
             new = {effect.name: effect for effect in acting if effect is not None}
-            board = replace(board, setups=(*board.setups, self.setup), chosen=(*board.chosen, *new.values()))
+            board = replace(
+                board, setups=(*board.setups, self.setup), effect_forms=(*board.effect_forms, *new.values())
+            )
         return System(self.setup, effects_of(board, self.setup))
 
     def values(self, system: System, values: Values) -> dict[str, Floats]:

@@ -43,7 +43,7 @@ def beam_functions(ends: EdgeConditions) -> BeamFunctions:
     from scipy.linalg import eigh
 
     side = line(ends, _N_ELEMENTS, is_split=False)
-    functions = np.flatnonzero(side.kept(0, is_sheared=False))
+    functions = np.flatnonzero(side.deflection_functions(0, is_sheared=False))
     value, _, bending = side.derivatives[:, :, functions]
     mass, stiffness = ((derivative.T * side.weights) @ derivative for derivative in (value, bending))
     coefficients = np.zeros((side.n_functions, N_BEAMS))

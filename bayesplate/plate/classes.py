@@ -39,11 +39,14 @@ class SymmetryClass:
         """Number of each field's unknown by its functions along x and along y, -1 where there is none; their count."""
         x, y = self.plate.x, self.plate.y
         is_sheared = len(self.plate.kinematics.fields) > 1
-        along_x, along_y = x.kept(self.parity.x, is_sheared), y.kept(self.parity.y, is_sheared)
+        along_x, along_y = (
+            x.deflection_functions(self.parity.x, is_sheared),
+            y.deflection_functions(self.parity.y, is_sheared),
+        )
         masks = {"w": np.outer(along_x, along_y)}
         if is_sheared:
-            masks["g_x"] = np.outer(x.kept_strain(self.parity.x), along_y)
-            masks["g_y"] = np.outer(along_x, y.kept_strain(self.parity.y))
+            masks["g_x"] = np.outer(x.strain_functions(self.parity.x), along_y)
+            masks["g_y"] = np.outer(along_x, y.strain_functions(self.parity.y))
         numbers, n = {}, 0
         for name, mask in masks.items():
             numbers[name] = np.where(mask, n - 1 + np.cumsum(mask).reshape(mask.shape), -1)
@@ -62,7 +65,7 @@ class SymmetryClass:
 
     @property
     def n_dof(self) -> int:
-        return self.n_on_plate + self.plate.n_beside
+        return self.n_on_plate + self.plate.n_coordinates
 
     @cached_property
     def n_rigid(self) -> int:
@@ -173,8 +176,8 @@ class SymmetryClass:
             along_x = self.plate.x.shapes(at_x, self.parity.x).toarray()
             along_y = self.plate.y.shapes(at_y, self.parity.y).toarray()
             row += self._on_unknowns("w", np.einsum("p,pi,pj->ij", factors, along_x, along_y))
-        if motion.beside >= 0:
-            row[self.n_on_plate + motion.beside] = 1.0
+        if motion.coordinate >= 0:
+            row[self.n_on_plate + motion.coordinate] = 1.0
         return row
 
     def _on_unknowns(self, name: str, values: Floats) -> Floats:
@@ -262,15 +265,15 @@ class SymmetryClass:
                 products.append(product((left @ vectors).T, (right @ vectors).T, shares)[None])
         return np.concatenate(products)
 
-    def project_beside(self, vectors: Floats) -> Floats:
+    def project_coordinates(self, vectors: Floats) -> Floats:
         """Mass terms of the coordinates beside the plate alone: (n_masses, n_vectors, n_vectors) array."""
         beside = vectors[self.n_on_plate :]
         masses = np.zeros((sum(1 for _ in weighed_terms(self.plate.masses)), vectors.shape[1], vectors.shape[1]))
         for k, (term, _) in enumerate(weighed_terms(self.plate.masses)):
             if isinstance(term, PointTerm):
                 for share, first, second in term.products:
-                    if first.beside >= 0 and second.beside >= 0:
-                        masses[k] += share * np.outer(beside[first.beside], beside[second.beside])
+                    if first.coordinate >= 0 and second.coordinate >= 0:
+                        masses[k] += share * np.outer(beside[first.coordinate], beside[second.coordinate])
         return masses
 
 

@@ -80,8 +80,8 @@ class Forms:
         return tuple(Parity(i, j) for i in along_x for j in along_y)
 
     @property
-    def n_beside(self) -> int:
-        places = (term.n_beside for term, _ in (*self.stiffness, *self.masses) if isinstance(term, PointTerm))
+    def n_coordinates(self) -> int:
+        places = (term.n_coordinates for term, _ in (*self.stiffness, *self.masses) if isinstance(term, PointTerm))
         return max(places, default=0)
 
     @property

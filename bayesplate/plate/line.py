@@ -34,7 +34,7 @@ class Line:
 
     ends: EdgeConditions  # of the board: they name the modes and tell the rigid motions
     # what the functions hold: the same, or less where an effect has put springs in place of a clamp
-    held: EndConditions
+    end_conditions: EndConditions
     is_split: bool  # the first half alone
     basis: Any
 
@@ -103,22 +103,26 @@ class Line:
         rows[np.arange(len(nodes)), [2 * node + order for node in nodes]] = 1.0
         return rows, np.full(len(nodes), self.share)
 
-    def kept(self, parity: int, is_sheared: bool) -> Bools:
+    def deflection_functions(self, parity: int, is_sheared: bool) -> Bools:
         """Which functions the deflection keeps: (n_functions,) array.
 
         On a shear-flexible plate the slope at a clamp stays free: it is the angle of the shear strain there.
         """
         fixed = {"clamped": (True, not is_sheared), "supported": (True, False), "guided": (False, not is_sheared)}
-        return self._without_fixed([fixed.get(end, (False, False)) for end in self.held], parity)
+        return self._without_fixed([fixed.get(end, (False, False)) for end in self.end_conditions], parity)
 
-    def kept_strain(self, parity: int) -> Bools:
+    def strain_functions(self, parity: int) -> Bools:
         """Which functions the shear strain along this side keeps: its value is zero where the turning is held."""
-        return self._without_fixed([(end in ("clamped", "guided"), False) for end in self.held], 1 - parity)
+        return self._without_fixed([(end in ("clamped", "guided"), False) for end in self.end_conditions], 1 - parity)
 
     def ties(self) -> list[tuple[int, int]]:
         """Values of the shear strain that are slopes of the deflection, where an end holds the turning."""
         last = self.n_functions - 2
-        nodes = [(0, self.held[0])] if self.is_split else [(0, self.held[0]), (last, self.held[1])]
+        nodes = (
+            [(0, self.end_conditions[0])]
+            if self.is_split
+            else [(0, self.end_conditions[0]), (last, self.end_conditions[1])]
+        )
         return [(value, value + 1) for value, end in nodes if end in ("clamped", "guided")]
 
     def _without_fixed(self, fixed: list[tuple[bool, bool]], parity: int) -> Bools:
@@ -163,14 +167,14 @@ def line(
     n_elements: int,
     is_sheared: bool = False,
     is_split: bool = True,
-    held: EndConditions | None = None,
+    end_conditions: EndConditions | None = None,
     n_points: int = N_POINTS,
 ) -> Line:
     """The functions of one side; the result is shared, so it must not be changed.
 
     `is_sheared`: of a shear-flexible plate, graded towards free ends. `is_split`: the first half alone where both ends
     are alike; False if something else on the plate makes the halves differ. A line with an element across its middle is
-    never split. `held`: what the ends hold where that is less than `ends` says.
+    never split. `end_conditions`: what the ends hold where that is less than `ends` says.
     """
     from skfem import Basis, ElementLineHermite, MeshLine
 
@@ -179,4 +183,4 @@ def line(
     if is_split:
         nodes = nodes[: n_elements // 2 + 1]
     basis = Basis(MeshLine.init_tensor(nodes), ElementLineHermite(), intorder=2 * n_points - 1)
-    return Line(ends, ends if held is None else held, is_split, basis)
+    return Line(ends, ends if end_conditions is None else end_conditions, is_split, basis)

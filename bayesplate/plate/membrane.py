@@ -51,7 +51,7 @@ class _Matrices:
     loads: tuple[Any, ...]
     mass: Any  # (n_w, n_w): integral of the product of two deflections
     places: Floats  # (2, n_w): of the deflections, as fractions of the sides
-    held: Indices  # (n_held,): unknowns that edges hold
+    held_unknowns: Indices  # (n_held,): unknowns that edges hold
 
 
 def membrane_terms(
@@ -116,7 +116,7 @@ def _stiffness_factors(membrane: _Membrane, moduli: tuple[float, ...]) -> tuple[
 
     matrices = _matrices(*membrane)
     stiffness = sum(modulus * matrix for modulus, matrix in zip(moduli, matrices.stiffness, strict=True))
-    free = np.setdiff1d(np.arange(stiffness.shape[0]), matrices.held)
+    free = np.setdiff1d(np.arange(stiffness.shape[0]), matrices.held_unknowns)
     free_stiffness = csc_array(stiffness)[free][:, free]
     ground = np.full(free.size, _GROUND_SHARE * float(free_stiffness.diagonal().max()))
     return free, splu(csc_array(free_stiffness + diags_array(ground)))
@@ -185,5 +185,5 @@ def _matrices(
         loads=tuple(load(i) for i in range(3)),
         mass=BilinearForm(lambda w, v, at: at.factor * w * v).assemble(deflection, factor=factor),
         places=deflection.doflocs,
-        held=np.unique(np.concatenate(held)) if held else np.empty(0, dtype=np.intp),
+        held_unknowns=np.unique(np.concatenate(held)) if held else np.empty(0, dtype=np.intp),
     )

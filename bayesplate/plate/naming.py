@@ -57,26 +57,26 @@ class PlacedMode:
     mass: Floats
 
 
-def name_shapes(own: SymmetryClass, vectors: Floats, on_plate: Floats) -> list[tuple[Beams, float]]:
+def name_shapes(symmetry_class: SymmetryClass, vectors: Floats, on_plate: Floats) -> list[tuple[Beams, float]]:
     """Beam product and correlation of each mode of a class, its lowest ones, each product given to one mode only.
 
     `on_plate` is the share of each mode's kinetic energy that is the plate's, with all that it carries along.
     """
-    parts, squares = beam_parts(own, vectors)
+    parts, squares = beam_parts(symmetry_class, vectors)
     products, named = (
-        own.plate.elastic_products[own.parity],
+        symmetry_class.plate.elastic_products[symmetry_class.parity],
         assign_products(product_fits(parts, np.diagonal(squares), on_plate)),
     )
     return [(products[column], correlation) for column, correlation in named]
 
 
-def beam_parts(own: SymmetryClass, vectors: Floats) -> tuple[Floats, Floats]:
+def beam_parts(symmetry_class: SymmetryClass, vectors: Floats) -> tuple[Floats, Floats]:
     """Components of deflections along each of `elastic_products`, (n_vectors, n_products), and their mean products."""
-    x, y = own.plate.x, own.plate.y
-    deflections = own.strains(["w"], vectors)["w"].reshape(-1, x.points.size, y.points.size)
+    x, y = symmetry_class.plate.x, symmetry_class.plate.y
+    deflections = symmetry_class.strains(["w"], vectors)["w"].reshape(-1, x.points.size, y.points.size)
     along_x, along_y = (side.weights * beam_functions(side.ends).at(side.points).T for side in (x, y))
     parts = along_x @ deflections @ along_y.T
-    orders = np.array(own.plate.elastic_products[own.parity]).T
+    orders = np.array(symmetry_class.plate.elastic_products[symmetry_class.parity]).T
     weighed = (np.outer(x.weights, y.weights) * deflections).reshape(len(deflections), -1)
     return parts[:, orders[0], orders[1]], weighed @ deflections.reshape(len(deflections), -1).T
 
@@ -102,20 +102,20 @@ def assign_products(parts: Floats) -> list[tuple[int, float]]:
 def name_modes(modes: Modes) -> list[tuple[Beams, float]]:
     """Beam product and correlation of each of the lowest modes of a plate, in their order."""
     named = {
-        parity: list(zip(modes.rows(parity), name_shapes(c.own, c.vectors, c.on_plate), strict=True))
+        parity: list(zip(modes.rows(parity), name_shapes(c.symmetry_class, c.vectors, c.on_plate), strict=True))
         for parity, c in modes.by_class.items()
     }
     names = dict(row for rows in named.values() for row in rows)
     return [names[i] for i in range(len(names))]
 
 
-def find_named_modes(plate: Plate, weights: Weights, wanted: Iterable[Beams]) -> dict[Beams, PlacedMode]:
+def find_named_modes(plate: Plate, weights: Weights, wanted_names: Iterable[Beams]) -> dict[Beams, PlacedMode]:
     """Each wanted name among the modes of a plate at the weights of one draw.
 
     A name without a certain mode gets its best remaining one, with the low correlation. KeyError if a name is no
     elastic mode of this plate or lies beyond the modes that can be resolved.
     """
-    names = list(wanted)
+    names = list(wanted_names)
     # No more modes than products in a class: with as many, all names are given.
     n_most = {c.parity: min(len(plate.elastic_products[c.parity]), c.n_dof - c.n_rigid - 1) for c in plate.classes}
     counts = {p: min(n + _SPARE_MODES, n_most[p]) for p, n in _expected_ranks(plate, weights, names).items()}
@@ -128,7 +128,7 @@ def find_named_modes(plate: Plate, weights: Weights, wanted: Iterable[Beams]) ->
         )
         places = {name: place for name, place in places.items() if place.parity not in counts}
         for parity, n in counts.items():
-            places |= _places(solved[parity].of(range(n)), names)
+            places |= _places(solved[parity].at_ranks(range(n)), names)
         lost_classes = {plate.parity(n) for n in names if n not in places or places[n].correlation < _STRAY_CORRELATION}
         unsure_classes = {plate.parity(n) for n in names if n in places and not places[n].is_certain}
         counts = {
@@ -158,8 +158,8 @@ def _expected_ranks(plate: Plate, weights: Weights, names: list[Beams]) -> dict[
 
 def _places(modes: ClassModes, names: Sequence[Beams]) -> dict[Beams, ModePlace]:
     """Places of the wanted names among the lowest modes of a class."""
-    named = name_shapes(modes.own, modes.vectors, modes.on_plate)
-    parity = modes.own.parity
+    named = name_shapes(modes.symmetry_class, modes.vectors, modes.on_plate)
+    parity = modes.symmetry_class.parity
     return {name: ModePlace(parity, rank, fit) for rank, (name, fit) in enumerate(named) if name in names}
 
 
@@ -167,7 +167,7 @@ def _placed_modes(solved: Mapping[Parity, ClassModes], places: Mapping[Beams, Mo
     placed = {}
     for parity, modes in solved.items():
         class_places = {name: place for name, place in places.items() if place.parity == parity}
-        energies = modes.of([place.rank for place in class_places.values()]).coefficients()
+        energies = modes.at_ranks([place.rank for place in class_places.values()]).coefficients()
         for (name, place), stiffness, mass in zip(class_places.items(), *energies, strict=True):
             placed[name] = PlacedMode(place, modes.eigenvalues[place.rank], stiffness, mass)
     return placed

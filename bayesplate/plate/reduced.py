@@ -36,7 +36,7 @@ class ReducedClass:
     products: tuple[Beams, ...]  # of beam functions that name its modes
     parts: Floats  # (r, n_products): components of each vector along these
     squares: Floats  # (r, r): mean products of the vectors' deflections
-    beside: Floats  # (n_masses, r, r): mass terms of the coordinates beside the plate alone
+    coordinate_masses: Floats  # (n_masses, r, r): mass terms of the coordinates beside the plate alone
     n_rigid: int = 0  # rigid motions in the basis: the lowest eigenvalues, which are left out
 
     def eigenvalues(self, weights: Weights) -> Floats:
@@ -72,7 +72,7 @@ class ReducedClass:
         """Mass matrices of many draws on the basis: (n_draws, r, r) array."""
         return _sum_terms(weights.mass, self.masses)
 
-    def ranks(self, weights: Weights, n_modes: int, least: float = 0.0) -> Indices:
+    def ranks(self, weights: Weights, n_modes: int, least_correlation: float = 0.0) -> Indices:
         """Rank of the mode that each of `products` names with at least that correlation: (n_draws, n_products).
 
         From 0; `n_modes` where it names none of the lowest elastic modes, -1 at a draw that is no plate.
@@ -84,13 +84,13 @@ class ReducedClass:
             for mode, (product, correlation) in enumerate(
                 assign_products(self._product_fits(weights.mass[draw], vectors[draw]))
             ):
-                if correlation >= least:
+                if correlation >= least_correlation:
                     ranks[draw, product] = mode
         return ranks
 
     def _product_fits(self, mass: Floats, vectors: Floats) -> Floats:
         """How well each mode of a draw fits each product: (n_modes, n_products) array."""
-        forms = np.stack([self.squares, np.tensordot(mass, self.beside, axes=1)])
+        forms = np.stack([self.squares, np.tensordot(mass, self.coordinate_masses, axes=1)])
         squares, beside = np.einsum("rm,frs,sm->fm", vectors, forms, vectors, optimize=True)
         return product_fits(vectors.T @ self.parts, squares, 1.0 - beside)
 
@@ -123,7 +123,7 @@ class ReducedOrderModel:
             values[:, columns] = reduced.eigenvalues(weights)[:, ranks]
         return values
 
-    def ranks(self, weights: Weights, least: float = 0.0) -> dict[Beams, Indices]:
+    def ranks(self, weights: Weights, least_correlation: float = 0.0) -> dict[Beams, Indices]:
         """Rank in its class of the mode that each product names with at least that correlation: (n_draws,).
 
         A product that names none of the lowest modes has the highest rank of all; -1 at a draw that is no plate.
@@ -131,7 +131,7 @@ class ReducedOrderModel:
         ranks: dict[Beams, Indices] = {}
         for reduced in self.classes:
             n_modes = max(self._modes_of(reduced)[1]) + 1 + SPARE_MODES
-            ranks |= dict(zip(reduced.products, reduced.ranks(weights, n_modes, least).T, strict=True))
+            ranks |= dict(zip(reduced.products, reduced.ranks(weights, n_modes, least_correlation).T, strict=True))
         return ranks
 
     def energies(self, weights: Weights) -> tuple[Floats, Floats]:

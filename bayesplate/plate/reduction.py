@@ -144,7 +144,7 @@ def _reduce_class(
         products=tuple(symmetry_class.plate.elastic_products[parity]),
         parts=parts,
         squares=squares,
-        beside=symmetry_class.project_beside(basis),
+        coordinate_masses=symmetry_class.project_coordinates(basis),
         n_rigid=symmetry_class.n_rigid,
     )
     return reduced, cents

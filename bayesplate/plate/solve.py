@@ -32,13 +32,13 @@ _SHIFT_RATIO = -1e-2
 class ClassModes:
     """Lowest elastic modes of one symmetry class."""
 
-    own: SymmetryClass
+    symmetry_class: SymmetryClass
     eigenvalues: Floats  # (n_modes,): omega^2, s^-2, increasing; rigid motions are left out
     vectors: Floats  # (n_dof, n_modes), mass-normalised
     rigid: Floats  # (n_dof, n_rigid): the rigid motions, mass-normalised
     on_plate: Floats  # (n_modes,): share of the kinetic energy that is not of coordinates beside the plate
 
-    def of(self, ranks: Sequence[int] | Indices) -> ClassModes:
+    def at_ranks(self, ranks: Sequence[int] | Indices) -> ClassModes:
         rows = list(ranks)
         return replace(
             self, eigenvalues=self.eigenvalues[rows], vectors=self.vectors[:, rows], on_plate=self.on_plate[rows]
@@ -49,7 +49,7 @@ class ClassModes:
 
         Weighted with the weights of the solve they sum to the eigenvalue and to 1 (the sum rule).
         """
-        return self.own.energies(self.vectors)
+        return self.symmetry_class.energies(self.vectors)
 
 
 def solve_classes(plate: Plate, weights: Weights, n_modes: Mapping[Parity, int]) -> dict[Parity, ClassModes]:
@@ -98,7 +98,7 @@ def _solve_class(
         vectors[:, : symmetry_class.n_rigid],
         vectors[:, symmetry_class.n_rigid : symmetry_class.n_rigid + n_modes],
     )
-    on_plate = 1.0 - np.diagonal(np.tensordot(weights.mass, symmetry_class.project_beside(elastic), axes=1))
+    on_plate = 1.0 - np.diagonal(np.tensordot(weights.mass, symmetry_class.project_coordinates(elastic), axes=1))
     return ClassModes(
         symmetry_class, values[symmetry_class.n_rigid : symmetry_class.n_rigid + n_modes], elastic, rigid, on_plate
     )
@@ -165,7 +165,7 @@ class Modes:
     def by_class(self) -> dict[Parity, ClassModes]:
         by_class = {}
         for parity in dict.fromkeys(self.parities):
-            by_class[parity] = self.classes[parity].of(self.ranks[self.rows(parity)])
+            by_class[parity] = self.classes[parity].at_ranks(self.ranks[self.rows(parity)])
         return by_class
 
     def in_order(self, of_class: Mapping[Parity, Any]) -> Floats:
@@ -178,11 +178,13 @@ class Modes:
 
     def displacement(self, x: Floats, y: Floats) -> Floats:
         """Shapes on a grid: (n_modes, n_x, n_y) array; x and y are fractions of the sides in [0, 1]."""
-        return self.in_order({p: c.own.deflections(c.vectors).on(x, y) for p, c in self.by_class.items()})
+        return self.in_order({p: c.symmetry_class.deflections(c.vectors).on(x, y) for p, c in self.by_class.items()})
 
     def displacement_across(self, x: Floats, y: Floats) -> Floats:
         """Shapes at points y, (n_x, n_y), of their own at each x, (n_x,)."""
-        return self.in_order({p: c.own.deflections(c.vectors).across(x, y) for p, c in self.by_class.items()})
+        return self.in_order(
+            {p: c.symmetry_class.deflections(c.vectors).across(x, y) for p, c in self.by_class.items()}
+        )
 
 
 def solve(plate: Plate, weights: Weights, n_modes: int) -> Modes:

@@ -89,7 +89,7 @@ class PointMotion(NamedTuple):
     """A sum of deflections at places (factor, x, y); or a coordinate beside the plate, such as a magnet's rise."""
 
     places: tuple[tuple[float, float, float], ...] = ()
-    beside: int = -1
+    coordinate: int = -1
 
 
 @dataclass(frozen=True)
@@ -100,11 +100,11 @@ class PointTerm:
 
     @property
     def is_on_plate(self) -> bool:
-        return self.n_beside == 0
+        return self.n_coordinates == 0
 
     @property
-    def n_beside(self) -> int:
-        return 1 + max(motion.beside for _, *motions in self.products for motion in motions)
+    def n_coordinates(self) -> int:
+        return 1 + max(motion.coordinate for _, *motions in self.products for motion in motions)
 
 
 @dataclass(frozen=True)

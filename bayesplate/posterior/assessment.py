@@ -35,10 +35,10 @@ class Assessment:
     left_out: Floats  # (n_modes,), ln measured - ln predicted from the other modes; nan if these are too few
     leverages: Floats  # (n_modes,), share of each mode in its own prediction, at the posterior's median noise
     carrying: tuple[CarryingMode, ...]  # modes that alone carry a constant or a size
-    linear_errors: Floats  # (n_some, n_every), cents: linear less exact law over the posterior
+    linear_errors: Floats  # (n_some, n_modes), cents: linear less exact law over the posterior
     linear_is_enough: bool  # the linear errors stay below their share of the posterior's own noise
     exact_worst: float  # cents, largest error of the exact law against full solves
-    surrogate_errors: Floats  # (n_draws, n_every), cents, surrogate less exact law; no draws without a surrogate
+    surrogate_errors: Floats  # (n_draws, n_modes), cents, surrogate less exact law; no draws without a surrogate
     means: Mapping[LawName, tuple[Mapping[str, float], float]]  # posterior means of E_x ... D_s, and effective draws
     doubts: tuple[str, ...]  # labels that the fit contradicts or that hardly fit, and signs that contradict them
 

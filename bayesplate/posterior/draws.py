@@ -27,7 +27,7 @@ class Draws:
     noise: Floats  # (..., n_setups), relative
     derived: Mapping[str, DerivedQuantity]
     log_frequency: Floats  # (..., n_modes), ln Hz, under the law of the fit
-    every_log_frequency: tuple[Floats, ...]  # per setup (..., n_every): labelled modes, then those that peaks may be
+    mode_log_frequencies: tuple[Floats, ...]  # per setup (..., n_modes): labelled modes, then those that peaks may be
     log_likelihood: Floats  # (..., n_factors), in the order of `Posterior.factors`
     predictive: Floats  # (..., n_modes), Hz, readings of the next measurement: with noise, rounded as the readings
 
@@ -38,8 +38,8 @@ class Draws:
 
     @property
     def flat_log_frequency(self) -> list[Floats]:
-        """ln f (Hz) of all modes at `flat`: one (n, n_every) array per setup."""
-        return [log_frequency.reshape(-1, log_frequency.shape[-1]) for log_frequency in self.every_log_frequency]
+        """ln f (Hz) of all modes at `flat`: one (n, n_modes) array per setup."""
+        return [log_frequency.reshape(-1, log_frequency.shape[-1]) for log_frequency in self.mode_log_frequencies]
 
     @property
     def median_noise(self) -> Floats:
@@ -47,10 +47,10 @@ class Draws:
         return np.asarray(np.median(self.noise.reshape(-1, self.noise.shape[-1]), axis=0))
 
 
-def named_draws(inference: Inference, seed: int, every_log_frequency: Sequence[Floats] | None = None) -> Draws:
+def named_draws(inference: Inference, seed: int, mode_log_frequencies: Sequence[Floats] | None = None) -> Draws:
     """Draws of an inference by name; `seed` is for the predictive draws.
 
-    `every_log_frequency` is ln f (Hz) of all modes at the thinned draws, (n_draws, n_every) per setup, if known.
+    `mode_log_frequencies` is ln f (Hz) of all modes at the thinned draws, (n_draws, n_modes) per setup, if known.
     """
     problem = inference.problem
     shape = inference.theta.shape[:2]
@@ -59,14 +59,14 @@ def named_draws(inference: Inference, seed: int, every_log_frequency: Sequence[F
     values = problem.parameters.values(flat)
     constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
     noise = np.exp(problem.parameters.log_noise(flat))
-    if every_log_frequency is None:
-        every_log_frequency = inference.every_log_frequency
-    if every_log_frequency is None:
+    if mode_log_frequencies is None:
+        mode_log_frequencies = inference.mode_log_frequencies
+    if mode_log_frequencies is None:
         distinct, distinct_index = np.unique(flat, axis=0, return_inverse=True)  # a rejected step repeats its draw
-        every_log_frequency = [
-            log_frequency[distinct_index.ravel()] for log_frequency in posterior.every_log_frequency(distinct)
+        mode_log_frequencies = [
+            log_frequency[distinct_index.ravel()] for log_frequency in posterior.mode_log_frequencies(distinct)
         ]
-    by_setup = list(every_log_frequency)
+    by_setup = list(mode_log_frequencies)
     rng = random_stream(seed, "predictive")
     labelled = posterior.labelled(by_setup)
     predictive = [
@@ -87,7 +87,7 @@ def named_draws(inference: Inference, seed: int, every_log_frequency: Sequence[F
         noise=shaped(noise),
         derived={name: DerivedQuantity(shaped(item.values), item.unit) for name, item in derived.items()},
         log_frequency=shaped(np.concatenate(labelled, axis=1)),
-        every_log_frequency=tuple(shaped(log_frequency) for log_frequency in by_setup),
+        mode_log_frequencies=tuple(shaped(log_frequency) for log_frequency in by_setup),
         log_likelihood=shaped(posterior.log_likelihood_of(by_setup, flat)),
         predictive=shaped(np.concatenate(predictive, axis=1)),
     )

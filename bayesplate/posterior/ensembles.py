@@ -35,10 +35,10 @@ class Ensembles:
         factor: Floats,  # lower Cholesky factor of the estimate's covariance
         seed: int,
         shape: tuple[int, int],  # ensembles, and walkers of each
-        near: Floats | None = None,  # (n_draws, n_dim) draws of nearly the same density
+        initial_draws: Floats | None = None,  # (n_draws, n_dim) draws of nearly the same density
     ) -> None:
         self.log_density, self.centre, self.factor, self.seed, self.shape = log_density, centre, factor, seed, shape
-        self.near = near
+        self.initial_draws = initial_draws
         self.n_steps = 0
         self._backends: list[Any] = []
 
@@ -55,8 +55,8 @@ class Ensembles:
     def pilot(self) -> Pilot:
         """The walk from the starts to where the ensembles begin."""
         rng, n_walkers = random_stream(self.seed, "pilot"), self.shape[0] * self.shape[1]
-        if self.near is not None:
-            return pilot_from_draws(self.log_density, self.near, rng, n_walkers)
+        if self.initial_draws is not None:
+            return pilot_from_draws(self.log_density, self.initial_draws, rng, n_walkers)
         n_rounds = len(self.centre) ** 2 // _PAIRS_A_ROUND
         return pilot(self.log_density, self.centre, self.factor, rng, n_walkers, n_rounds)
 
@@ -160,7 +160,7 @@ def _last_rounds(backend: Any, n_rounds: int, thirds: int) -> Floats:
     return np.asarray(backend.chain[-_PILOT_STEPS * max(1, thirds * n_rounds // 3) :])
 
 
-def pilot_from_draws(log_density: LogDensity, near: Floats, rng: np.random.Generator, n_walkers: int) -> Pilot:
+def pilot_from_draws(log_density: LogDensity, initial_draws: Floats, rng: np.random.Generator, n_walkers: int) -> Pilot:
     """A pilot without a walk, from (n_draws, n_dim) draws of nearly the same density."""
-    starts = finite_starts(log_density, lambda n: near[rng.integers(len(near), size=n)], n_walkers)
-    return Pilot(near, Mixture.fitted(near), *starts)
+    starts = finite_starts(log_density, lambda n: initial_draws[rng.integers(len(initial_draws), size=n)], n_walkers)
+    return Pilot(initial_draws, Mixture.fitted(initial_draws), *starts)

@@ -55,7 +55,7 @@ class Labelling:
     board: Board  # with labels for the peaks that are likely one certain mode
     log_rigidities: Floats  # (n_constants,), ln of the free rigidities (N m), close to the estimate from its readings
     log_density: float  # ln of the posterior density there, at the most probable noise
-    log_density_unlike: float  # the same at a noise of at least `MODEL_ERROR`
+    log_density_at_model_error: float  # the same at a noise of at least `MODEL_ERROR`
 
     @property
     def moduli(self) -> Moduli:
@@ -131,7 +131,7 @@ def probable_labellings(board: Board, prior: PriorCard) -> list[tuple[Labelling,
         if sum(len(setup.readings) for setup in labelling.board.setups) >= FEWEST_PEAKS
     ]
     log_shares = [
-        labelling.log_density_unlike + (0.0 if labelling.is_usual else np.log(_UNUSUAL_PROBABILITY))
+        labelling.log_density_at_model_error + (0.0 if labelling.is_usual else np.log(_UNUSUAL_PROBABILITY))
         for labelling in labellings
     ]
     return (
@@ -141,7 +141,7 @@ def probable_labellings(board: Board, prior: PriorCard) -> list[tuple[Labelling,
     )
 
 
-def choose_labelling(ways: Sequence[Labelling]) -> Labelling:
+def choose_labelling(labellings: Sequence[Labelling]) -> Labelling:
     """The most probable labelling, if all labellings with distant constants are improbable.
 
     A free plate has nearly the same frequencies with its grain along the other side, and few peaks fit several plates.
@@ -149,10 +149,10 @@ def choose_labelling(ways: Sequence[Labelling]) -> Labelling:
     distant labelling is possible as well, with the constants of each and the label that would decide.
     """
     distinct: list[Labelling] = []
-    for labelling in sorted(ways, key=lambda labelling: -labelling.log_density_unlike):
+    for labelling in sorted(labellings, key=lambda labelling: -labelling.log_density_at_model_error):
         if all(labelling.is_far_from(other) for other in distinct):
             distinct.append(labelling)
-    shares = softmax([labelling.log_density_unlike for labelling in distinct])
+    shares = softmax([labelling.log_density_at_model_error for labelling in distinct])
     possible = [
         (labelling, share) for labelling, share in zip(distinct, shares, strict=True) if share >= POSSIBLE_PROBABILITY
     ]
@@ -207,7 +207,7 @@ def _settle_labels(board: Board, guess: Guess, visited: list[tuple[Setup, ...]])
         path.append(labelled.setups)
         visited.append(labelled.setups)
         estimate = weighted_least_squares(_with_readings(labelled), _STEPS, guess.rigidities)
-        if identifiability(estimate.sensitivities, estimate.scales, board.symmetry).blind():
+        if identifiability(estimate.sensitivities, estimate.scales, board.symmetry).undetermined_constants():
             return labelled, guess.rigidities
         guess = guess_of(board, estimate)
 
@@ -216,7 +216,7 @@ def _first_guesses(board: Board, prior: PriorCard) -> list[Guess]:
     """The constants that the labelled modes determine, or else guesses from all of the prior that explain the peaks."""
     if sum(len(setup.readings) for setup in board.setups) >= board.symmetry.n:
         estimate = weighted_least_squares(_with_readings(board), accepted=_TOLERANCE)
-        if not identifiability(estimate.sensitivities, estimate.scales, board.symmetry).blind():
+        if not identifiability(estimate.sensitivities, estimate.scales, board.symmetry).undetermined_constants():
             return [guess_of(board, estimate)]
     n_peaks = sum(len(setup.readings) + len(setup.peaks) for setup in board.setups)
     if board.isotropic or n_peaks < len(RIGIDITIES):  # one label fixes all of an isotropic plate
@@ -276,10 +276,10 @@ def _label_setup(board: Board, setup: Setup, guess: Guess) -> Setup:
     peaks = PeakLikelihood.of(model)
     assert peaks is not None
     # At a wrong guess few peaks are near a mode: a smaller chance of being spurious assigns them for a better guess.
-    peaks = replace(peaks, log_alone=peaks.log_alone - np.log(peaks.log_alone.size))
+    peaks = replace(peaks, log_spurious=peaks.log_spurious - np.log(peaks.log_spurious.size))
     free = np.exp(guess.log_rigidities).T
     values = {**guess.values, **board.symmetry.rigidities(free, guess.values["poisson_xy"])}
-    log_frequency = model.every_log_frequency(values, "linear")
+    log_frequency = model.mode_log_frequencies(values, "linear")
     usable = np.isfinite(log_frequency).all(axis=1)
     noise = np.full(int(usable.sum()), guess.noise)
     return label_likely_peaks(setup, peaks, peaks.probabilities(log_frequency[usable], noise), LIKELY_LABEL)

@@ -38,8 +38,8 @@ class Inference:
     convergence: Convergence
     theta: Floats  # (n_chains, n_draws, n_dim), thinned, chain = ensemble; resampled by weight if from a surrogate
     log_posterior: Floats  # (n_chains, n_draws)
-    # for each setup (n_chains * n_draws, n_every), ln Hz, if known
-    every_log_frequency: tuple[Floats, ...] | None = None
+    # for each setup (n_chains * n_draws, n_modes), ln Hz, if known
+    mode_log_frequencies: tuple[Floats, ...] | None = None
     surrogate: Surrogate | None = None  # of the exact law, on which the walkers walked
     pareto_k: float | None = None  # k-hat of the weights from the surrogate to the exact law
 
@@ -70,7 +70,7 @@ def infer(
     posterior = problem.posterior
 
     def walk(
-        density: Posterior, walk_checkpoint: Checkpoint | None, near: Floats | None = None
+        density: Posterior, walk_checkpoint: Checkpoint | None, initial_draws: Floats | None = None
     ) -> tuple[Chains, Convergence]:
         chains, convergence = sample(
             coordinates.density(density),
@@ -78,31 +78,31 @@ def infer(
             coordinates.start_covariance(problem.covariance),
             settings,
             names=problem.parameters.names,
-            near=None if near is None else coordinates.y(near),
+            initial_draws=None if initial_draws is None else coordinates.y(initial_draws),
             checkpoint=walk_checkpoint,
             progress=progress,
         )
         log_density = chains.log_prob - coordinates.log_jacobian(chains.draws)
         return Chains(coordinates.theta(chains.draws), log_density, chains.burn_in), convergence
 
-    surrogate, near = None, None
+    surrogate, initial_draws = None, None
     if posterior.law == "exact" and not problem.is_forced:
         surrogate = find_surrogate(posterior, problem.centre, problem.covariance, coordinates)
     for stage in _WALKS:
         if surrogate is None:
             break
         surrogate_posterior = with_surrogate(posterior, surrogate)
-        run = walk(surrogate_posterior, None if checkpoint is None else checkpoint.part(stage), near)
+        run = walk(surrogate_posterior, None if checkpoint is None else checkpoint.part(stage), initial_draws)
         reweighted, law_points = _reweighted(problem, surrogate, *run, random_stream(settings.seed, "weights"))
         is_walked = run[1].passed
         if reweighted is not None and (reweighted.convergence.ess_min >= settings.gate.ess_min or not is_walked):
             return reweighted
         if not is_walked:
             break
-        near = run[0].pooled
+        initial_draws = run[0].pooled
         log_jacobian = coordinates.log_jacobian(coordinates.y(law_points.theta))
-        surrogate = surrogate.taught(law_points._replace(log_density=law_points.log_density + log_jacobian))
-    chains, convergence = walk(posterior, checkpoint, near)
+        surrogate = surrogate.refitted_with(law_points._replace(log_density=law_points.log_density + log_jacobian))
+    chains, convergence = walk(posterior, checkpoint, initial_draws)
     theta, log_posterior = (
         thin_walker_major(values, chains.burn_in, convergence.tau_max, n_draws_max=MOST_DRAWS_A_CHAIN)
         for values in (chains.draws, chains.log_prob)

@@ -229,7 +229,7 @@ def exact_models(
     half_widths = np.zeros(parameters.n_dim)
     half_widths[boxed] = np.clip(_BOX_SDS * np.sqrt(np.diagonal(spread)), _NARROWEST, _WIDEST)
     sds = np.sqrt(np.diagonal(covariance))
-    followed = {name for model in models for effect in model.system.effects for name in effect.goes_with}
+    followed = {name for model in models for effect in model.system.effects for name in effect.followed_inputs}
     stretched = []
     for i, parameter in enumerate(parameters.uncertain, start=parameters.first_input):
         if parameter.name == "poisson_xy":
@@ -278,7 +278,7 @@ def _effect_steps(models: Sequence[SetupModel], parameters: Parameters, centre: 
     parameter is not moved.
     """
     share_sets = dict.fromkeys(
-        tuple(shares.items()) for model in models for effect in model.system.effects for shares in effect.also_at()
+        tuple(shares.items()) for model in models for effect in model.system.effects for shares in effect.law_points()
     )
     column = {name: i for i, name in enumerate(parameters.inputs, start=parameters.first_input)}
     low, high = parameters.within_bounds(np.stack([centre - reach, centre + reach]))
@@ -297,8 +297,8 @@ def worst_cents(models: Sequence[SetupModel]) -> float:
 
 
 def linearisation_errors(board: Board, models: Sequence[SetupModel], theta: Floats) -> Floats:
-    """Linear less exact law at each draw, of all modes of the likelihood: (n_draws, n_every) array, cents."""
+    """Linear less exact law at each draw, of all modes of the likelihood: (n_draws, n_modes) array, cents."""
     values = Parameters(board).values(theta)
-    laws = [[model.every_log_frequency(values, law) for model in models] for law in get_args(LawName)]
+    laws = [[model.mode_log_frequencies(values, law) for model in models] for law in get_args(LawName)]
     errors = [linear - exact for linear, exact in zip(*laws, strict=True)]
     return cents(np.concatenate(errors, axis=1))

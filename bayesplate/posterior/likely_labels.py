@@ -24,13 +24,13 @@ def with_likely_labels(inference: Inference, seed: int) -> tuple[Inference, Draw
     """
     draws = named_draws(inference, seed)
     problem, previous = inference.problem, inference.problem.posterior
-    every_log_frequency = draws.flat_log_frequency
+    mode_log_frequencies = draws.flat_log_frequency
     step = max(1, len(draws.flat) // MOST_DRAWS_OF_LABELS)
     noise = draws.noise.reshape(len(draws.flat), -1)[::step]
     setups = []
     for i, (setup, peaks) in enumerate(zip(problem.board.setups, previous.peaks, strict=True)):
         if peaks is not None:
-            probabilities = peaks.probabilities(every_log_frequency[i][::step], noise[:, i])
+            probabilities = peaks.probabilities(mode_log_frequencies[i][::step], noise[:, i])
             setup = label_likely_peaks(setup, peaks, probabilities, LIKELY_LABEL)
         setups.append(setup)
     board = replace(problem.board, setups=tuple(setups))
@@ -40,18 +40,18 @@ def with_likely_labels(inference: Inference, seed: int) -> tuple[Inference, Draw
     models = tuple(model.labelled_as(setup) for model, setup in zip(previous.models, setups, strict=True))
     posterior = Posterior(board, previous.prior, models, previous.law, previous.robust)
     columns = [  # for each setup, the previous index of each mode
-        np.array([previous_model.every_place.index(place) for place in model.every_place], dtype=np.intp)
+        np.array([previous_model.mode_places.index(place) for place in model.mode_places], dtype=np.intp)
         for previous_model, model in zip(previous.models, models, strict=True)
     ]
     surrogate = inference.surrogate
     if surrogate is not None:
-        starts = np.cumsum([0, *previous.n_every])[:-1]
+        starts = np.cumsum([0, *previous.n_modes])[:-1]
         all_columns = np.concatenate([start + order for start, order in zip(starts, columns, strict=True)])
         surrogate = replace(surrogate, coefficients=surrogate.coefficients[:, all_columns])
     verdict = identifiability(estimate.sensitivities, estimate.scales, board.symmetry)
     relabelled_problem = replace(problem, board=board, estimate=estimate, identifiability=verdict, posterior=posterior)
     relabelled = replace(inference, problem=relabelled_problem, surrogate=surrogate)
     log_frequencies = [
-        log_frequency[:, order] for log_frequency, order in zip(every_log_frequency, columns, strict=True)
+        log_frequency[:, order] for log_frequency, order in zip(mode_log_frequencies, columns, strict=True)
     ]
     return relabelled, named_draws(relabelled, seed, log_frequencies)

@@ -44,7 +44,7 @@ class Mixture:
         return cls(np.ones(1), centre[None], _cholesky(shrink * covariance)[None])
 
     @classmethod
-    def one_fitted(cls, draws: Floats) -> Mixture:
+    def fitted_single(cls, draws: Floats) -> Mixture:
         """The Student distribution with the mean and covariance of (..., n_dim) draws."""
         flat = draws.reshape(-1, draws.shape[-1])
         return cls.with_covariance(flat.mean(axis=0), np.cov(flat.T).reshape(flat.shape[1], flat.shape[1]))
@@ -61,7 +61,7 @@ class Mixture:
         n_numbers = n_dim * (n_dim + 3) // 2
         flat = flat[:: -(-len(flat) // (_MOST_PER_NUMBER * n_numbers))]
         n_parts = min(N_PARTS, len(flat) // (_FEWEST_PER_NUMBER * n_numbers))
-        mixture = cls.one_fitted(flat)
+        mixture = cls.fitted_single(flat)
         if n_parts < 2:
             return mixture
         floor = _FLOOR * np.cov(flat.T).reshape(n_dim, n_dim)

@@ -68,12 +68,12 @@ class PosedProblem:
         # at the fitted inputs: at the nominal sizes a board with a soft core looks like another board
         values = self.parameters.values_at(self.centre)
         constants = unusual_sentences(self.board, self.prior, np.array([values[name] for name in RIGIDITIES]))
-        return (*constants, *self.slips, *self._readings.others)
+        return (*constants, *self.slip_remarks, *self._readings.other_remarks)
 
     @property
-    def slips(self) -> tuple[str, ...]:
+    def slip_remarks(self) -> tuple[str, ...]:
         """The doubts that identify a reading or two as a slip."""
-        return self._readings.slips
+        return self._readings.slip_remarks
 
     @cached_property
     def _readings(self) -> Remarks:
@@ -127,7 +127,7 @@ def _pose_labelled(proposed: ProposedLabels, prior: PriorCard, law: LawName | No
     if chosen_law is None:
         errors = linearisation_errors(board, models, _plausible_draws(board, centre, covariance))
         medians = [setup.noise.median for setup in board.setups]
-        is_linear = linear_suffices([len(model.every_place) for model in models], errors, medians)
+        is_linear = linear_suffices([len(model.mode_places) for model in models], errors, medians)
         chosen_law = "linear" if is_linear else "exact"
     posterior = Posterior(board, prior, models, chosen_law, robust)
     _require_reachable(posterior, centre, covariance)

@@ -58,13 +58,13 @@ def weighted_mean(values: Floats, weights: Floats) -> float:
 
 
 def linearisation(inference: Inference, draws: Draws) -> Floats:
-    """Linear less exact law over the posterior, of all modes: (n_some, n_every) array, cents.
+    """Linear less exact law over the posterior, of all modes: (n_some, n_modes) array, cents.
 
     The draws hold the frequencies of their own law; the other law is evaluated.
     """
     step = _comparison_step(draws)
     other_law: LawName = "linear" if inference.problem.posterior.law == "exact" else "exact"
-    other_frequencies = inference.problem.under(other_law).posterior.every_log_frequency(draws.flat[::step])
+    other_frequencies = inference.problem.under(other_law).posterior.mode_log_frequencies(draws.flat[::step])
     difference = np.concatenate(other_frequencies, axis=1) - np.concatenate(draws.flat_log_frequency, axis=1)[::step]
     return cents(difference if other_law == "linear" else -difference)
 
@@ -77,4 +77,4 @@ def _comparison_step(draws: Draws) -> int:
 def linear_is_enough(inference: Inference, draws: Draws, errors: Floats | None = None) -> bool:
     """Whether the linear law's `errors` over the posterior stay below their share of the posterior's own noise."""
     errors = linearisation(inference, draws) if errors is None else errors
-    return linear_suffices(inference.problem.posterior.n_every, errors, draws.median_noise)
+    return linear_suffices(inference.problem.posterior.n_modes, errors, draws.median_noise)

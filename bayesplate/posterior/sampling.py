@@ -68,14 +68,14 @@ class Chains:
     burn_in: int  # steps to discard
 
     @property
-    def kept(self) -> Floats:
+    def after_burn_in(self) -> Floats:
         """Draws after burn-in, (n_ensembles, n_kept_steps, n_walkers, n_dim)."""
         return self.draws[:, self.burn_in :]
 
     @property
     def pooled(self) -> Floats:
         """Draws after burn-in of all ensembles together, (n_draws, n_dim)."""
-        return self.kept.reshape(-1, self.draws.shape[-1])
+        return self.after_burn_in.reshape(-1, self.draws.shape[-1])
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def sample(
     settings: SamplerSettings,
     *,
     names: Sequence[str] = (),
-    near: Floats | None = None,
+    initial_draws: Floats | None = None,
     checkpoint: Checkpoint | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> tuple[Chains, Convergence]:
@@ -113,14 +113,15 @@ def sample(
 
     The draws depend on the seed alone: a run that was killed and continued from its checkpoint gives the same bytes.
 
-    The walkers start around the (n_dim,) estimate, three times as wide as its covariance, or at some of the `near`
-    draws (n_draws, n_dim) of nearly the same density. Unless `passed`, nothing may be printed from the chains.
+    The walkers start around the (n_dim,) estimate, three times as wide as its covariance, or at some of the
+    `initial_draws`, (n_draws, n_dim) of nearly the same density. Unless `passed`, nothing may be printed from the
+    chains.
     """
     n_walkers = settings.walkers(n_dim := len(centre))
     names = tuple(names) or tuple(f"parameter {dim + 1}" for dim in range(n_dim))
     starts = np.asarray(centre), cholesky_factor(covariance)
     shape = settings.n_ensembles, n_walkers
-    ensembles = Ensembles(guard_log_density(log_density, names), *starts, settings.seed, shape, near)
+    ensembles = Ensembles(guard_log_density(log_density, names), *starts, settings.seed, shape, initial_draws)
     identity = {"seed": settings.seed, "n_ensembles": settings.n_ensembles, "n_walkers": n_walkers, "n_dim": n_dim}
     context = nullcontext() if checkpoint is None else checkpoint.session(**identity, chunk_steps=settings.chunk_steps)
     with context as session:
@@ -134,7 +135,7 @@ def sample(
                 is_last |= is_hopeless(n_taus, n_steps - burn_in, settings)
                 if is_last or n_taus >= settings.gate.tau_count_min:
                     chains = Chains(ensembles.chain, ensembles.log_prob, burn_in)
-                    convergence = judge_convergence(chains.kept, settings.gate, names=names)
+                    convergence = judge_convergence(chains.after_burn_in, settings.gate, names=names)
                     is_long = n_taus >= _LONG_RUN * settings.gate.tau_count_min
                     is_last |= is_long and convergence.acceptance < settings.gate.acceptance_min
                     if is_last or convergence.passed:

@@ -64,8 +64,9 @@ class Slip:
 class Remarks(NamedTuple):
     """Sentences with doubts about the readings."""
 
-    slips: tuple[str, ...]  # the likeliest slip, if a slip explains the readings
-    others: tuple[str, ...]  # two readings in the wrong order, if there is no slip but a plate fits; a large noise
+    slip_remarks: tuple[str, ...]  # the likeliest slip, if a slip explains the readings
+    # two readings in the wrong order, if there is no slip but a plate fits; a large noise
+    other_remarks: tuple[str, ...]
 
 
 def reading_remarks(posterior: Posterior, centre: Floats) -> Remarks:

@@ -62,15 +62,15 @@ def draws_around_estimate(centre: Floats, factor: Floats, rng: np.random.Generat
     return lambda n: centre + _SPREAD * rng.standard_normal((n, len(centre))) @ factor.T
 
 
-def finite_starts(log_density: LogDensity, drawn: Callable[[int], Floats], n_walkers: int) -> tuple[Floats, Floats]:
+def finite_starts(log_density: LogDensity, draw: Callable[[int], Floats], n_walkers: int) -> tuple[Floats, Floats]:
     """Points of finite log density, and these densities; NotConvergedError where too few are found."""
-    points = drawn(n_walkers)
+    points = draw(n_walkers)
     log_prob = np.asarray(log_density(points))
     for _ in range(_TRIES):
         outside = np.flatnonzero(log_prob == -np.inf)
         if outside.size == 0:
             return points, log_prob
-        points[outside] = drawn(outside.size)
+        points[outside] = draw(outside.size)
         log_prob[outside] = log_density(points[outside])
     raise NotConvergedError(
         f"start of the sampler: wanted {n_walkers} points of finite posterior around the estimate, got "

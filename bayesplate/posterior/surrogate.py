@@ -52,11 +52,11 @@ class LawPoints(NamedTuple):
     log_frequency: Floats
     log_density: Floats
 
-    def where(self, kept: Bools) -> LawPoints:
+    def select(self, is_selected: Bools) -> LawPoints:
         """The points of a mask."""
-        return LawPoints(*(array[kept] for array in self))
+        return LawPoints(*(array[is_selected] for array in self))
 
-    def beside(self, *others: LawPoints) -> LawPoints:
+    def joined_with(self, *others: LawPoints) -> LawPoints:
         """These points and others together."""
         return LawPoints(*(np.concatenate(arrays) for arrays in zip(self, *others, strict=True)))
 
@@ -85,7 +85,7 @@ class Surrogate:
         The fit of second order shows the most bent directions; higher orders along these follow if the points, by
         their weights, are enough. `along_bent` is as `BENT_DIRECTIONS`.
         """
-        points = points.where(np.isfinite(points.log_frequency).all(axis=1) & np.isfinite(points.log_density))
+        points = points.select(np.isfinite(points.log_frequency).all(axis=1) & np.isfinite(points.log_density))
         x, weights = points.theta[:, columns], points.weights
         factor = np.linalg.cholesky(np.atleast_2d(np.cov(x.T, aweights=weights)))
         centre = np.average(x, axis=0, weights=weights)
@@ -96,9 +96,9 @@ class Surrogate:
         most_bent = second_order._bent_directions()
         return replace(second_order, bent={order: most_bent[:n] for order, n in along_bent.items()})._fitted()
 
-    def taught(self, *further: LawPoints) -> Surrogate:
+    def refitted_with(self, *further: LawPoints) -> Surrogate:
         """The surrogate fitted to further points as well."""
-        return Surrogate.fitted(self.points.beside(*further), self.columns)
+        return Surrogate.fitted(self.points.joined_with(*further), self.columns)
 
     def _fitted(self) -> Surrogate:
         roots, terms = np.sqrt(self.points.weights)[:, None], self._terms(self.points.theta)
@@ -160,8 +160,8 @@ class SurrogatePosterior(Posterior):
         log_density, log_frequency = super().evaluate(theta)
         return log_density + self.surrogate.log_within(theta), log_frequency
 
-    def every_log_frequency(self, theta: Floats, values: Values | None = None) -> list[Floats]:
-        """ln f of the labelled modes, then of those that peaks may be: one (n_draws, n_every) array per setup."""
+    def mode_log_frequencies(self, theta: Floats, values: Values | None = None) -> list[Floats]:
+        """ln f of the labelled modes, then of those that peaks may be: one (n_draws, n_modes) array per setup."""
         return self.by_setup(self.surrogate.log_frequencies(theta))
 
 
@@ -205,7 +205,7 @@ def find_surrogate(
             and missing_share <= _LARGEST_MISSING
         ):
             return surrogate
-        surrogate = surrogate.taught(law_points, outer_points)
+        surrogate = surrogate.refitted_with(law_points, outer_points)
     return None
 
 
@@ -223,7 +223,7 @@ def missing_probability(log_law: Floats, log_surrogate: Floats, log_proposal: Fl
 
 def _law_points(posterior: Posterior, coordinates: TailCoordinates, theta: Floats) -> LawPoints:
     """Points with frequencies and log density by the law itself; the density is that of the walk's coordinates."""
-    by_setup = posterior.every_log_frequency(theta)
+    by_setup = posterior.mode_log_frequencies(theta)
     likelihood = posterior.log_likelihood_of(by_setup, theta).sum(axis=1)
     log_density = posterior.log_prior(theta) + likelihood + coordinates.log_jacobian(coordinates.y(theta))
     return LawPoints(theta, np.concatenate(by_setup, axis=1), log_density)

@@ -52,7 +52,7 @@ class Posterior:
     def _sure_readings(self) -> tuple[tuple[Bools, ReadingErrors], ...]:
         """For each setup, the mask of readings with a sure label, and their errors."""
         masks = (np.array([reading.is_sure for reading in setup.readings], dtype=bool) for setup in self.board.setups)
-        return tuple((mask, errors.at(mask)) for mask, errors in zip(masks, self.readings, strict=True))
+        return tuple((mask, errors.select(mask)) for mask, errors in zip(masks, self.readings, strict=True))
 
     @cached_property
     def peaks(self) -> tuple[PeakLikelihood | None, ...]:
@@ -64,20 +64,20 @@ class Posterior:
         return self.evaluate(theta)[0]
 
     def evaluate(self, theta: Floats) -> tuple[Floats, Floats]:
-        """Log density (n_draws,), and ln f of all modes (n_draws, n_every), nan where the prior excludes the draw."""
+        """Log density (n_draws,), and ln f of all modes (n_draws, n_modes), nan where the prior excludes the draw."""
         values = self.parameters.values(theta)
         total = self.log_prior(theta, values)
         inside = np.isfinite(total)
-        log_frequency = np.full((len(theta), sum(self.n_every)), np.nan)
+        log_frequency = np.full((len(theta), sum(self.n_modes)), np.nan)
         if inside.any():
-            by_setup = self.every_log_frequency(theta[inside], values if inside.all() else None)
+            by_setup = self.mode_log_frequencies(theta[inside], values if inside.all() else None)
             total[inside] += self.log_likelihood_of(by_setup, theta[inside]).sum(axis=1)
             log_frequency[inside] = np.concatenate(by_setup, axis=1)
         return total, log_frequency
 
     def by_setup(self, log_frequency: Floats) -> list[Floats]:
-        """Columns of each setup among those of `evaluate`: one (..., n_every) array per setup."""
-        return np.split(log_frequency, np.cumsum(self.n_every)[:-1], axis=-1)
+        """Columns of each setup among those of `evaluate`: one (..., n_modes) array per setup."""
+        return np.split(log_frequency, np.cumsum(self.n_modes)[:-1], axis=-1)
 
     def log_prior(self, theta: Floats, values: Values | None = None) -> Floats:
         """Log prior density: (n_draws,) array; `values` as of `log_prior_constants`."""
@@ -137,9 +137,9 @@ class Posterior:
         return theta
 
     @property
-    def n_every(self) -> tuple[int, ...]:
+    def n_modes(self) -> tuple[int, ...]:
         """Number of modes in the likelihood of each setup: labelled modes, and modes that peaks may be."""
-        return tuple(len(model.every_place) for model in self.models)
+        return tuple(len(model.mode_places) for model in self.models)
 
     @property
     def factors(self) -> tuple[str, ...]:
@@ -150,42 +150,42 @@ class Posterior:
             names += [] if peaks is None else [f"{setup.name} peaks"]
         return tuple(names)
 
-    def every_log_frequency(self, theta: Floats, values: Values | None = None) -> list[Floats]:
-        """ln f of the labelled modes, then of those that peaks may be: one (n_draws, n_every) array per setup."""
+    def mode_log_frequencies(self, theta: Floats, values: Values | None = None) -> list[Floats]:
+        """ln f of the labelled modes, then of those that peaks may be: one (n_draws, n_modes) array per setup."""
         values = self.parameters.values(theta) if values is None else values
         return log_frequencies_of_board(self.models, values, self.law)
 
     def log_frequencies(self, theta: Floats) -> list[Floats]:
         """ln f of the labelled modes: one (n_draws, n_modes) array per setup."""
-        return self.labelled(self.every_log_frequency(theta))
+        return self.labelled(self.mode_log_frequencies(theta))
 
-    def labelled(self, every_log_frequency: Sequence[Floats]) -> list[Floats]:
-        """Columns of the labelled modes among those of `every_log_frequency`."""
-        pairs = zip(every_log_frequency, self.board.setups, strict=True)
+    def labelled(self, mode_log_frequencies: Sequence[Floats]) -> list[Floats]:
+        """Columns of the labelled modes among those of `mode_log_frequencies`."""
+        pairs = zip(mode_log_frequencies, self.board.setups, strict=True)
         return [log_frequency[:, : len(setup.readings)] for log_frequency, setup in pairs]
 
     def log_likelihood(self, theta: Floats) -> Floats:
         """Log probability of each of `factors`: (n_draws, n_factors) array."""
-        return self.log_likelihood_of(self.every_log_frequency(theta), theta)
+        return self.log_likelihood_of(self.mode_log_frequencies(theta), theta)
 
-    def log_likelihood_of(self, every_log_frequency: Sequence[Floats], theta: Floats) -> Floats:
-        """`log_likelihood` from the frequencies of `every_log_frequency`."""
+    def log_likelihood_of(self, mode_log_frequencies: Sequence[Floats], theta: Floats) -> Floats:
+        """`log_likelihood` from the frequencies of `mode_log_frequencies`."""
         noise = np.exp(self.parameters.log_noise(theta))
         factors = []
-        labelled = self.labelled(every_log_frequency)
+        labelled = self.labelled(mode_log_frequencies)
         for i, ((is_sure, errors), peaks) in enumerate(zip(self._sure_readings, self.peaks, strict=True)):
             factors.append(errors.log_likelihood(labelled[i][:, is_sure], noise[:, i]))
             if peaks is not None:
-                factors.append(peaks.log_likelihood(every_log_frequency[i], noise[:, i])[:, None])
+                factors.append(peaks.log_likelihood(mode_log_frequencies[i], noise[:, i])[:, None])
         return np.concatenate(factors, axis=1)
 
 
-def linear_suffices(n_every: Sequence[int], errors: Floats, noise: Sequence[float] | Floats) -> bool:
+def linear_suffices(n_modes: Sequence[int], errors: Floats, noise: Sequence[float] | Floats) -> bool:
     """Whether (n_draws, n_modes) linearisation errors, cents, stay below a quarter of the noise, rms over draws.
 
-    `n_every` is the number of modes of each setup, `noise` its relative noise.
+    `n_modes` is the number of modes of each setup, `noise` its relative noise.
     """
-    limit = LINEAR_SHARE * cents(np.repeat(noise, n_every))
+    limit = LINEAR_SHARE * cents(np.repeat(noise, n_modes))
     finite = np.isfinite(errors).all(axis=1)
     if finite.mean() < 0.5:
         return False

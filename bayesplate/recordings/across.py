@@ -58,14 +58,14 @@ class AveragedModes(NamedTuple):
 
 
 def average_modes(
-    spectra: Spectra, sets: Sequence[RecordIndices], shown: Sequence[Sequence[JudgedMode]]
+    spectra: Spectra, sets: Sequence[RecordIndices], judged_modes: Sequence[Sequence[JudgedMode]]
 ) -> AveragedModes:
     """Modes of all records from the peaks that each set of records shows by itself.
 
     Refused where half of the recordings or more have other modes than the rest.
     """
     names = [_set_name(spectra, records) for records in sets]
-    hertz = [np.array([peak.pole[0] for peak in peaks if peak.is_likely]) for peaks in shown]
+    hertz = [np.array([peak.pole[0] for peak in peaks if peak.is_likely]) for peaks in judged_modes]
     first, offsets, n_common = _best_reference(hertz)
     strange_sets = [
         k
@@ -78,8 +78,8 @@ def average_modes(
             [Fault(names[k], "a recording of the same board", reasons[k], "pick it apart") for k in strange_sets]
         )
     kept_sets = [k for k in range(len(sets)) if k not in strange_sets]
-    groups = _match_peaks([shown[k] for k in kept_sets], [offsets[k] for k in kept_sets], kept_sets.index(first))
-    kept_spectra = spectra.only(np.concatenate([sets[k] for k in kept_sets]))
+    groups = _match_peaks([judged_modes[k] for k in kept_sets], [offsets[k] for k in kept_sets], kept_sets.index(first))
+    kept_spectra = spectra.of_records(np.concatenate([sets[k] for k in kept_sets]))
     modes = _average_groups(kept_spectra, groups, [sets[k].size for k in kept_sets])
     remarks = [f"{names[k]} left out: {reasons[k]} (is it of the same board?)" for k in strange_sets]
     remarks.append(_difference_remark([names[k] for k in kept_sets], groups, spectra.files.size))

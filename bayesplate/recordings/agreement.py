@@ -92,7 +92,7 @@ def _fit_pole(spectra: Spectra, values: Complex, near: Bools, start: Floats) -> 
     fit = refine_poles(Window(spectra.frequency[near], values[:, None], np.zeros((0, 2))), start)
     ((_, decay),) = fit.poles
     variances = np.diagonal(np.linalg.pinv(fit.information()[1][0], hermitian=True))
-    is_simple = np.sqrt(np.mean(np.abs(fit.rest) ** 2)) < _REST_SHARE * np.abs(values).max()
+    is_simple = np.sqrt(np.mean(np.abs(fit.residual) ** 2)) < _REST_SHARE * np.abs(values).max()
     is_sure = 0.0 < variances.max() < (_POLE_ERROR * decay) ** 2
     rings = decay * spectra.duration > STEADY_DECAY
     return (fit.poles[0], variances) if is_simple and is_sure and rings else None

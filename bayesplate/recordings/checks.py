@@ -45,58 +45,58 @@ _GATE_BLOCK, _GATED_SHARE = 0.01, 0.1
 """s of a block, and share of blocks without any sound that a noise gate leaves."""
 
 
-def signal_faults(one: Signal, *, was_played: bool = False) -> Iterator[Fault]:
+def signal_faults(signal: Signal, *, was_played: bool = False) -> Iterator[Fault]:
     """All faults of a recording or a frequency response; the level of a loudspeaker's signal is no fault."""
-    if isinstance(one, FrequencyResponse):
-        if fault := _number_fault(one.name, one.values, "line"):
+    if isinstance(signal, FrequencyResponse):
+        if fault := _number_fault(signal.name, signal.values, "line"):
             yield fault
-        elif not (np.abs(one.values) > _SMALLEST).any():
-            yield Fault(one.name, "a response", "nothing but zeros")
+        elif not (np.abs(signal.values) > _SMALLEST).any():
+            yield Fault(signal.name, "a response", "nothing but zeros")
         return
-    if not _LOWEST_RATE <= one.rate <= _HIGHEST_RATE:
+    if not _LOWEST_RATE <= signal.rate <= _HIGHEST_RATE:
         wanted = f"{_LOWEST_RATE:g} to {_HIGHEST_RATE:g} samples a second"
-        yield Fault(f"{one.name} rate", wanted, f"{one.rate:g}", "is it in Hz?")
-    if one.force is None:
-        yield from _channel_faults(one, one.response, one.name, was_played=was_played)
+        yield Fault(f"{signal.name} rate", wanted, f"{signal.rate:g}", "is it in Hz?")
+    if signal.force is None:
+        yield from _channel_faults(signal, signal.response, signal.name, was_played=was_played)
     else:
-        yield from _channel_faults(one, one.response, f"{one.name} response", was_played=was_played)
-        yield from _channel_faults(one, one.force, f"{one.name} force", was_played=was_played)
+        yield from _channel_faults(signal, signal.response, f"{signal.name} response", was_played=was_played)
+        yield from _channel_faults(signal, signal.force, f"{signal.name} force", was_played=was_played)
 
 
-def phase_fault(one: FrequencyResponse) -> Fault | None:
+def phase_fault(response: FrequencyResponse) -> Fault | None:
     """The fault of a response that does not follow its force: over time it rises towards the hit.
 
     Magnitudes, decibels or degrees in the place of a real or imaginary part lie as much before the hit as after it,
     and a conjugated response lies wholly before.
     """
     got, remedy = "one that answers before it is hit", "export re and im: no magnitudes, no decibels, no degrees"
-    fault = Fault(one.name, "a response with its phase", got, remedy)
-    if not one.values.imag.any():
+    fault = Fault(response.name, "a response with its phase", got, remedy)
+    if not response.values.imag.any():
         return fault
-    if not _FINEST <= one.frequency[1] - one.frequency[0] <= _COARSEST:
+    if not _FINEST <= response.frequency[1] - response.frequency[0] <= _COARSEST:
         return None
-    over_time = np.abs(np.fft.ifft(one.values * np.hanning(one.values.size))) ** 2
+    over_time = np.abs(np.fft.ifft(response.values * np.hanning(response.values.size))) ** 2
     first, _, third, last = (part.sum() for part in np.array_split(over_time[_BLOW_SAMPLES:-_BLOW_SAMPLES], 4))
     return fault if last > max(_RISE * third, _NOISE * first) else None
 
 
-def force_fault(one: Recording) -> Fault | None:
+def force_fault(recording: Recording) -> Fault | None:
     """The fault of a force channel that holds no force; None where it holds one, or where none was recorded."""
-    if one.force is None:
+    if recording.force is None:
         return None
-    if _correlation(one.force, one.response) > _ALIKE_CORRELATION:
+    if _correlation(recording.force, recording.response) > _ALIKE_CORRELATION:
         got = "nearly the same as the response"
-    elif rings(one.force, one.rate):
+    elif rings(recording.force, recording.rate):
         got = "one that rings on after it"
     else:
         return None
     remedy = "--channels response,force where they are exchanged, response,response for a stereo microphone"
-    return Fault(f"{one.name} force", "a channel with a pulse for each hit", got, remedy)
+    return Fault(f"{recording.name} force", "a channel with a pulse for each hit", got, remedy)
 
 
-def is_copy(one: Floats, other: Floats) -> bool:
+def is_copy(first: Floats, second: Floats) -> bool:
     """Whether two channels are the same up to a factor and rounding."""
-    return _correlation(one, other) > _COPY_CORRELATION
+    return _correlation(first, second) > _COPY_CORRELATION
 
 
 def rings(signal: Floats, rate: float) -> bool:

@@ -50,7 +50,7 @@ class Window:
     values: Complex  # (n_lines, n_records): spectra over the standard deviation of each record's noise
     fixed: Floats  # (n_fixed, 2), Hz: frequency and decay rate of modes outside, whose tails reach in
     # share of a line that no simple mode describes: no mode of a real board is perfectly simple
-    unlike: float = 0.0
+    model_error: float = 0.0
     floor: float = 0.0  # error of each line as a share of the window's highest line
     least_variance: float = 0.0  # of a record's noise; 1 is the expected noise
 
@@ -58,7 +58,7 @@ class Window:
     def weights(self) -> Floats:
         """Square roots of the weights of the lines, the same for all records: (n_lines,) array."""
         level = np.mean(np.abs(self.values) ** 2, axis=1)
-        return np.asarray(1.0 / np.sqrt(1.0 + self.unlike**2 * level + self.floor**2 * level.max()))
+        return np.asarray(1.0 / np.sqrt(1.0 + self.model_error**2 * level + self.floor**2 * level.max()))
 
     @property
     def spacing(self) -> float:
@@ -73,22 +73,22 @@ class Window:
             [resonance_terms(self.frequency, all_poles), position[:, None] ** np.arange(DEGREE + 1)], axis=1
         )
 
-    def compressed(self, most: int) -> Window:
+    def compressed(self, n_records: int) -> Window:
         """The window of the strongest combinations of its records: any combination has the same modes."""
-        if self.values.shape[1] <= most:
+        if self.values.shape[1] <= n_records:
             return self
         _, _, right = np.linalg.svd(self.values, full_matrices=False)
-        return replace(self, values=self.values @ right[:most].conj().T)
+        return replace(self, values=self.values @ right[:n_records].conj().T)
 
 
 @dataclass(frozen=True, eq=False)
 class WindowFit:
-    """A fit of modes in a window; `rest`, `jacobian` and `orthogonal` are weighted."""
+    """A fit of modes in a window; `residual`, `jacobian` and `orthogonal` are weighted."""
 
     window: Window
     poles: Floats  # (n_modes, 2), Hz: frequency, and decay rate: half the width of the peak at half its power
     residues: Complex  # (n_modes, n_records), in the units of the window's values
-    rest: Complex  # (n_lines, n_records): residual of the fit
+    residual: Complex  # (n_lines, n_records): residual of the fit
     # (n_lines, 2 n_modes): derivatives of the resonance terms by frequency, then by decay rate, orthogonal to the basis
     jacobian: Complex
     orthogonal: Complex  # (n_lines, n_basis): an orthonormal basis of the resonance terms and the polynomial
@@ -101,7 +101,7 @@ class WindowFit:
     @property
     def variance(self) -> Floats:
         """Noise variance of each record, (n_records,): mean square of the residual, but not below the least one."""
-        power = np.sum(np.abs(self.rest) ** 2, axis=0) / self.n_free
+        power = np.sum(np.abs(self.residual) ** 2, axis=0) / self.n_free
         return np.maximum(power, max(self.window.least_variance, 1e-300))
 
     def information(self) -> tuple[Floats, Floats]:
@@ -114,15 +114,15 @@ class WindowFit:
         inner = self.jacobian.conj().T @ self.jacobian
         pairs = np.einsum("ar,br->rab", doubled.conj(), doubled)
         information = 2.0 * np.real(inner * pairs) / power[:, None, None]
-        scores = 2.0 * np.real(doubled.conj().T * (self.jacobian.conj().T @ self.rest).T) / power[:, None]
+        scores = 2.0 * np.real(doubled.conj().T * (self.jacobian.conj().T @ self.residual).T) / power[:, None]
         return scores, information
 
     @cached_property
     def cost(self) -> float:
         """-2 ln of the likelihood, up to a constant, with the most likely noise of each record."""
-        squares, variance = np.sum(np.abs(self.rest) ** 2, axis=0), self.variance
-        spread = -2.0 * self.rest.shape[1] * float(np.sum(np.log(self.window.weights)))
-        return float(2.0 * np.sum(len(self.rest) * np.log(variance) + squares / variance)) + 2.0 * spread
+        squares, variance = np.sum(np.abs(self.residual) ** 2, axis=0), self.variance
+        spread = -2.0 * self.residual.shape[1] * float(np.sum(np.log(self.window.weights)))
+        return float(2.0 * np.sum(len(self.residual) * np.log(variance) + squares / variance)) + 2.0 * spread
 
     def without(self, mode: int) -> WindowFit:
         """The fit without one of its modes, the others refined in a few steps."""
@@ -130,7 +130,7 @@ class WindowFit:
 
     def with_share(self, shares: tuple[float, ...]) -> WindowFit:
         """The fit with the likeliest of some shares of a line that no simple mode describes."""
-        fits = [refine_poles(replace(self.window, unlike=share), self.poles, _FEW_STEPS) for share in shares]
+        fits = [refine_poles(replace(self.window, model_error=share), self.poles, _FEW_STEPS) for share in shares]
         best = min(fits, key=lambda fit: fit.cost)
         return refine_poles(best.window, best.poles)
 
@@ -199,7 +199,7 @@ def search_modes(window: Window, least_gain: float) -> list[Floats]:
     path: list[Floats] = []
     while len(path) < MOST_MODES and fit.n_free >= 2 * len(path) + 8:
         free_power = power - np.sum(np.abs(adjoint @ fit.orthogonal) ** 2, axis=1)
-        gains = np.sum(np.abs(adjoint @ (fit.rest / np.sqrt(fit.variance))) ** 2, axis=1)
+        gains = np.sum(np.abs(adjoint @ (fit.residual / np.sqrt(fit.variance))) ** 2, axis=1)
         best = int(np.argmax(gains / np.maximum(free_power, _LEAST_ORTHOGONAL * power)))
         trial = refine_poles(window, np.concatenate([fit.poles, candidates[best][None]]), _SEARCH_STEPS)
         if fit.cost - trial.cost < least_gain:

@@ -89,7 +89,7 @@ def find_modes(spectra: Spectra, lowest: float, highest: float) -> tuple[list[Fl
         band_poles = []
         for band in _bands(spectra, lowest, highest, width):
             strongest = band.window.compressed(_MOST_RECORDS)
-            search_window = replace(strongest, unlike=UNLIKE_SHARE, floor=FLOOR_SHARE, least_variance=1.0)
+            search_window = replace(strongest, model_error=UNLIKE_SHARE, floor=FLOOR_SHARE, least_variance=1.0)
             orders = [band.poles_inside(poles) for poles in search_modes(search_window, _least_gain(band.window))]
             band_poles.append(orders[-1] if orders else np.zeros((0, 2)))
             paths.append(StabilityPath(width, tuple(np.sort(poles[:, 0]) for poles in orders)))
@@ -154,7 +154,7 @@ def _fit_band(spectra: Spectra, band: _Band, start: Floats, n_lines: int, by_wid
     pruned, gains = _prune_modes(strongest, _least_gain(window))
     if not len(pruned.poles):
         return
-    fit = refine_poles(replace(window, unlike=pruned.window.unlike), pruned.poles, _LAST_STEPS)
+    fit = refine_poles(replace(window, model_error=pruned.window.model_error), pruned.poles, _LAST_STEPS)
     scores, information = fit.information()
     inverse = _pole_covariance(information)
     steps, noise_level = scores @ inverse, spectra.noise
@@ -177,7 +177,7 @@ def _fit_band(spectra: Spectra, band: _Band, start: Floats, n_lines: int, by_wid
             window=_pole_shift(narrow, fit.poles[m], own_variance) / np.sqrt(2.0),
             residues=fit.residues[m] * noise_level,
             residue_sd=_residue_sd(fit, m) * noise_level,
-            expected=_expected_noise_modes(gains[m], pruned.rest.shape[1], n_lines),
+            expected=_expected_noise_modes(gains[m], pruned.residual.shape[1], n_lines),
             seen=float(np.mean([_contains_pole(poles, fit.poles[m], window.spacing) for poles in by_width])),
         )
 
@@ -227,7 +227,7 @@ def _expected_noise_modes(gain: float, n_records: int, n_lines: int) -> float:
 
 def _correlation_factor(fit: WindowFit) -> float:
     """Factor of variances, 1 to 10, by which the residual of a fit is correlated from line to line."""
-    rest = fit.rest / np.sqrt(fit.variance)
+    rest = fit.residual / np.sqrt(fit.variance)
     total = float(np.sum(np.abs(rest) ** 2))
     factor = 1.0
     for k in range(1, 7):

@@ -30,7 +30,7 @@ _MATCH_REACH = 3.0
 class PickedModes:
     # in the order of frequency, without signs and labels, including peaks that are likely no mode
     peaks: tuple[PickedRow, ...]
-    answers: tuple[ModeMobility, ...]
+    mobilities: tuple[ModeMobility, ...]
     spectra: Spectra
     paths: tuple[StabilityPath, ...]  # of the search, for the diagram of stability
     lowest: float
@@ -42,12 +42,12 @@ class PickedModes:
         return tuple(peak for peak in self.peaks if peak.is_likely)
 
     @property
-    def likely_answers(self) -> tuple[ModeMobility, ...]:
-        return tuple(mobility for mobility, peak in zip(self.answers, self.peaks, strict=True) if peak.is_likely)
+    def likely_mobilities(self) -> tuple[ModeMobility, ...]:
+        return tuple(mobility for mobility, peak in zip(self.mobilities, self.peaks, strict=True) if peak.is_likely)
 
-    def sign(self, answer: ModeMobility, flips: bool | None) -> str:
+    def sign(self, mobility: ModeMobility, flips: bool | None) -> str:
         """Sign of a residue; empty without a force, else as of `ModeMobility.sign`."""
-        return "" if self.spectra.force is None else answer.sign(flips)
+        return "" if self.spectra.force is None else mobility.sign(flips)
 
 
 def pick_modes(spectra: Spectra, lowest: float = LOWEST, highest: float = HIGHEST) -> PickedModes:
@@ -61,7 +61,7 @@ def pick_modes(spectra: Spectra, lowest: float = LOWEST, highest: float = HIGHES
         place, wanted = f"{spectra.names[0]} between {lowest:g} and {highest:g} Hz", f"{_FEWEST_LINES} lines or more"
         raise InputError(Fault(place, wanted, str(n_lines), "--lowest and --highest look elsewhere"))
     sets = agreeing_records(spectra, lowest, highest)
-    searched = [_search_records(spectra.only(records), lowest, highest) for records in sets]
+    searched = [_search_records(spectra.of_records(records), lowest, highest) for records in sets]
     paths = tuple(path for _, set_paths in searched for path in set_paths)
     peaks, remarks = searched[0][0], tuple[str, ...]()
     if len(sets) > 1:
@@ -71,9 +71,9 @@ def pick_modes(spectra: Spectra, lowest: float = LOWEST, highest: float = HIGHES
         pairs = zip(judge_modes(spectra, averaged.modes), averaged.spurious, strict=True)
         peaks = [replace(peak, verdict=_raise_doubt(peak.verdict, spurious)) for peak, spurious in pairs]
     peaks = sorted(peaks, key=lambda peak: peak.mode.frequency)
-    strongest = max((peak.answer.strength for peak in peaks if peak.is_likely), default=1.0)
+    strongest = max((peak.mobility.strength for peak in peaks if peak.is_likely), default=1.0)
     rows = tuple(_picked_row(peak, strongest) for peak in peaks)
-    return PickedModes(rows, tuple(peak.answer for peak in peaks), spectra, paths, lowest, highest, remarks)
+    return PickedModes(rows, tuple(peak.mobility for peak in peaks), spectra, paths, lowest, highest, remarks)
 
 
 def parts_of_peaks(verdicts: Sequence[ModeVerdict]) -> dict[int, int]:
@@ -127,12 +127,12 @@ def _overlap(mode: Mode, other: Mode) -> bool:
 
 
 def _peak_without_parts(refitted: JudgedMode, fitted: JudgedMode, parts: Sequence[JudgedMode]) -> JudgedMode:
-    """A peak refitted without its parts; `other` becomes the mode or part of the first fit that lies nearest to it."""
+    """A peak refitted without its parts; `other_fit` becomes the nearest mode or part of the first fit."""
     if not parts:
         return refitted
     modes = (peak.mode for peak in (fitted, *parts))
     nearest = min(modes, key=lambda mode: abs(mode.frequency - refitted.mode.frequency))
-    return replace(refitted, other=nearest, doubt=max(part.verdict.spurious for part in parts))
+    return replace(refitted, other_fit=nearest, doubt=max(part.verdict.spurious for part in parts))
 
 
 def _raise_doubt(verdict: ModeVerdict, spurious: float) -> ModeVerdict:
@@ -156,9 +156,9 @@ def _picked_row(peak: JudgedMode, strongest: float) -> PickedRow:
         damping_percent=100.0 * decay / frequency,
         damping_sd_percent=100.0 * decay_sd / frequency,
         sign="",
-        amplitude=peak.answer.strength / strongest,
+        amplitude=peak.mobility.strength / strongest,
         spurious_probability=peak.verdict.spurious,
         kind=peak.verdict.kind,
         seen=mode.seen,
-        alike=peak.answer.alike,
+        alike=peak.mobility.alike,
     )

@@ -55,24 +55,24 @@ class ModeVerdict(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class JudgedMode:
-    """A mode as last fitted, with its verdict; `other` is the fit in which a part of its peak was another mode."""
+    """A mode as last fitted, with its verdict; `other_fit` is the fit in which a part of its peak was another mode."""
 
     mode: Mode
-    answer: ModeMobility
+    mobility: ModeMobility
     verdict: ModeVerdict
-    other: Mode
+    other_fit: Mode
     doubt: float = 1.0
     """Probability that the part is no mode."""
 
     @property
     def pole(self) -> Floats:
         """Frequency and decay rate averaged over both fits: (2,) array, Hz."""
-        return self.doubt * self.mode.pole + (1.0 - self.doubt) * self.other.pole
+        return self.doubt * self.mode.pole + (1.0 - self.doubt) * self.other_fit.pole
 
     @property
     def split(self) -> Floats:
         """Standard deviations of frequency and decay rate between both fits: (2,) array, Hz."""
-        return np.abs(self.mode.pole - self.other.pole) * np.sqrt(self.doubt * (1.0 - self.doubt))
+        return np.abs(self.mode.pole - self.other_fit.pole) * np.sqrt(self.doubt * (1.0 - self.doubt))
 
     @property
     def is_likely(self) -> bool:
@@ -86,11 +86,11 @@ def judge_modes(spectra: Spectra, modes: Sequence[Mode]) -> list[JudgedMode]:
     return [JudgedMode(mode, mobility, verdict, mode) for mode, mobility, verdict in judgements]
 
 
-def mode_verdicts(spectra: Spectra, modes: Sequence[Mode], answered: Sequence[ModeMobility]) -> list[ModeVerdict]:
+def mode_verdicts(spectra: Spectra, modes: Sequence[Mode], mobilities: Sequence[ModeMobility]) -> list[ModeVerdict]:
     """A verdict for each mode; the probabilities of different reasons are taken as independent."""
     if not modes:
         return []
-    comparison = _ModeComparison(spectra, modes, answered)
+    comparison = _ModeComparison(spectra, modes, mobilities)
     return [comparison.verdict(m) for m in range(len(modes))]
 
 
@@ -103,7 +103,7 @@ class _ModeComparison:
 
     def __init__(self, spectra: Spectra, modes: Sequence[Mode], mobilities: Sequence[ModeMobility]) -> None:
         self.modes, self.mobilities = modes, mobilities
-        self.n_places, self.n_records = len(spectra.between), spectra.places.size
+        self.n_places, self.n_records = len(spectra.place_pairs), spectra.places.size
         self.has_force = spectra.force is not None
         hertz = np.array([mode.frequency for mode in modes])
         self.strengths = np.array([mobility.strength for mobility in mobilities])

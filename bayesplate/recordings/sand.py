@@ -38,27 +38,29 @@ def read_picture(path: str | os.PathLike[str]) -> Floats:
     from PIL import Image, UnidentifiedImageError
 
     path = Path(path)
-    shown, wanted = path.name, "a PNG or JPEG picture"
+    file_name, wanted = path.name, "a PNG or JPEG picture"
     if path.suffix.lower() not in (".png", ".jpg", ".jpeg"):
-        raise InputError(Fault(shown, wanted, f'"{path.suffix}"', "crop it to the board and save it as PNG"))
+        raise InputError(Fault(file_name, wanted, f'"{path.suffix}"', "crop it to the board and save it as PNG"))
     try:
         if path.stat().st_size > LARGEST_PICTURE:
             got = f"{path.stat().st_size / 1e6:,.0f} MB"
-            raise InputError(Fault(shown, f"at most {LARGEST_PICTURE / 1e6:,.0f} MB", got, "save it smaller"))
+            raise InputError(Fault(file_name, f"at most {LARGEST_PICTURE / 1e6:,.0f} MB", got, "save it smaller"))
         with Image.open(path) as picture:
             if picture.width * picture.height > MOST_PIXELS:
-                raise InputError(Fault(shown, f"at most {MOST_PIXELS:,} pixels", f"{picture.width} x {picture.height}"))
+                raise InputError(
+                    Fault(file_name, f"at most {MOST_PIXELS:,} pixels", f"{picture.width} x {picture.height}")
+                )
             picture.draft("L", (4 * GRID[0], 4 * GRID[0]))
             grey = picture.convert("L")
             grey.thumbnail((8 * GRID[0], 8 * GRID[0]))
             values = np.asarray(grey, dtype=float) / 255.0
     except FileNotFoundError:
-        raise InputError(Fault(shown, "a picture", "no such file")) from None
+        raise InputError(Fault(file_name, "a picture", "no such file")) from None
     except (UnidentifiedImageError, OSError, Image.DecompressionBombError) as error:
-        raise InputError(Fault(shown, wanted, str(error)[:100])) from None
+        raise InputError(Fault(file_name, wanted, str(error)[:100])) from None
     if min(values.shape) < 24 or np.ptp(values) < 0.02:
         got = f"{values.shape[1]} x {values.shape[0]} of one shade"
-        raise InputError(Fault(shown, "a picture with lines on it", got))
+        raise InputError(Fault(file_name, "a picture with lines on it", got))
     return values
 
 

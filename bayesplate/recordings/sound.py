@@ -21,23 +21,23 @@ _BITS = {"PCM_S8": 8, "PCM_U8": 8, "PCM_16": 16, "PCM_24": 24, "PCM_32": 32}
 """Bits of a sample, by the library's name of its kind; other kinds are numbers without a largest value."""
 
 
-def read_sound(path: Path, shown: str, rate: float | None, channels: str, motion: Motion) -> list[Signal]:
+def read_sound(path: Path, file_name: str, rate: float | None, channels: str, motion: Motion) -> list[Signal]:
     """The recordings of a sound file; parameters as of `read_recordings`."""
     import soundfile
 
-    content, remarks = _mend_header(path.read_bytes(), shown)
+    content, remarks = _mend_header(path.read_bytes(), file_name)
     try:
         with soundfile.SoundFile(io.BytesIO(content)) as file:
             own_rate, bits = float(file.samplerate), _BITS.get(file.subtype)
             columns = file.read(dtype="float64", always_2d=True)
     except (RuntimeError, ValueError, TypeError, OSError, MemoryError) as error:
         got, remedy = str(error).rpartition(": ")[2][:120], "save it as WAV, PCM or floating point"
-        raise InputError(Fault(shown, f"a {path.suffix[1:].upper()} file", got, remedy)) from None
+        raise InputError(Fault(file_name, f"a {path.suffix[1:].upper()} file", got, remedy)) from None
     if rate is not None and abs(rate - own_rate) > _RATE_OFF * rate:
         wanted, remedy = f"{rate:g} Hz, as --rate says", "leave --rate out: the file knows"
-        raise InputError(Fault(f"{shown} rate", wanted, f"{own_rate:g} Hz", remedy))
+        raise InputError(Fault(f"{file_name} rate", wanted, f"{own_rate:g} Hz", remedy))
     full_scale = np.inf if bits is None else 1.0 - 2.0 ** (1 - bits)
-    recording = Recording(shown, own_rate, columns[:, 0], None, motion, full_scale, remarks=remarks)
+    recording = Recording(file_name, own_rate, columns[:, 0], None, motion, full_scale, remarks=remarks)
     return [*_split_channels(columns, recording, channels)]
 
 

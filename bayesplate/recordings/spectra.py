@@ -32,7 +32,7 @@ class Spectra:
     names: tuple[str, ...]
     files: RecordIndices  # (n_records,): number of the file of each record
     places: RecordIndices  # (n_records,): number of the pair of places of each record
-    between: tuple[PlacePair, ...]  # the pairs of places
+    place_pairs: tuple[PlacePair, ...]  # the pairs of places
     motion: Motion
     duration: float  # s, of each decay
 
@@ -48,7 +48,7 @@ class Spectra:
         top = np.abs(self.values).max(axis=0)
         return np.asarray(np.maximum(level, 1e-9 * top + 1e-300))
 
-    def only(self, records: RecordIndices) -> Spectra:
+    def of_records(self, records: RecordIndices) -> Spectra:
         kept_places = np.unique(self.places[records])
         return replace(
             self,
@@ -57,16 +57,18 @@ class Spectra:
             names=tuple(self.names[r] for r in records),
             files=self.files[records],
             places=np.searchsorted(kept_places, self.places[records]),
-            between=tuple(self.between[k] for k in kept_places),
+            place_pairs=tuple(self.place_pairs[k] for k in kept_places),
         )
 
 
-def decay_spectra(heard: Sequence[tuple[Recording, Sequence[Hit]]], highest: float) -> Spectra:
+def decay_spectra(hits_by_recording: Sequence[tuple[Recording, Sequence[Hit]]], highest: float) -> Spectra:
     """Spectra of the decays after all hits of recordings of one rate, cut to one length, for modes up to some Hz."""
     from scipy.fft import prev_fast_len, rfft
 
-    first = heard[0][0]
-    numbered_hits = [(recording, number, hit) for recording, hits in heard for number, hit in enumerate(hits, start=1)]
+    first = hits_by_recording[0][0]
+    numbered_hits = [
+        (recording, number, hit) for recording, hits in hits_by_recording for number, hit in enumerate(hits, start=1)
+    ]
     shortest = min(hit.stop - hit.start for _, _, hit in numbered_hits)
     n_samples = prev_fast_len(min(shortest, round(LONGEST_DURATION * first.rate)), real=True)
     n_lines = min(int(_BAND_MARGIN * highest * n_samples / first.rate) + 1, n_samples // 2)
@@ -86,9 +88,9 @@ def decay_spectra(heard: Sequence[tuple[Recording, Sequence[Hit]]], highest: flo
         values=np.stack(columns, axis=1),
         force=np.stack(forces, axis=1) if forces else None,
         names=tuple(f"{recording.name} hit {number}" for recording, number, _ in numbered_hits),
-        files=np.repeat(np.arange(len(heard)), [len(hits) for _, hits in heard]),
+        files=np.repeat(np.arange(len(hits_by_recording)), [len(hits) for _, hits in hits_by_recording]),
         places=places,
-        between=between,
+        place_pairs=between,
         motion=first.motion,
         duration=n_samples / first.rate,
     )
@@ -109,7 +111,7 @@ def response_spectra(responses: Sequence[FrequencyResponse], highest: float, pad
         names=tuple(response.name for response in responses),
         files=np.arange(len(responses)),
         places=places,
-        between=between,
+        place_pairs=between,
         motion=first.motion,
         duration=1.0 / (padding * spacing),
     )

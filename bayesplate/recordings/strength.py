@@ -71,7 +71,7 @@ def mode_mobilities(spectra: Spectra, modes: Sequence[Mode]) -> list[ModeMobilit
 def _mode_mobility(spectra: Spectra, mode: Mode, force: Complex) -> ModeMobility:
     factor, power = _MOBILITY_FACTORS[spectra.motion]
     turned = factor * mode.frequency**power * mode.residues
-    n_places = len(spectra.between)
+    n_places = len(spectra.place_pairs)
     mobility, sd = np.zeros(n_places, dtype=complex), np.zeros(n_places)
     common = total = 0.0
     n_free = 0
@@ -100,7 +100,7 @@ def _forces_at_modes(spectra: Spectra, modes: Sequence[Mode]) -> list[Complex]:
     ] or modes  # steady tones do not start with the hit
     hertz = np.array([mode.frequency for mode in ringing])
     residues = np.array([mode.residues for mode in ringing]).reshape(len(ringing), -1)
-    for place in range(len(spectra.between)):
+    for place in range(len(spectra.place_pairs)):
         same_places = np.flatnonzero(spectra.places == place)
         if same_places.size > 1:
             delays[same_places], gains[same_places] = _hit_delays(hertz, residues[:, same_places])

@@ -39,25 +39,25 @@ _SPACING_TOLERANCE = 2e-2
 """Share of the mean spacing by which the spacing of lines may vary."""
 
 
-def read_csv(path: Path, shown: str, rate: float | None, channels: str, motion: Motion) -> list[Signal]:
+def read_csv(path: Path, file_name: str, rate: float | None, channels: str, motion: Motion) -> list[Signal]:
     """The recording of a CSV file; parameters as of `read_recordings`."""
-    names, line = _read_header(path, shown)
-    columns = _read_columns(path, shown, names, line)
+    names, line = _read_header(path, file_name)
+    columns = _read_columns(path, file_name, names, line)
     if "f_hz" in columns:
-        return [_frequency_response(columns, shown, motion)]
+        return [_frequency_response(columns, file_name, motion)]
     faults = []
     responses = [name for name in ("response", *MOTIONS) if name in columns]
     if not responses:
-        faults.append(Fault(f"{shown} line {line}", WANTED_COLUMNS, ", ".join(names) or "nothing"))
+        faults.append(Fault(f"{file_name} line {line}", WANTED_COLUMNS, ", ".join(names) or "nothing"))
     if len(responses) > 1:
-        faults.append(Fault(f"{shown} line {line}", "one response", "several", "one file for each sensor"))
+        faults.append(Fault(f"{file_name} line {line}", "one response", "several", "one file for each sensor"))
     if "time" not in columns and rate is None:
-        faults.append(Fault(f"{shown} rate", "a column time, or --rate", "neither", "--rate 48000"))
+        faults.append(Fault(f"{file_name} rate", "a column time, or --rate", "neither", "--rate 48000"))
     if faults:
         raise InputError(faults)
-    own_rate = sampling_rate(columns["time"], shown, rate) if "time" in columns else rate or 1.0
+    own_rate = sampling_rate(columns["time"], file_name, rate) if "time" in columns else rate or 1.0
     column_motion = next((name for name in MOTIONS if name in columns), motion)
-    return [Recording(shown, own_rate, columns[responses[0]], columns.get("force"), column_motion)]
+    return [Recording(file_name, own_rate, columns[responses[0]], columns.get("force"), column_motion)]
 
 
 def _read_header(path: Path, file_name: str) -> tuple[list[str], int]:
@@ -131,11 +131,11 @@ def _frequency_response(columns: dict[str, Floats], file_name: str, motion: Moti
     return FrequencyResponse(file_name, columns["f_hz"], values, motion)
 
 
-def sampling_rate(times: Floats, shown: str, rate: float | None = None) -> float:
+def sampling_rate(times: Floats, file_name: str, rate: float | None = None) -> float:
     """Samples a second of evenly spaced times in s, rounded to seven digits; a given `rate` must agree with them."""
     steps = np.diff(np.where(np.abs(times) < _LARGEST_VALUE, times, np.nan))
     if times.size < 2 or not (steps >= 0.0).all() or times[-1] <= times[0]:
-        raise InputError(Fault(f"{shown} time", "times in s that rise", "times that do not"))
+        raise InputError(Fault(f"{file_name} time", "times in s that rise", "times that do not"))
     step = float((times[-1] - times[0]) / (times.size - 1))
     rounding = float(steps[steps > 0.0].min()) if (steps == 0.0).any() else 0.0
     deviation = np.abs(times - times[0] - step * np.arange(times.size)).max()
@@ -145,11 +145,11 @@ def sampling_rate(times: Floats, shown: str, rate: float | None = None) -> float
         or steps.max() > max(_GAP * step, 1.01 * rounding)
         or rounding > _COARSEST_ROUNDING * step
     ):
-        raise InputError(Fault(f"{shown} time", "evenly spaced samples", "uneven ones", "record without gaps"))
+        raise InputError(Fault(f"{file_name} time", "evenly spaced samples", "uneven ones", "record without gaps"))
     own_rate = 1.0 / step
     if rate is not None and abs(rate / own_rate - 1.0) > _JITTER:
         raise InputError(
-            Fault(f"{shown} rate", f"{rate:g} Hz, as --rate says", f"{own_rate:.6g} Hz", "leave --rate out")
+            Fault(f"{file_name} rate", f"{rate:g} Hz, as --rate says", f"{own_rate:.6g} Hz", "leave --rate out")
         )
     return rate or float(f"{own_rate:.7g}")
 

@@ -30,28 +30,28 @@ _AXES = {
 """By kind of function: factors from the units of the abscissa to s or Hz, and the kind of data of the abscissa."""
 
 
-def read_uff(path: Path, shown: str, rate: float | None, channels: str, motion: Motion) -> list[Signal]:
+def read_uff(path: Path, file_name: str, rate: float | None, channels: str, motion: Motion) -> list[Signal]:
     """Time and frequency responses among the data sets 58 and 58b of a UFF file; parameters as of `read_recordings`."""
     try:
         import pyuff
     except ImportError:
         remedy = 'pip install "bayesplate[recordings]", or WAV'
-        raise InputError(Fault(shown, "pyuff installed, which reads UFF", "none", remedy)) from None
+        raise InputError(Fault(file_name, "pyuff installed, which reads UFF", "none", remedy)) from None
     sets = []
     try:
         file = pyuff.UFF(str(path))
         kinds = [int(kind) for kind in file.get_set_types()]
         # one by one: the library reads no file that holds a set unknown to it
         sets = [file.read_sets(number) for number, kind in enumerate(kinds) if kind == 58]
-        signals = [*_read_sets(sets, shown, motion)]
+        signals = [*_read_sets(sets, file_name, motion)]
     except InputError:
         raise
     except Exception as error:  # the library stumbles over broken files in many ways
         wanted = "whole data sets 58" if sets else "a UFF file"
-        raise InputError(Fault(shown, wanted, f"a broken one ({type(error).__name__})")) from None
+        raise InputError(Fault(file_name, wanted, f"a broken one ({type(error).__name__})")) from None
     if not signals:
         got = f"{len(kinds)} others" if kinds else "no set that is whole (was it cut off?)"
-        raise InputError(Fault(shown, "data sets 58 or 58b with a time or a frequency response", got))
+        raise InputError(Fault(file_name, "data sets 58 or 58b with a time or a frequency response", got))
     return signals
 
 

@@ -144,7 +144,9 @@ def _percentiles_picture(percentile: PercentileEstimate, n_modes: int, moduli: M
         draw_heading(panel, modulus_title(name))
         panel.set(ylabel="modes used")
     draw_legend(figure, 2)
-    kept_counts = ", ".join(f"{int(n)} of {name}" for n, name in zip(percentile.kept.sum(axis=0), MODULI, strict=True))
+    kept_counts = ", ".join(
+        f"{int(n)} of {name}" for n, name in zip(percentile.is_kept.sum(axis=0), MODULI, strict=True)
+    )
     alt = (
         f"{percentile.n_subsets} least-squares estimates of each constant, one per subset of the modes, of which the "
         f"trimming keeps {kept_counts}; their mean and spread as a band, and the posterior below."
@@ -162,7 +164,7 @@ def _draw_estimates(panel: Axes, name: str, percentile: PercentileEstimate, n_mo
     i = MODULI.index(name)
     sizes = np.concatenate([np.full(comb(n_modes, size), size) for size in range(3, n_modes + 1)])
     draws = np.asarray(moduli).ravel() * GPA
-    estimates, is_kept = percentile.estimates[:, i] * GPA, percentile.kept[:, i]
+    estimates, is_kept = percentile.estimates[:, i] * GPA, percentile.is_kept[:, i]
     mean, sd = percentile.mean[name] * GPA, percentile.sd[name] * GPA
     band = [mean - sd, mean + sd]
     low, high = ends = axis_range(draws, [*estimates[is_kept], mean - 2 * sd, mean + 2 * sd], reach=np.inf)

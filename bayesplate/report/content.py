@@ -108,7 +108,7 @@ def _effect_cells(effect: str, owner: str, parameter: str, shape: Parameter | No
     name = effect_name(effect)
     if shape is None:
         return f"{name}, {owner}", parameter
-    return f"{name}, {owner}: {shape.look}", shape.words.removesuffix(f" of {name}")
+    return f"{name}, {owner}: {shape.description}", shape.display_name.removesuffix(f" of {name}")
 
 
 def _spread_cells(entry: Spread) -> tuple[Cell, Cell]:
@@ -117,10 +117,10 @@ def _spread_cells(entry: Spread) -> tuple[Cell, Cell]:
     return plus_minus(entry, factor), unit or None
 
 
-def effect_sentences(summary: Summary, told: Sequence[str] = ()) -> list[str]:
-    """A sentence on each effect of the model, except those in `told`, which the page has already."""
+def effect_sentences(summary: Summary, given_sentences: Sequence[str] = ()) -> list[str]:
+    """A sentence on each effect of the model, except those in `given_sentences`, which the page has already."""
     effects = ((effect_name(name), EFFECTS[name].sentence) for name in summary.model.effects)
-    return [f"{name}: {sentence}" for name, sentence in effects if sentence not in told]
+    return [f"{name}: {sentence}" for name, sentence in effects if sentence not in given_sentences]
 
 
 def budget_table(inference: Inference, draws: Draws, summary: Summary) -> Table:

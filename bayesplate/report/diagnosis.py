@@ -69,7 +69,9 @@ def before_after_picture(diagnosis: Diagnosis) -> Picture | None:
         return None
     before, after = diagnosis.before, diagnosis.after
     merits = [
-        merit for merit in MERITS if merit.is_rms and (merit.of(before) is not None or merit.of(after) is not None)
+        merit
+        for merit in MERITS
+        if merit.is_rms and (merit.value_of(before) is not None or merit.value_of(after) is not None)
     ]
     shifts = {name: shift.shift_in_sd for name, shift in diagnosis.elastic_shift.items()}
     heights = [_ROW_HEIGHT * len(merits) + 0.1, 0.25 * len(shifts) + 0.1]
@@ -78,7 +80,7 @@ def before_after_picture(diagnosis: Diagnosis) -> Picture | None:
     before_style: Any = {"color": GREY, "hatch": "///", "edgecolor": "white", "label": "before"}
     after_style: Any = {"color": BLUE, "label": "after"}
     for offset, errors, style in ((-0.18, before, before_style), (0.18, after, after_style)):
-        values = np.array([merit.of(errors) for merit in merits], dtype=float)
+        values = np.array([merit.value_of(errors) for merit in merits], dtype=float)
         panels[0].barh(rows + offset, values, height=0.32, lw=0, **style)
     name_rows(panels[0], [merit.words for merit in merits])
     draw_heading(panels[0], "Error of the frequencies")
@@ -93,7 +95,7 @@ def before_after_picture(diagnosis: Diagnosis) -> Picture | None:
     panels[1].set(xlim=(-reach, reach), xlabel="standard deviations")
     draw_legend(figure, 2)
     details = "; ".join(
-        f"{merit.words}: {_cents_text(merit.of(before))} before, {_cents_text(merit.of(after))} after"
+        f"{merit.words}: {_cents_text(merit.value_of(before))} before, {_cents_text(merit.value_of(after))} after"
         for merit in merits
     )
     shift_texts = "; ".join(f"{name} by {value:+.1f} sd" for name, value in shifts.items())
@@ -119,9 +121,9 @@ class _NullStatistic:
     sets: Histogram
     board: float
     limit: float
-    words: str
+    title: str
     axis: str
-    shown: Callable[[float], str] = "{:.3g}".format
+    format_value: Callable[[float], str] = "{:.3g}".format
 
 
 def null_picture(diagnosis: Diagnosis) -> Picture | None:
@@ -146,7 +148,8 @@ def null_picture(diagnosis: Diagnosis) -> Picture | None:
             "chance."
         )
     alt = "; ".join(
-        f"{statistic.axis}: this board {statistic.shown(statistic.board)}, limit {statistic.shown(statistic.limit)}"
+        f"{statistic.axis}: this board {statistic.format_value(statistic.board)}, "
+        f"limit {statistic.format_value(statistic.limit)}"
         for statistic in statistics
     )
     return Picture("null-control", "This board among boards that lack nothing", alt, caption, figure)
@@ -190,7 +193,7 @@ def _draw_null_histogram(panel: Axes, statistic: _NullStatistic) -> None:
     panel.stairs(counts, edges, color=DARK, lw=0.6)
     panel.axvline(statistic.board, color=BLUE, lw=2.0, label="this board")
     panel.axvline(statistic.limit, color=VERMILLION, lw=1.2, ls="--")
-    panel.set_title(f"dashed: {statistic.words}", loc="right", fontsize=SMALL_SIZE, color=VERMILLION)
+    panel.set_title(f"dashed: {statistic.title}", loc="right", fontsize=SMALL_SIZE, color=VERMILLION)
     panel.set(xlabel=statistic.axis, ylabel="boards", ylim=(0.0, 1.25 * max(counts)))
 
 

@@ -67,7 +67,7 @@ def grading_pictures(graded: Grading) -> dict[str, list[Picture]]:
     return {
         "constants": [sorted_picture(graded)],
         "makers": [speed_picture(graded)],
-        "limits": [] if graded.meets_all is None or not len(graded.trusted) else [limits_picture(graded)],
+        "limits": [] if graded.all_limits_probability is None or not len(graded.trusted) else [limits_picture(graded)],
         "pairs": [pairs_picture(graded)] if graded.pairs else [],
     }
 
@@ -160,10 +160,10 @@ def _name_points(panel: Axes, x: Floats, y: Floats, names: Sequence[str]) -> Non
 
 def limits_picture(graded: Grading) -> Picture:
     """Probability that each board meets all limits, the most probable first, without boards in doubt."""
-    assert graded.meets_all is not None
+    assert graded.all_limits_probability is not None
     order = rank_boards(graded)[: len(graded.trusted)]
     is_named = len(order) <= MOST_NAMED_ROWS
-    values = 100.0 * graded.meets_all[order]
+    values = 100.0 * graded.all_limits_probability[order]
     left = _name_margin(_drawn_name(graded, i) for i in order) if is_named else _LEFT_OF_CROWD
     figure, (panel,) = stacked_panels([_ROW * len(order) + 0.1 if is_named else _CROWD_HEIGHT], left=left, bottom=0.5)
     if is_named:
@@ -176,7 +176,7 @@ def limits_picture(graded: Grading) -> Picture:
         panel.grid(axis="x", color="0.9", lw=0.6)
     panel.set(xlim=(0, 100), xlabel="probability that the board meets all limits, %")
     panel.axvline(90, color=DARK, lw=0.8, ls="--")
-    n_sure = int((graded.meets_all[order] >= 0.9).sum())
+    n_sure = int((graded.all_limits_probability[order] >= 0.9).sum())
     alt = f"{n_sure} of {len(order)} boards meet all limits with 90 % or more."
     caption = f"{alt}{' Green: 90 % and more; blue: 10 to 90 %; red: less than 10 %.' if is_named else ''}"
     return Picture("limits", "Which boards meet the specification", alt, caption, figure)
@@ -285,8 +285,8 @@ def write_grading_page(folder: Path, graded: Grading, summary: BatchSummary, *, 
 
 def grading_sentences(graded: Grading, summary: BatchSummary) -> tuple[str, ...]:
     sentences = [f"{summary.n_fitted} of {summary.n_boards} boards were fitted."]
-    if graded.meets_all is not None and graded.names:
-        meets = graded.meets_all[graded.trusted]
+    if graded.all_limits_probability is not None and graded.names:
+        meets = graded.all_limits_probability[graded.trusted]
         limits = ", ".join(limit_text(name, limit) for name, limit in graded.request.limits.items())
         n_sure, n_maybe = int((meets >= 0.9).sum()), int((meets >= 0.5).sum())
         sentences.append(

@@ -187,19 +187,19 @@ _SHARE_STYLES_OF_ISOTROPIC = {"E_x": (BLUE, "", "bending along x"), "E_y": (ORAN
 _SHARE_ROW = 0.27
 
 
-def shares_picture(summary: Summary | CheckReport, found: Identifiability) -> Picture:
-    """Energy shares and leverage of each mode; `found` is the identifiability of the modes of the summary."""
+def shares_picture(summary: Summary | CheckReport, identifiability: Identifiability) -> Picture:
+    """Energy shares and leverage of each mode; the identifiability is that of the modes of the summary."""
     modes: Sequence[ModeRow | CheckedMode] = summary.modes
     several = len({mode.setup for mode in modes}) > 1
     names = [mode_name(mode.label, shorten(mode.setup, 14), several=several) for mode in modes]
     left = 0.62 if not several else min(1.6, 0.3 + 0.075 * max(len(name) for name in names))
-    shares = np.column_stack([found.shares, 1.0 - found.shares.sum(axis=1)])
+    shares = np.column_stack([identifiability.shares, 1.0 - identifiability.shares.sum(axis=1)])
     if np.abs(shares[:, 3]).max() < 0.005:
         shares = shares[:, :3]
     figure, panel = panel_with_rows(names, row=_SHARE_ROW, size=TEXT_SIZE, left=left, right=0.75, top=0.28, bottom=0.98)
     rows = np.arange(len(modes))
     start = np.zeros(len(modes))
-    styles = _SHARE_STYLES | (_SHARE_STYLES_OF_ISOTROPIC if found.symmetry.is_isotropic else {})
+    styles = _SHARE_STYLES | (_SHARE_STYLES_OF_ISOTROPIC if identifiability.symmetry.is_isotropic else {})
     for share, (colour, hatch, label) in zip(shares.T, styles.values(), strict=False):
         widths = np.maximum(share, 0.0)
         panel.barh(
@@ -211,7 +211,7 @@ def shares_picture(summary: Summary | CheckReport, found: Identifiability) -> Pi
         panel.text(102, row, words, fontsize=SMALL_SIZE, va="center", color=DARK, clip_on=False)
     panel.set(xlim=(0, 100), xlabel="energy of the mode, %")
     draw_legend(figure, 2)
-    return Picture("shares", "What each mode tells", _shares_alt_text(names, found), _SHARES_CAPTION, figure)
+    return Picture("shares", "What each mode tells", _shares_alt_text(names, identifiability), _SHARES_CAPTION, figure)
 
 
 _SHARES_CAPTION = (

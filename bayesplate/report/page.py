@@ -49,7 +49,7 @@ _PIXELS_AN_INCH = 96
 class PagePicture(NamedTuple):
     """A picture on a page: its words, its size in pixels, and its SVG content as a data address."""
 
-    words: Picture
+    picture: Picture
     size: tuple[int, ...]
     source: str
 
@@ -137,7 +137,7 @@ def fit_page(
     inference: Inference,
     draws: Draws,
     summary: Summary,
-    shown: Mapping[str, Sequence[PagePicture]],
+    pictures: Mapping[str, Sequence[PagePicture]],
     diagnosis: Diagnosis | None = None,
 ) -> str:
     problem = inference.problem
@@ -151,7 +151,7 @@ def fit_page(
         weak=summary.identifiability,
         effects=content.effect_sentences(summary, () if diagnosis is None else diagnosis.sentences),
         diagnosis=None if diagnosis is None else diagnosis_section(diagnosis),
-        pictures=dict.fromkeys(PICTURE_PLACES, ()) | dict(shown),
+        pictures=dict.fromkeys(PICTURE_PLACES, ()) | dict(pictures),
         tables={
             "constants": quoted_constants(summary, diagnosis),
             "effects": content.effects_table(board, summary),

@@ -59,7 +59,7 @@ class SampledQuantity:
     prior: Quantity
 
     @property
-    def told(self) -> str:
+    def change_text(self) -> str:
         """How the posterior differs from the prior: narrower or moved; by logarithms for a positive quantity."""
         is_log = self.prior.kind != "normal"
         draws = np.log(self.draws) if is_log else self.draws
@@ -94,7 +94,7 @@ def input_words(parameter: Parameter, board: Board) -> tuple[str, float, str]:
     """Name of a parameter in words, the factor from SI, and its display unit."""
     factor, unit = (100.0, "%") if parameter.key == DISCREPANCY else display_unit(parameter.unit)
     owner = f" ({parameter.owner.name})" if parameter.owner.name and len(board.setups) > 1 else ""
-    return f"{parameter.words or parameter.key}{owner}", factor, unit
+    return f"{parameter.display_name or parameter.key}{owner}", factor, unit
 
 
 def priors_picture(problem: PosedProblem, draws: Draws) -> Picture:
@@ -110,7 +110,7 @@ def priors_picture(problem: PosedProblem, draws: Draws) -> Picture:
         left, bottom = _LEFT + column * (_PANEL[0] + _GAP), height - _TOP - row * _ROW - _PANEL[1]
         _draw_densities(place_panel(figure, left, bottom, *_PANEL), quantity)
     draw_legend(figure, 2)
-    details = "; ".join(f"{quantity.name}: {quantity.told}" for quantity in quantities)
+    details = "; ".join(f"{quantity.name}: {quantity.change_text}" for quantity in quantities)
     omission = (
         f" {len(all_quantities) - len(quantities)} more are not drawn." if len(all_quantities) > len(quantities) else ""
     )
@@ -136,7 +136,7 @@ def _draw_densities(panel: Axes, quantity: SampledQuantity) -> None:
     name = mathtext(quantity.name) if is_constant else shorten(quantity.name, _LONGEST - len(quantity.unit))
     title = f"{name}, {quantity.unit}" if quantity.unit else name
     panel.set_title(title, fontsize=SMALL_SIZE, loc="left", weight="bold", pad=12, parse_math=is_constant)
-    panel.text(0.0, 1.04, quantity.told, transform=panel.transAxes, va="bottom", fontsize=SMALL_SIZE - 0.5)
+    panel.text(0.0, 1.04, quantity.change_text, transform=panel.transAxes, va="bottom", fontsize=SMALL_SIZE - 0.5)
 
 
 _COLOURS = (BLUE, ORANGE, GREEN, VERMILLION)

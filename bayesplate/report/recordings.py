@@ -68,7 +68,7 @@ def averaged_responses(spectra: Spectra) -> tuple[AveragedResponse, ...]:
     of the response averages out of it. The coherence is the share of the response's power that the force explains.
     """
     responses = []
-    for place in range(len(spectra.between)):
+    for place in range(len(spectra.place_pairs)):
         of_place = spectra.places == place
         y, coherence = spectra.values[:, of_place], None
         if spectra.force is None:

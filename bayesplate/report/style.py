@@ -180,11 +180,11 @@ def draw_upright_names(panel: Axes, hertz: Sequence[float], names: Sequence[str]
         panel.text(place, end, names[i], rotation=90, ha="center", va=side, fontsize=SMALL_SIZE - 1.5, **in_axes)
 
 
-def separate_places(wanted: Floats, least: float) -> Floats:
-    """Places from 0 to 1, at least `least` apart, near the `wanted` ones, which are in rising order."""
-    places = wanted.copy()
+def separate_places(desired_places: Floats, distance: float) -> Floats:
+    """Places from 0 to 1, at least `distance` apart, near the desired places, which are in rising order."""
+    places = desired_places.copy()
     for _ in range(2000):
-        overlap = np.maximum(least - np.diff(places), 0.0)
+        overlap = np.maximum(distance - np.diff(places), 0.0)
         if overlap.max(initial=0.0) < 1e-4:
             break
         places[:-1] -= 0.5 * overlap

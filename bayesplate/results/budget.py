@@ -49,7 +49,7 @@ def budget(draws: Draws, board: Board) -> dict[str, dict[str, float]]:
     components of an effect, or the discrepancies of all modes. The share of a group is the sum of its shares.
     """
     rows = {
-        parameter.name: (parameter.effect or parameter.words) if parameter.is_component else parameter.name
+        parameter.name: (parameter.effect or parameter.display_name) if parameter.is_component else parameter.name
         for parameter in board.uncertain
     }
     result = {}
@@ -64,7 +64,9 @@ def budget(draws: Draws, board: Board) -> dict[str, dict[str, float]]:
 
 def row_words(row: str, board: Board) -> str:
     """A row of the budget in words."""
-    return next((parameter.words for parameter in board.uncertain if parameter.name == row), row.replace("_", " "))
+    return next(
+        (parameter.display_name for parameter in board.uncertain if parameter.name == row), row.replace("_", " ")
+    )
 
 
 def prior_remarks(draws: Draws, prior: PriorCard) -> list[str]:

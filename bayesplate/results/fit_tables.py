@@ -90,11 +90,11 @@ def write_constants(folder: Path, summary: Summary, title: str) -> tuple[Path, .
     return write_tables(folder, CONSTANTS_FILES, exported_constants(summary), compared_constants(summary, heading))
 
 
-def write_tables(folder: Path, names: tuple[str, str], numbers: Table, told: Table) -> tuple[Path, ...]:
+def write_tables(folder: Path, names: tuple[str, str], number_table: Table, printed_table: Table) -> tuple[Path, ...]:
     """Write a table for programs as CSV and one for people as LaTeX, under these names."""
     paths = tuple(folder / name for name in names)
-    write_text(paths[0], render(numbers, "csv"))
-    write_text(paths[1], render(told, "latex"))
+    write_text(paths[0], render(number_table, "csv"))
+    write_text(paths[1], render(printed_table, "latex"))
     return paths
 
 

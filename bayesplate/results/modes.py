@@ -182,7 +182,7 @@ def assigned_peaks(problem: PosedProblem, draws: Draws) -> tuple[tuple[AssignedP
     for i, (setup, likelihood) in enumerate(zip(problem.board.setups, problem.posterior.peaks, strict=True)):
         if likelihood is None:
             continue
-        log_frequency = draws.every_log_frequency[i]
+        log_frequency = draws.mode_log_frequencies[i]
         flat, noise = log_frequency.reshape(-1, log_frequency.shape[-1]), draws.noise[..., i].ravel()
         predicted = [Prediction.of(np.exp(column)) for column in flat[:, likelihood.columns].T]
         step = max(1, len(flat) // MOST_DRAWS_OF_LABELS)

@@ -99,13 +99,13 @@ class ModesReport:
         return f"<ModesReport of {self.name}: {sheets}>"
 
 
-def proposed_labels(board: Board, ways: Sequence[tuple[Labelling, float]]) -> tuple[ProposedLabel, ...]:
+def proposed_labels(board: Board, labellings: Sequence[tuple[Labelling, float]]) -> tuple[ProposedLabel, ...]:
     """The proposed label of each peak of a board, from labellings of all peaks and their probabilities."""
-    if not ways:
+    if not labellings:
         return ()
     return tuple(
         _proposed_label(
-            setup.name, hertz, [(_peak_label(labelling, setup.name, hertz), share) for labelling, share in ways]
+            setup.name, hertz, [(_peak_label(labelling, setup.name, hertz), share) for labelling, share in labellings]
         )
         for setup in board.setups
         for hertz in sorted(setup.unlabelled)

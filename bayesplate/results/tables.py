@@ -63,19 +63,19 @@ def constants_table(
     return table_by_constant(title, columns | dict(more or {}), isotropic=isotropic)
 
 
-def render(shown: Table | str, medium: Medium, *, width: int = 80, styled: bool = False, kind: str = "") -> str:
+def render(content: Table | str, medium: Medium, *, width: int = 80, styled: bool = False, kind: str = "") -> str:
     """A table, or a sentence, rendered for a medium; every text in it is escaped.
 
     CSV has full precision: a number with its uncertainty has two columns, and so has an interval. `kind` holds classes
     of an HTML table; `styled` terminals show bold letters.
     """
     if medium == "terminal":
-        return _terminal_text(shown, width, styled=styled)
-    if isinstance(shown, str):
-        return f"<p>{escape(shown, medium)}</p>" if medium == "html" else escape(shown, medium)
+        return _terminal_text(content, width, styled=styled)
+    if isinstance(content, str):
+        return f"<p>{escape(content, medium)}</p>" if medium == "html" else escape(content, medium)
     if medium == "html":
-        return str(_html_table(shown, kind))
-    return csv_text(*_csv_columns(shown)) if medium == "csv" else _latex_table(shown)
+        return str(_html_table(content, kind))
+    return csv_text(*_csv_columns(content)) if medium == "csv" else _latex_table(content)
 
 
 def notebook_html(heading: str, sentences: Iterable[str], tables: Iterable[Table]) -> str:

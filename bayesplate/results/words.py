@@ -57,7 +57,7 @@ class Value:
     digits: int = 0  # fixed decimals
     signed: bool = False  # whether a positive number is printed with its sign
     unit: str = ""  # printed after the number
-    times: float = 1.0  # factor in print: 100 for a share in per cent
+    factor: float = 1.0  # factor in print: 100 for a share in per cent
 
     def __str__(self) -> str:
         if self.ends is not None:
@@ -70,7 +70,7 @@ class Value:
 
     def _fixed(self, number: float) -> str:
         """Fixed decimals, zero without a sign."""
-        return _unsigned_zero(f"{number * self.times:{'+' if self.signed else ''}.{self.digits}f}")
+        return _unsigned_zero(f"{number * self.factor:{'+' if self.signed else ''}.{self.digits}f}")
 
 
 def constant_name(name: str, *, isotropic: bool = False) -> str:
@@ -143,7 +143,7 @@ def _unsigned_zero(text: str) -> str:
 
 def percent(share: float | None, digits: int = 0) -> Value:
     """A share in per cent."""
-    return Value(share, digits=digits, unit=" %", times=100.0)
+    return Value(share, digits=digits, unit=" %", factor=100.0)
 
 
 def mode_name(label: str, setup: str, *, several: bool) -> str:
@@ -151,6 +151,6 @@ def mode_name(label: str, setup: str, *, several: bool) -> str:
     return f"{label} {setup}" if several else label
 
 
-def probabilities_text(found: Mapping[str, float]) -> str:
+def probabilities_text(probabilities: Mapping[str, float]) -> str:
     """Alternatives with their probabilities in per cent; a dash where there are none."""
-    return ", ".join(f"{name} {percent(share)}" for name, share in found.items()) or MISSING
+    return ", ".join(f"{name} {percent(share)}" for name, share in probabilities.items()) or MISSING

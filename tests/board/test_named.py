@@ -97,7 +97,7 @@ def test_an_empty_list_of_effects_declares_nothing_not_even_what_is_implied():
 
     for given, implied in [(None, ("support_stiffness",)), ([], ()), (["warp"], ("support_stiffness",))]:
         board = sheet(HZ, effects=given, setups=bayesplate.Setup.from_frequencies(HZ, edges="free", bounce=5.0))
-        assert (board.implies, implied_effects(board)) == (bool(implied), implied)
+        assert (board.has_implied_effects, implied_effects(board)) == (bool(implied), implied)
 
 
 def test_a_campaign_names_its_boards_and_what_they_share(tmp_path):

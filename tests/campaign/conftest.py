@@ -6,7 +6,7 @@ import pytest
 from made_campaigns import write_campaign
 
 import bayesplate
-from bayesplate.campaign import together
+from bayesplate.campaign import combined
 from bayesplate.commands.fitting import FitResult
 from bayesplate.posterior.slips import Remarks
 
@@ -22,8 +22,8 @@ def _no_slips():
 @pytest.fixture
 def _few_points(monkeypatch):
     """For rates over many campaigns, where moments of few points are enough."""
-    monkeypatch.setattr(together, "_N_POINTS_BY_DIMENSION", dict.fromkeys((1, 2), 2**11))
-    monkeypatch.setattr(together, "FEWEST_POINTS", 100)
+    monkeypatch.setattr(combined, "_N_POINTS_BY_DIMENSION", dict.fromkeys((1, 2), 2**11))
+    monkeypatch.setattr(combined, "FEWEST_POINTS", 100)
 
 
 def leave_out_slips(patch):

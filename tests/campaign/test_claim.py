@@ -16,7 +16,7 @@ from bayesplate.campaign.claim import (
     judge_shared_effect,
     refusing_boards,
 )
-from bayesplate.campaign.pulls import NormalLikelihood
+from bayesplate.campaign.normal_likelihood import NormalLikelihood
 
 
 @pytest.mark.usefixtures("_few_points")
@@ -54,7 +54,7 @@ def test_a_board_that_says_nothing_of_a_number_that_cannot_be_negative_has_no_pu
     silent, mistaken = NormalLikelihood.of_draws(z, weights, [prior]), NormalLikelihood.of_draws(z, weights)
 
     assert abs(silent.precision[0, 0]) < 0.05
-    assert abs(silent.lean[0]) < 0.05
+    assert abs(silent.precision_times_mode[0]) < 0.05
     assert mistaken.precision[0, 0] > 1.5  # the negative control: its prior taken for a normal one
 
 
@@ -64,11 +64,13 @@ def test_a_board_that_only_leans_does_not_refuse(size):
     much as one of the prior's sds and stays as wide."""
     draws = np.random.default_rng(4).standard_normal((4000, 2)) * np.array([0.98, 0.5]) + np.array([size, 0.2])
     pull = NormalLikelihood.of_draws(draws, np.full(len(draws), 1.0 / len(draws)))
-    others = SimpleNamespace(pulls=[pull], taught=lambda without: (np.zeros(2), 0.1 * np.eye(2)))
+    others = SimpleNamespace(
+        normal_likelihoods=[pull], moments_from_others=lambda without: (np.zeros(2), 0.1 * np.eye(2))
+    )
 
     assert np.linalg.eigvalsh(pull.precision)[0] < 0.1  # which its lean would be divided by
     assert board_p_value(others, 0) > 0.3
-    others.pulls[0] = NormalLikelihood(
+    others.normal_likelihoods[0] = NormalLikelihood(
         30.0 * np.eye(2), 30.0 * np.array([3.0 * size, 0.2])
     )  # control: off, and sure of it
     assert board_p_value(others, 0) < 0.001

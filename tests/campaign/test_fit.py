@@ -11,7 +11,7 @@ import pytest
 import bayesplate
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
-from bayesplate.campaign.pulls import NormalLikelihood
+from bayesplate.campaign.normal_likelihood import NormalLikelihood
 from bayesplate.campaign.shared import SharedParameter
 from bayesplate.commands.check import expected_shared_sds
 from bayesplate.errors import InputError
@@ -143,8 +143,8 @@ def test_the_sd_to_expect_is_over_that_of_the_prior(lower, sd_before):
 
 
 def test_where_a_value_is_shared_no_draw_is_weighted(fitted_campaign):
-    for member in fitted_campaign.learnt.members:
-        assert np.array_equal(member.alone.log_weights, np.zeros(len(member.alone.z)))
+    for member in fitted_campaign.shared_posterior.members:
+        assert np.array_equal(member.own_sample.log_weights, np.zeros(len(member.own_sample.z)))
 
 
 @pytest.mark.slow

@@ -37,7 +37,7 @@ def test_a_prior_with_an_edge_and_a_likelihood_that_leans():
     shares = np.exp(log_reference(grid[:, None]) + log_likelihood(grid))
     z = np.interp(rng.random(20_000), np.cumsum(shares) / shares.sum(), grid)[:, None]
     exact = np.log(np.trapezoid(shares, grid))
-    found = SharedLikelihood.found(z, np.full(len(z), 1 / len(z)), len(z), log_reference, exact)
+    found = SharedLikelihood.from_draws(z, np.full(len(z), 1 / len(z)), len(z), log_reference, exact)
 
     off = found.at(z) - log_likelihood(z[:, 0])
     assert np.sqrt(np.mean(off**2)) < 2.0 * np.sqrt(found.coefficients.size / len(z))
@@ -48,7 +48,7 @@ def test_far_from_the_draws_it_falls_like_a_normal_one():
     rng = np.random.default_rng(8)
     (board,) = linear_boards(rng, 1, 1, [0.5], sd=0.1)
     _, z = board.draws(rng, N)
-    found = SharedLikelihood.found(z, np.full(N, 1 / N), N, log_standard_normal, 0.0)
+    found = SharedLikelihood.from_draws(z, np.full(N, 1 / N), N, log_standard_normal, 0.0)
     far = z.mean() + z.std() * np.array([[-10.0], [10.0]])
 
     fall = found.at(far) - found.at(z.mean(axis=0)[None])
@@ -63,7 +63,7 @@ def test_what_a_board_does_not_say_does_not_rise_beyond_its_draws():
     log_likelihood = -np.exp(2.0 * grid)
     shares = np.exp(stats.norm.logpdf(grid) + log_likelihood)
     z = np.interp(rng.random(8000), np.cumsum(shares) / shares.sum(), grid)[:, None]
-    found = SharedLikelihood.found(z, np.full(len(z), 1 / len(z)), len(z), log_standard_normal, 0.0)
+    found = SharedLikelihood.from_draws(z, np.full(len(z), 1 / len(z)), len(z), log_standard_normal, 0.0)
     top = found.at(np.quantile(z, 0.5, axis=0)[None])[0]
 
     assert (found.at(np.linspace(2.0, 8.0, 13)[:, None]) < top - 3.0).all()
@@ -72,7 +72,7 @@ def test_what_a_board_does_not_say_does_not_rise_beyond_its_draws():
 @pytest.mark.parametrize(("n_effective", "degree"), [(300, 2), (3000, 4)])
 def test_few_draws_give_few_terms(n_effective, degree):
     z = np.random.default_rng(6).standard_normal((n_effective, 3))
-    found = SharedLikelihood.found(z, np.full(len(z), 1 / len(z)), n_effective, log_standard_normal, 0.0)
+    found = SharedLikelihood.from_draws(z, np.full(len(z), 1 / len(z)), n_effective, log_standard_normal, 0.0)
 
     assert found.degree == degree
 
@@ -123,11 +123,11 @@ def test_a_board_that_was_walked_anew_is_known_where_its_own_draws_are_as_well()
     def log_evidence_of(likelihood, log_reference):
         return float(log_sum(log_reference(grid) + likelihood.at(grid)) + np.log(grid[1, 0] - grid[0, 0]))
 
-    vars(member)["alone"] = sample_of(member.log_prior, 8000)
+    vars(member)["own_sample"] = sample_of(member.log_prior, 8000)
     anew = sample_of(log_near, 2048)
     found = member.likelihood(anew, log_near)
-    extrapolated = SharedLikelihood.found(anew.z, anew.weights, 2048, log_near, anew.log_evidence)
+    extrapolated = SharedLikelihood.from_draws(anew.z, anew.weights, 2048, log_near, anew.log_evidence)
 
     assert log_evidence_of(found, log_near) == pytest.approx(anew.log_evidence, abs=0.1)
-    assert log_evidence_of(found, member.log_prior) == pytest.approx(member.alone.log_evidence, abs=0.1)
-    assert abs(log_evidence_of(extrapolated, member.log_prior) - member.alone.log_evidence) > 0.2
+    assert log_evidence_of(found, member.log_prior) == pytest.approx(member.own_sample.log_evidence, abs=0.1)
+    assert abs(log_evidence_of(extrapolated, member.log_prior) - member.own_sample.log_evidence) > 0.2

@@ -14,7 +14,7 @@ from bayesplate.campaign.claim import SharedClaim, TaughtBoard
 from bayesplate.campaign.diagnosis import CampaignDiagnosis, PooledErrors, campaign_claim_sentence
 from bayesplate.campaign.search import CampaignExplanation
 from bayesplate.campaign.tables import shared_table
-from bayesplate.commands.shown import show_campaign_diagnosis, show_campaign_fit
+from bayesplate.commands.printout import show_campaign_diagnosis, show_campaign_fit
 from bayesplate.errors import InputError
 from bayesplate.report import campaign as home
 from bayesplate.report.campaign import shared_picture, write_campaign_report
@@ -142,7 +142,7 @@ def test_a_campaign_that_shares_nothing_is_boards_side_by_side(campaign, fitted_
     monkeypatch.setattr("bayesplate.commands.campaign_fit.fit_boards", lambda *_: alone)
     found = bayesplate.fit(replace(campaign, problems=campaign.problems[1:], shared=(), population=None))
 
-    assert found.learnt is None
+    assert found.shared_posterior is None
     assert found.summary.shared == {}
     assert set(found.summary.boards) == {"board-1", "board-2"}
     with pytest.raises(InputError, match="nothing shared"):

@@ -13,8 +13,8 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Peak
 from bayesplate.campaign.scatter import expected_width
 from bayesplate.planning.bench import make_benches, reading_bands
+from bayesplate.planning.campaign import _linearise_board, _weigh_readings, campaign_beliefs
 from bayesplate.planning.proposals import Costs, Planner
-from bayesplate.planning.together import _linearise_board, _weigh_readings, campaign_beliefs
 
 SHARED = "attached_mass.mass"
 
@@ -56,7 +56,7 @@ def planner(posed):
 @pytest.fixture(scope="module")
 def listed(posed, planner):
     """What could be read next."""
-    return planner.ranked(*posed[1:])
+    return planner.rank_proposals(*posed[1:])
 
 
 def judged(posed, planner, **other):
@@ -68,9 +68,9 @@ def judged(posed, planner, **other):
 
 def test_a_board_whose_number_scatters_says_less_of_the_middle(posed, planner):
     """Its precision and the variance of the scatter, joined as of a sum; not where nothing scatters."""
-    alone = planner.beliefs.boards[0].pull
+    alone = planner.beliefs.boards[0].shared_precision
     scattering = tuple(replace(one, scatter=0.5) for one in posed[2])
-    scattered = judged(posed, planner, shared=scattering).known.pull
+    scattered = judged(posed, planner, shared=scattering).known_board.shared_precision
     width = expected_width(scattering)
 
     assert scattered == pytest.approx(np.linalg.inv(np.linalg.inv(alone) + np.diag(width**2)))
@@ -101,7 +101,7 @@ def test_peaks_that_stand_by_a_mode_are_taken_for_it(posed):
     (setup,) = board.setups
     peaks = tuple(Peak(one.frequency) for one in setup.readings[-2:])
     bare = replace(board, setups=(replace(setup, readings=setup.readings[:-2], peaks=peaks),))
-    (law,) = _linearise_board(bare, prior, shared).known.laws
+    (law,) = _linearise_board(bare, prior, shared).known_board.laws
 
     assert law.station.n_old == len(setup.readings)
     assert set(law.station.setup.labels[: law.station.n_old]) == set(setup.labels)
@@ -131,19 +131,19 @@ def test_boards_that_tell_most_may_be_held_another_way(planner, listed):
     """What it leaves of the shared parameter, by a normal update by hand."""
     other = [one for one in listed if one.entry.what == "edges"]
     beliefs = planner.beliefs
-    order = sorted(beliefs.boards, key=lambda one: -np.trace(one.pull))
+    order = sorted(beliefs.boards, key=lambda one: -np.trace(one.shared_precision))
     assert {one.entry.board for one in other} == {one.board.name for one in order[:2]}
     for one in other:
         assert one.entry.sentence.startswith(f"Measure board {one.entry.board} ")
         assert one.entry.cost_minutes == Costs().clamping + len(one.entry.modes) * Costs().reading
-        assert one.read.law.station.is_new
-        assert one.read.again is None
-        noise = one.read.law.station.setup.noise.median
+        assert one.station_readings.law.station.is_new
+        assert one.station_readings.repeats is None
+        noise = one.station_readings.law.station.setup.noise.median
         assert one.readings.variance[0][0] == pytest.approx(np.full(len(one.entry.modes), noise**2))
     one, (now,) = other[0], beliefs.explanations
     rows, variance = one.readings.slopes[0][0], one.readings.variance[0][0]
     known = np.linalg.inv(now.covariance[0]) + rows.T @ (rows / variance[:, None])
-    wanted = now.wanted[0]
+    wanted = now.target_slopes[0]
     before, after = (np.diagonal(wanted @ c @ wanted.T) for c in (now.covariance[0], np.linalg.inv(known)))
     of_shared = list(one.entry.gain.shared.values())
     assert of_shared == pytest.approx(np.sqrt(after / before)[: len(of_shared)])
@@ -154,7 +154,7 @@ def test_the_sheets_are_those_of_the_steps_that_are_proposed_together(campaign, 
     """Where modes are all that could be read, the best three are of three boards; two of them get a sheet."""
     monkeypatch.setattr("bayesplate.commands.plan.campaign_beliefs", lambda *_: planner.beliefs)
     of_modes = tuple(one for one in listed if one.entry.what in ("modes", "edges"))
-    monkeypatch.setattr(Planner, "ranked", lambda *_: of_modes)
+    monkeypatch.setattr(Planner, "rank_proposals", lambda *_: of_modes)
     found = bayesplate.plan(campaign, goal="E_y", out=tmp_path / "out")
     asked = found.summary.sequences[-1].steps
 

@@ -13,10 +13,10 @@ from scipy.stats import norm
 from bayesplate.board.quantity import Quantity
 from bayesplate.campaign import scatter
 from bayesplate.campaign.claim import board_p_value
-from bayesplate.campaign.pulls import NormalLikelihood
+from bayesplate.campaign.combined import shared_values
+from bayesplate.campaign.normal_likelihood import NormalLikelihood
 from bayesplate.campaign.scatter import ScatteredLikelihood
 from bayesplate.campaign.shared import SharedParameter
-from bayesplate.campaign.together import shared_values
 
 SCALE = 0.5
 LOG_SD = 0.4
@@ -128,7 +128,7 @@ def test_middle_and_scatter_are_those_of_a_fine_grid():
         error = 4.0 * np.repeat(grid[1::2], 2) / np.sqrt(together.fewest_points)
         assert (np.abs(found - grid) < error).all()
         assert together.log_evidence(without) == pytest.approx(evidence, abs=4.0 / np.sqrt(together.fewest_points))
-        taught_mean, taught = together.taught(without)
+        taught_mean, taught = together.moments_from_others(without)
         assert abs(taught_mean[0] - grid[0]) < 2.0 * error[0] * np.sqrt(1.0 + square / grid[1] ** 2)
         assert taught[0, 0] == pytest.approx(grid[1] ** 2 + square, rel=4.0 * np.sqrt(2.0 / together.fewest_points))
     assert not np.allclose(by_grid(boards[:3])[0], by_grid(boards)[0], atol=error.max())  # the grid tells boards apart
@@ -140,9 +140,9 @@ def test_what_is_taught_has_a_density_with_its_moments():
     one, other = numbers(2)
     together = exactly_together(boards, (one, replace(other, scatter=0.0)))
     z = np.random.default_rng(0).uniform(-6.0, 6.0, (40_000, 2))
-    weights = np.exp(together.log_taught((1,))(z))
+    weights = np.exp(together.log_density_from_others((1,))(z))
     weights /= weights.sum()
-    mean, covariance = together.taught((1,))
+    mean, covariance = together.moments_from_others((1,))
     found = weights @ z
     spread = (weights[:, None] * (z - found)).T @ (z - found)
     sd = np.sqrt(np.diagonal(covariance))
@@ -158,12 +158,12 @@ def test_what_is_taught_keeps_the_bounds_of_a_number_that_does_not_scatter():
     bounded = replace(other, scatter=0.0, prior=Quantity.from_mean(0.0, 1.0, "normal", lower=0.0))
     boards, _ = scattered_boards(np.random.default_rng(2), 4, 2, 0.5, z_true=0.05, sd=2.0)
     together = exactly_together(boards, (scattering, bounded))
-    log_taught, rng = together.log_taught(), np.random.default_rng(1)
+    log_taught, rng = together.log_density_from_others(), np.random.default_rng(1)
     z = np.column_stack([rng.uniform(-6.0, 6.0, 40_000), rng.uniform(-1.0, 4.0, 40_000)])
     log_density = log_taught(z)
     inside = np.flatnonzero(z[:, 1] >= 0.0)
     density = np.exp(log_density[inside])
-    draws = together.taught_draws(rng, 20_000)[:, 1]
+    draws = together.draws_from_others(rng, 20_000)[:, 1]
 
     assert (log_density[z[:, 1] < 0.0] == -np.inf).all()
     assert (log_taught(np.array([[50.0, 1.0], [1.0, 50.0]])) == -np.inf).all()  # no draw is as far out

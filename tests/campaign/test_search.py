@@ -34,7 +34,7 @@ class Cells:
         values = self.effects.get("_".join(effects), {})
         return {(0.0, z): (-np.log(len(values)), value) for z, value in values.items()}
 
-    def cells_beside(self, shared, own):
+    def cells_in_pair(self, shared, own):
         """A board's likelihood is the product of what it says of the two."""
         return {
             key: (prior, value + self.log_evidence((own,))) for key, (prior, value) in self.cells((shared,)).items()
@@ -226,7 +226,7 @@ def test_the_cells_of_two_effects_are_those_of_each_and_make_up_the_evidence(fou
     cells = one.cells(SHEAR_AND_SENSOR)
     tables = [one.ground.candidates[name].coarse for name in SHEAR_AND_SENSOR]
     hypothesis = one.hypothesis(SHEAR_AND_SENSOR)
-    seen = hypothesis.seen(one.ground.baseline, one.ground.baseline.residual[None, :])
+    seen = hypothesis.residual_under_labels(one.ground.baseline, one.ground.baseline.residual[None, :])
 
     assert len(cells) == tables[0].n_cells * tables[1].n_cells
     expected = hypothesis.terms.log_evidence(seen)[0] + hypothesis.log_labels
@@ -240,7 +240,7 @@ def test_the_cells_of_two_effects_are_those_of_each_and_make_up_the_evidence(fou
 def test_the_cells_of_one_effect_beside_another_are_sums_over_those_of_both(found_on_boards, order):
     one = found_on_boards[1][0]
     shared, own = SHEAR_AND_SENSOR[::order]
-    beside = one.cells_beside(shared, own)
+    beside = one.cells_in_pair(shared, own)
     by_hand = {}
     for key, (log_prior, log_likelihood) in one.cells(SHEAR_AND_SENSOR).items():
         kept = key[:3] if shared == "transverse_shear" else key[3:]

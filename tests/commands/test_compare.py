@@ -12,7 +12,7 @@ from bayesplate.board.reading import Peak
 from bayesplate.cli import main
 from bayesplate.commands.compare import compare
 from bayesplate.commands.prepare import prepare
-from bayesplate.commands.shown import show_compare
+from bayesplate.commands.printout import show_compare
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.laws import cents
 from bayesplate.results.contract import as_json

@@ -36,7 +36,7 @@ def diagnose(folder: Path, *arguments: str) -> runs.Run:
 def quickly(patch: pytest.MonkeyPatch, *, page: bool = False) -> None:
     """Two candidates, and a sampler whose first judgement passes; a page only where it is asked for."""
     runs.sample_loosely(patch)
-    patch.setattr("bayesplate.commands.diagnose.full_search", partial(full_search, tried=TRIED))
+    patch.setattr("bayesplate.commands.diagnose.full_search", partial(full_search, effects=TRIED))
     if not page:
         patch.setattr("bayesplate.commands.fitting.FitResult.write_page", lambda *_: None)
 
@@ -230,7 +230,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[list[tuple[str, ...]]]:
     monkeypatch.setattr(f"{home}.wrong_reading", lambda _: "Read (1,1) again.")
     monkeypatch.setattr(f"{home}.surviving_explanations", lambda _, rivals: kept.append(rivals) or ())
     monkeypatch.setattr(f"{home}.search_beliefs", lambda *_: None)
-    monkeypatch.setattr(f"{home}.Planner", lambda *_: SimpleNamespace(ranked=tuple))
+    monkeypatch.setattr(f"{home}.Planner", lambda *_: SimpleNamespace(rank_proposals=tuple))
     monkeypatch.setattr(f"{home}.plan_first_line", lambda *_: "Measure more.")
     return kept
 
@@ -244,5 +244,5 @@ def test_a_wrong_reading_is_told_where_nothing_explains_the_readings_and_else_th
         ("undetectable", (), "Measure more."),
         ("indistinguishable group", rivals, "Measure more."),
     ):
-        assert advice(None, Verdict(word, (), 0, None, "", stands_for=stands_for), None, 1) == told
+        assert advice(None, Verdict(word, (), 0, None, "", explanations=stands_for), None, 1) == told
     assert asked == [[], [], [("shear",), ("mass",)]]

@@ -12,7 +12,7 @@ from bayesplate.board.board import board_density, vibrating_lengths
 from bayesplate.cli import main
 from bayesplate.commands.modes import modes
 from bayesplate.commands.prepare import prepare
-from bayesplate.commands.shown import show_modes
+from bayesplate.commands.printout import show_modes
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.laws import cents
 

@@ -37,7 +37,7 @@ CASES = {
 
 def test_the_label_stated_is_never_another_than_the_most_probable():
     for by_all, by_evidence, expected in CASES.values():
-        assert Labels((by_all,), (by_evidence,), None).stated(0) == expected
+        assert Labels((by_all,), (by_evidence,), None).label_to_state(0) == expected
 
 
 PEAK = PickedRow(
@@ -54,8 +54,8 @@ def planted(material: str = "poisson_xy = 0.4") -> PreparedBoard:
 
 def heard(likely: tuple[PickedRow, ...]) -> SimpleNamespace:
     """What was picked without a force, between places that nobody knows."""
-    spectra = SimpleNamespace(force=None, between=((None, None),))
-    return SimpleNamespace(likely=likely, likely_answers=(), spectra=spectra)
+    spectra = SimpleNamespace(force=None, place_pairs=((None, None),))
+    return SimpleNamespace(likely=likely, likely_mobilities=(), spectra=spectra)
 
 
 def test_a_picture_of_another_mode_or_crosswise_is_told():

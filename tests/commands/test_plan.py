@@ -153,8 +153,8 @@ def test_only_the_answers_that_survive_a_diagnosis_are_tabulated(tmp_path, told,
     class Seen(Exception):
         """Nothing further is asked."""
 
-    def stop(baseline, tried=None, tell=None):
-        kept.append(tried)
+    def stop(baseline, effects=None, tell=None):
+        kept.append(effects)
         raise Seen
 
     monkeypatch.setattr(home, "full_search", stop)

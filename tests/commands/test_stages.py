@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bayesplate.commands.fitting import Stages
-from bayesplate.commands.shown import progress_text
+from bayesplate.commands.printout import progress_text
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import Progress
 from bayesplate.terminal import progress_line
@@ -17,9 +17,9 @@ def test_the_share_is_that_of_the_whole_and_never_falls():
     stages.begin("one", 2.0)
     stages.sampled(Progress(100, 20_000, 0.5 * Gate().tau_count_min))
     stages.begin("two", 2.0)
-    stages.left = 0.0  # nothing is left after this part, contrary to what was expected
+    stages.remaining_time = 0.0  # nothing is left after this part, contrary to what was expected
     stages.reached(0.5)
-    stages.left = 100.0
+    stages.remaining_time = 100.0
     stages.reached(1.0)
     assert [one.stage for one in told] == ["one", "one", "two", "two", "two"]
     assert [one.done for one in told] == pytest.approx([0.0, 1 / 8, 2 / 8, 3 / 4, 3 / 4])
@@ -43,7 +43,7 @@ def test_a_line_is_printed_when_a_part_begins_and_now_and_then_while_sampling(ca
     def sampling(n_steps: int) -> Progress:
         return Progress(n_steps, 20_000, None, "fit", 0.5)
 
-    with progress_line(shown=True) as tell:
+    with progress_line(is_shown=True) as tell:
         for progress in (
             Progress(0, 0, None, "fit", 0.0),
             sampling(25),

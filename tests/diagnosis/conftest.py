@@ -28,7 +28,7 @@ class Grounded:
 
 def grounded(name: str, tried: Sequence[str] | None = None) -> Grounded:
     problem = Problem.from_card(name).posed
-    return Grounded(problem, prepare_search(baseline_of(problem), tried=tried))
+    return Grounded(problem, prepare_search(baseline_of(problem), effects=tried))
 
 
 @pytest.fixture(scope="session")

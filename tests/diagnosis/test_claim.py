@@ -17,7 +17,7 @@ from bayesplate.diagnosis.sensitivity import vary_priors
 from bayesplate.diagnosis.verdict import rank_explanations
 
 DIRECTION = 0.05 * np.random.default_rng(2).standard_normal(9)
-CONTROL = NullControl(against=np.linspace(-3.0, 0.0, 101), ratio=np.linspace(0.4, 1.4, 101))
+CONTROL = NullControl(log_odds=np.linspace(-3.0, 0.0, 101), ratio=np.linspace(0.4, 1.4, 101))
 
 
 def searched(size: float, direction: np.ndarray = DIRECTION, n_modes: int = 9, others: Sequence[np.ndarray] = ()):
@@ -38,13 +38,13 @@ def found():
 def judged(found, verdict, control):
     """The claim on a board whose own readings are left out here, those that alone carry something not counted."""
     folded = nested_errors_of_board(found, control, verdict.index)
-    return judge_claim(found, verdict, control.without(() if folded is None else folded.carried), folded)
+    return judge_claim(found, verdict, control.without(() if folded is None else folded.carrying_readings), folded)
 
 
 def folds(found, ratio: float = 0.1) -> NestedErrors:
     """Errors of a given ratio; every fold chose the effect."""
     told = nested_errors_of_board(found, CONTROL)
-    return NestedErrors(told.before, ratio * told.before, np.ones_like(told.chosen))
+    return NestedErrors(told.before, ratio * told.before, np.ones_like(told.choices))
 
 
 def test_an_effect_that_is_there_meets_all_of_them(found):
@@ -77,7 +77,7 @@ def test_the_log_score_rises_by_two_standard_errors_of_the_paired_differences(fo
     )
     assert told.value == pytest.approx(gains.sum())
     assert told.limit == pytest.approx(2.0 * 3.0 * gains.std(ddof=1))
-    none = replace(folds(found), chosen=np.zeros((1, 9), dtype=int))
+    none = replace(folds(found), choices=np.zeros((1, 9), dtype=int))
     told = judge_claim(found, decided(found), CONTROL, none).conditions[1]
     assert (told.value, told.limit, told.is_met) == (0.0, 0.0, False)
 
@@ -96,7 +96,7 @@ def test_halved_and_doubled_priors_may_refuse_the_claim(size, widest):
     Of the small one its probability is below one in twenty with the usual priors and above it with the wide ones.
     """
     one = searched(size)
-    each = {factor: vary_priors(one, width=factor).none for factor in (0.5, 1.0, 2.0)}
+    each = {factor: vary_priors(one, width=factor).probability_of_none for factor in (0.5, 1.0, 2.0)}
     assert max(each, key=each.get) == widest
     told = judged(one, replace(decided(one), index=1), CONTROL).conditions[2]
     assert told.value == pytest.approx(each[widest], rel=1e-9, abs=0.0)
@@ -119,7 +119,7 @@ def test_a_name_with_a_rival_is_no_claim_unless_the_rival_is_told_too(alike, is_
     told = judged(found, verdict, CONTROL).conditions[3]
     assert (told.name, told.limit, told.is_met) == ("probability of another", 0.05, is_met)
     assert told.value >= found.probability[2]
-    both = replace(verdict, stands_for=rank_explanations(found))
+    both = replace(verdict, explanations=rank_explanations(found))
     assert judged(found, both, CONTROL).conditions[3].value == 0.0
 
 
@@ -151,10 +151,10 @@ def test_nothing_is_claimed_where_nothing_was_added_or_nothing_is_left_to_judge_
 
 def test_the_folds_of_the_board_add_an_effect_where_the_null_simulations_call_for_one(found):
     weak = searched(0.1)
-    calm, loud = (replace(CONTROL, against=np.full(100, level)) for level in (-50.0, 50.0))
-    assert nested_errors_of_board(weak, calm).chosen.sum() == 9
-    assert nested_errors_of_board(weak, loud).chosen.sum() == 0
-    assert 0 < nested_errors_of_board(weak, CONTROL).chosen.sum() < 9
+    calm, loud = (replace(CONTROL, log_odds=np.full(100, level)) for level in (-50.0, 50.0))
+    assert nested_errors_of_board(weak, calm).choices.sum() == 9
+    assert nested_errors_of_board(weak, loud).choices.sum() == 0
+    assert 0 < nested_errors_of_board(weak, CONTROL).choices.sum() < 9
 
 
 def test_modes_that_alone_carry_something_count_in_no_condition(found):
@@ -166,9 +166,9 @@ def test_modes_that_alone_carry_something_count_in_no_condition(found):
     assert spoilt.ratio[0] < 0.2
     folded, same = spoilt.without((3,)), control.without((3,))
     kept = np.delete(np.arange(9), 3)
-    after, before = (getattr(control.folded, name)[:, kept] for name in ("after", "before"))
+    after, before = (getattr(control.nested_errors, name)[:, kept] for name in ("after", "before"))
     assert same.ratio == pytest.approx(np.sqrt((after**2).sum(axis=1) / (before**2).sum(axis=1)))
-    assert force_choices(found.ground, null, carried=(3,)).ratio == pytest.approx(same.ratio)
+    assert force_choices(found.ground, null, carrying_readings=(3,)).ratio == pytest.approx(same.ratio)
     gains = log_score_gains(found.ground, found.residual, np.ones(9, dtype=int))
     by_ratio, by_score, *_ = judge_claim(found, decided(found), same, folded).conditions
     assert by_ratio.value == pytest.approx(0.5)
@@ -190,8 +190,8 @@ def test_the_folds_of_the_board_do_not_count_what_carries_something():
     """By the leverages of the search: an effect that shifts one mode alone."""
     alone = searched(1.5, 0.2 * np.eye(9)[4])
     folded = nested_errors_of_board(alone, CONTROL, 1)
-    assert set(nested_errors_of_board(alone, CONTROL).carried) | {4} == set(folded.carried)
-    assert not folded.counted[0, 4]
+    assert set(nested_errors_of_board(alone, CONTROL).carrying_readings) | {4} == set(folded.carrying_readings)
+    assert not folded.is_counted[0, 4]
     claim = judged(alone, replace(decided(alone), index=1), CONTROL)
-    gains = log_score_gains(alone.ground, alone.residual, folded.chosen[0], folded.carried)
+    gains = log_score_gains(alone.ground, alone.residual, folded.choices[0], folded.carrying_readings)
     assert claim.conditions[1].value == pytest.approx(gains.sum())

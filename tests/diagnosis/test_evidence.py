@@ -150,7 +150,7 @@ def test_of_several_sessions_a_mode_is_left_out_with_all_its_readings(days):
     """Its reading on the other day would foretell it, whatever the model."""
     base, residual = days
     ground = ground_of(base, bare(base, one_level(base)))
-    assert base.same_modes == tuple((i, i + 6) for i in range(6))
+    assert base.readings_by_mode == tuple((i, i + 6) for i in range(6))
     found = left_out(ground, 0, residual)
     nothing_added = np.zeros(12), np.zeros((12, 0))
     for i in range(12):

@@ -36,7 +36,7 @@ class BentLaw:
     def __init__(self, form, base, direction):
         self.form, self.base, self.direction = form, base, direction
 
-    def every_log_frequency(self, base, log_rigidities, values):
+    def mode_log_frequencies(self, base, log_rigidities, values):
         (size,) = values.values()
         return bent(self.base)(log_rigidities) + np.outer(size, self.direction)
 
@@ -75,7 +75,7 @@ def quadrature(found, law):
     root = np.linalg.cholesky(spread)
     steps = np.linspace(-6.0, 6.0, 33)
     z = np.array(list(product(steps, repeat=3)))
-    shift = base.absorbing @ found.residual
+    shift = base.absorption @ found.residual
     x = middle + shift + z @ root.T
     sizes, weights = [0.0], [1.0]
     if law is not None:
@@ -85,7 +85,9 @@ def quadrature(found, law):
     density = np.zeros(len(x))
     for size, weight in zip(sizes, weights, strict=True):
         there = (
-            base.every.predict(x) if law is None else law.every_log_frequency(base, x, {"size": np.full(len(x), size)})
+            base.possible_modes.predict(x)
+            if law is None
+            else law.mode_log_frequencies(base, x, {"size": np.full(len(x), size)})
         )
         density += weight * np.exp(-0.5 * np.sum((readings - there) ** 2, axis=1) / NOISE**2)
     mean = density @ x / density.sum()

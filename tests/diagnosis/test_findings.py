@@ -23,7 +23,7 @@ from made_summaries import SUMMARY, mode
 
 from bayesplate.board.parameter import BOARD_OWNER, Parameter
 from bayesplate.board.quantity import Quantity
-from bayesplate.commands.shown import show_diagnosis
+from bayesplate.commands.printout import show_diagnosis
 from bayesplate.diagnosis import sensitivity
 from bayesplate.diagnosis.claim import Claim, Condition
 from bayesplate.diagnosis.entries import effect_entry, exchange_entries, fate_of
@@ -216,7 +216,7 @@ def test_an_entry_by_hand():
     raw = 1200.0 / np.log(2.0) * direction * float(HALF_NORMAL.value(1.0))
     told = entries(found)[AIR]
     assert told.raw_rms_cents == pytest.approx(np.sqrt(np.mean(raw**2)))
-    assert told.visible_cents == pytest.approx(raw - base.slopes @ (base.absorbing @ raw))
+    assert told.visible_cents == pytest.approx(raw - base.slopes @ (base.absorption @ raw))
     assert told.log_bayes_factor == pytest.approx(np.log(0.15 / 0.01))
     assert told.amplitude.form == ""
 
@@ -248,7 +248,7 @@ def named() -> Case:
 
 
 def test_a_named_effect_that_was_refitted(named):
-    answer = rank_explanations(named.found)[0]
+    answer = rank_explanations(named.result)[0]
     told = diagnosis_of(replace(named, finalists=[(answer, replace(named.after, index=answer.index, summary=MOVED))]))
     assert (told.verdict, told.effects, told.refitted) == ("named", (SHEAR,), (SHEAR,))
     assert told.sentences == (EFFECTS[SHEAR].sentence,)
@@ -295,7 +295,7 @@ def test_what_comes_nearest_is_told_though_it_is_not_enough(members):
     advice = "Declare it, effects = [{}], and diagnose again to look for what else is lacking."
     for changed, told in [
         ({}, advice.format('"fluid_loading"')),
-        ({"found": beside}, advice.format('"thickness_profile", "fluid_loading"')),
+        ({"result": beside}, advice.format('"thickness_profile", "fluid_loading"')),
         ({"has_slip": True}, "Before you declare it, look at the readings that are told below."),
     ]:
         (sentence,) = diagnosis_of(replace(case, after=case.before, **changed)).sentences
@@ -350,9 +350,9 @@ def test_a_misfit_beyond_all_doubt_has_odds():
     found = made(NAMED)
     evidence = np.array([-2000.0, -3.0, -9.0, -9.0, -9.0, -np.inf])
     sure = SearchResult(found.ground, found.residual, evidence, probabilities(found.ground.hypotheses, evidence))
-    assert sure.none == 0.0
+    assert sure.probability_of_none == 0.0
     wanted = 1997.0 + np.log(0.1 / 0.5) + np.log1p(3.0 * np.exp(-6.0))
-    assert sure.against_none == pytest.approx(wanted)
+    assert sure.log_odds == pytest.approx(wanted)
     told = diagnosis_of(case_of(sure, control_of(sure, 0.5), folds_of(sure, 0.25)))
     assert told.null_control.log_odds == pytest.approx(wanted)
     assert told.gain_null_percentile == 100.0
@@ -363,7 +363,7 @@ def test_a_board_that_declares_every_effect_has_no_odds():
     base = baseline(np.random.default_rng(1))
     ground = ground_of(base, bare(base, noise_grid(base.board), 1.0))
     found = run_search(ground, 0.003 * np.random.default_rng(2).standard_normal(6))
-    control = null_control(ground, np.random.default_rng(3), 100, found.against_none)
+    control = null_control(ground, np.random.default_rng(3), 100, found.log_odds)
     told = diagnosis_of(case_of(found, control, folds_of(found, 1.0)))
     assert (told.verdict, told.null_control.log_odds, told.gain_null_percentile) == ("none needed", None, None)
     assert told.null_control.flagged_percent == 0.0
@@ -391,9 +391,9 @@ def test_what_is_named_in_part_stands_beside_the_word_unexplained_and_nothing_is
     found = made(UNEXPLAINED, residual=np.array([0.2, -0.2, 0.15, 0.1, -0.3, 0.2]))
     case = case_of(found, control_of(found, 0.4), folds_of(found, 0.5))
     after = FittedModel(1, MOVED, case.before.draws, case.before.measured)
-    case = replace(case, after=after, finalists=[(case.verdict.nearest, after)], in_part=(SHEAR,))
-    assert case.verdict.tried == 1
-    told, whole = diagnosis_of(case), diagnosis_of(replace(case, after=case.before, in_part=()))
+    case = replace(case, after=after, finalists=[(case.verdict.nearest, after)], effects_in_part=(SHEAR,))
+    assert case.verdict.judged_index == 1
+    told, whole = diagnosis_of(case), diagnosis_of(replace(case, after=case.before, effects_in_part=()))
     for one, part in ((told, (SHEAR,)), (whole, ())):
         assert (one.verdict, one.effects, one.claim, one.conditions) == ("unexplained", (), False, ())
         assert one.named_in_part == one.refitted == part
@@ -429,7 +429,7 @@ def carrying_case(*carried: str):
         found, control_of(found, 0.4), folds_of(found, 0.5).without(indices_of(modes, found.ground.baseline.board))
     )
     before, after = (replace(side, summary=replace(side.summary, modes=rows)) for side in (case.before, case.after))
-    return replace(case, before=before, after=after, carrying=modes), found
+    return replace(case, before=before, after=after, carrying_modes=modes), found
 
 
 def test_modes_that_alone_carry_something_count_neither_before_nor_after():

@@ -147,9 +147,9 @@ def test_every_fold_that_can_see_an_exchange_makes_it_and_none_where_labels_are_
     swap = swap_of(base, 3, 4)
     ground = ground_of(base, bare(base, noise_grid(base.board)), swap)
     mixed = nested_leave_one_out(ground, exchanged(base, swap.swap, straight.copy()))
-    assert (mixed.chosen[0, [0, 1, 2, 5]] == 1).all()
+    assert (mixed.choices[0, [0, 1, 2, 5]] == 1).all()
     assert mixed.ratio[0] < 0.1
-    assert (nested_leave_one_out(ground, straight).chosen == 0).all()
+    assert (nested_leave_one_out(ground, straight).choices == 0).all()
 
 
 def test_a_reading_takes_its_own_error_along_to_the_other_label(base):
@@ -167,6 +167,9 @@ def test_a_reading_takes_its_own_error_along_to_the_other_label(base):
     assert base.own_variance[3] > 10.0 * NOISE**2
     assert put_right.own_variance[[3, 4]] == pytest.approx([0.0, (4.0 / readings[3].frequency.mean) ** 2])
     assert log_evidences((swap,), base, mixed) == pytest.approx(log_evidences((none,), put_right, straight))
-    (evidence, errors), (there, expected) = swap.terms.left_out(swap.seen(base, mixed)), none.terms.left_out(straight)
+    (evidence, errors), (there, expected) = (
+        swap.terms.left_out(swap.residual_under_labels(base, mixed)),
+        none.terms.left_out(straight),
+    )
     assert evidence == pytest.approx(there[order])
     assert errors == pytest.approx(expected[order])

@@ -27,7 +27,7 @@ def made(none=1e-6, rival=0.0, rest=0.1, prior=SIZE, planted=1.0) -> SearchResul
     shares = [none, (1.0 - none) * (1.0 - rival), (1.0 - none) * rival]
     other = rest / 0.1 * directions[2]
     residual = planted * directions[0] + other
-    residual -= base.slopes @ (base.absorbing @ residual)
+    residual -= base.slopes @ (base.absorption @ residual)
     return found_among(base, effects, singles(base, effects, prior=0.2), shares, residual)
 
 

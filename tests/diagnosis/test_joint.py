@@ -35,7 +35,7 @@ TRIED = (*PAIR, "clamp_rotation", "density_gradient")
 def ground():
     """A clamped guitar top in air, under tension, noise of 5 cents: one slows all modes, the other speeds them up."""
     planted = plant(np.random.default_rng(0), "clamped-9", tuple(sorted(PAIR)), 2.0, 5.0, sensor=SENSORS["clamped-9"])
-    return prepare_search(baseline_of_card(planted), tried=TRIED)
+    return prepare_search(baseline_of_card(planted), effects=TRIED)
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,7 @@ def test_a_pair_is_found_of_which_neither_alone_lowers_the_misfit(solved):
     ground, base = found.ground, found.ground.baseline
 
     def squares(residual):
-        return np.sum(((residual - base.slopes @ (base.absorbing @ residual)) / base.scales) ** 2)
+        return np.sum(((residual - base.slopes @ (base.absorption @ residual)) / base.scales) ** 2)
 
     beside = base.residual - visible_of(ground.candidates["fluid_loading"])
     assert squares(beside) > 2.0 * squares(base.residual)  # the error rises with what is there
@@ -114,8 +114,8 @@ def test_draws_of_a_pair_that_was_solved_have_its_law(solved):
         for i, free in enumerate(law.form.free):
             size = free.prior.value(at[draw, i] + width[draw, i] * drawn.within[draw, i])
             values[free.name] = np.clip(np.array([size]), free.prior.lower, free.prior.upper)
-        (direct,) = law.every_log_frequency(base, drawn.log_rigidities[[draw]], values)
-        direct += base.every.input_slopes @ (drawn.inputs[draw] - base.every.inputs)
+        (direct,) = law.mode_log_frequencies(base, drawn.log_rigidities[[draw]], values)
+        direct += base.possible_modes.input_slopes @ (drawn.inputs[draw] - base.possible_modes.inputs)
         assert np.abs(exact[draw] - direct).max() < 1e-9
     assert np.abs(cents(apart - exact)).max() > CENT
 
@@ -167,7 +167,7 @@ def test_a_board_that_is_cupped_and_twisted_is_not_taken_for_one_on_a_stiff_supp
     planted = plant(np.random.default_rng(0), "free-12", ["warp"], 1.0, 5.0, fixed={"warp": shape})
     exact = replace(planted, readings=planted.exact)
 
-    result = run_search(prepare_search(baseline_of_card(exact), tried=("warp", "support_stiffness")))
+    result = run_search(prepare_search(baseline_of_card(exact), effects=("warp", "support_stiffness")))
 
     evidence = {
         hypothesis.members: value

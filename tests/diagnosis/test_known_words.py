@@ -38,8 +38,11 @@ def test_what_is_told_of_a_fit_by_hand():
     assert set(stands.change_percent.values()) == {0.0}
     assert (air.combination, air.effects, air.without) == (("fluid_loading",), ("fluid_loading",), ())
     assert air.in_sample_rms_cents == pytest.approx(5.0)
-    assert known_models((first,), carried=(1,))[0].leave_one_out_rms_cents == pytest.approx(6.0)
-    assert [one.leave_one_out_rms_cents for one in known_models((first, second), carried=(1,))] == [None, None]
+    assert known_models((first,), carrying_readings=(1,))[0].leave_one_out_rms_cents == pytest.approx(6.0)
+    assert [one.leave_one_out_rms_cents for one in known_models((first, second), carrying_readings=(1,))] == [
+        None,
+        None,
+    ]
     assert air.change_percent == pytest.approx({"E_x": 5.0, "E_y": -10.0, "G_xy": 0.0})
     third = fit(("fluid_loading",), [10e9, 1e9, 0.5e9], [1.0, 7.0], [5.0, np.nan])
     assert [one.leave_one_out_rms_cents for one in known_models((first, second, third))] == [None] * 3

@@ -31,7 +31,7 @@ def hat(found, *modes):
     """Leverages of a regression on the constants and on one mode's own shift each, of prior sd 0.2."""
     base = found.ground.baseline
     own = 0.2 * np.eye(N_MODES)[:, list(modes)]
-    weighted = np.hstack([base.slopes, own - base.slopes @ (base.absorbing @ own)]) / base.scales[:, None]
+    weighted = np.hstack([base.slopes, own - base.slopes @ (base.absorption @ own)]) / base.scales[:, None]
     prior = np.diag([0.0] * 3 + [1.0] * len(modes))
     return np.diagonal(weighted @ np.linalg.inv(weighted.T @ weighted + prior) @ weighted.T)
 

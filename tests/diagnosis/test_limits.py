@@ -88,7 +88,7 @@ def test_effects_look_alike_from_a_cosine_of_095_on(base, likeness, either, alik
     """Of what each leaves visible, with either sign if they may act either way; in `check` and in `diagnose`."""
     prior = Quantity.from_mean(0.0, 1.0, "normal") if either else HALF_NORMAL
     some = 0.02 * np.random.default_rng(3).standard_normal((2, 6))
-    one, other = (shift - base.slopes @ (base.absorbing @ shift) for shift in some)
+    one, other = (shift - base.slopes @ (base.absorption @ shift) for shift in some)
     one = one / np.linalg.norm(one / base.scales)
     other = other - one * np.sum(one * other / base.scales**2)
     other = likeness * one + np.sqrt(1.0 - likeness**2) * other / np.linalg.norm(other / base.scales)
@@ -139,7 +139,7 @@ def test_an_amplitude_has_the_interval_of_ninety_percent(base):
     prior = Quantity.from_mean(0.0, 1.0, "normal")
     found = found_of(base, {A: direction}, [0.0, 1.0], 1.2 * direction, prior, n_cells=401, level=NOISE)
     # The size seen through what the constants leave of it.
-    weight = float(np.sum(((direction - base.slopes @ (base.absorbing @ direction)) / base.scales) ** 2))
+    weight = float(np.sum(((direction - base.slopes @ (base.absorption @ direction)) / base.scales) ** 2))
     sd = 1.0 / np.sqrt(1.0 + weight)
     mean = 1.2 * weight * sd**2
 

@@ -57,7 +57,7 @@ def test_the_finnish_board_supports_no_claim_and_no_poisson_ratio(diagnosed, fin
     for factor in (2.0, 3.0):
         wider = vary_priors(found, width=factor)
         inclusion = {name: wider.inclusion(name) for name in found.ground.candidates}
-        assert wider.none >= 0.1 or max(inclusion, key=inclusion.get) != "poisson_ratio"
+        assert wider.probability_of_none >= 0.1 or max(inclusion, key=inclusion.get) != "poisson_ratio"
 
 
 @slow
@@ -93,9 +93,9 @@ def test_the_constants_of_the_search_are_those_of_the_sampler_without_effect(nam
     are not weighted are off by more.
     """
     fitted = fit(name, law="exact")
-    found = run_search(prepare_search(baseline_of(fitted.inference.problem), tried=()))
+    found = run_search(prepare_search(baseline_of(fitted.inference.problem), effects=()))
     base = found.ground.baseline
-    every, middle = base.every, base.log_rigidities
+    every, middle = base.possible_modes, base.log_rigidities
     straight = with_modes(base, predict=lambda x: every.log_frequency + (x - middle) @ every.slopes.T)
     linear = replace(found, ground=replace(found.ground, baseline=straight))
     off = {}

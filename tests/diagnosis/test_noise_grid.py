@@ -47,7 +47,7 @@ def test_odds_are_those_of_a_fine_grid(n_setups):
     def off(grid):
         return np.sqrt(np.mean((log_odds(base, grid, residuals) - expected) ** 2))
 
-    many, few = (off(noise_grid(base.board, few=few)) for few in (False, True))
+    many, few = (off(noise_grid(base.board, is_coarse=few)) for few in (False, True))
     one = off(NoiseGrid(np.full((1, n_setups), 0.005), np.ones(1)))
     assert many < 0.3 < one
     assert many < few < 0.5 * one
@@ -58,7 +58,9 @@ def test_odds_are_those_of_a_fine_grid(n_setups):
 
 def test_levels_are_no_more_for_twenty_setups_than_for_three():
     for few in [False, True]:
-        grids = [noise_grid(baseline(np.random.default_rng(0), 60, noise=(0.005,) * n).board, few=few) for n in (3, 20)]
+        grids = [
+            noise_grid(baseline(np.random.default_rng(0), 60, noise=(0.005,) * n).board, is_coarse=few) for n in (3, 20)
+        ]
 
         assert grids[0].weights.size == grids[1].weights.size <= 64
         for grid in grids:

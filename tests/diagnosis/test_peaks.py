@@ -25,7 +25,7 @@ from bayesplate.plate.naming import ModePlace
 from bayesplate.plate.terms import Parity
 
 PLACE = ModePlace(Parity(0, 0), 0, 1.0)
-N_EVERY = 9
+N_MODES = 9
 READ = [0, 1, 2, 4, 5, 7]
 """Modes that left a peak; the last one of the others lies far above the highest."""
 MISSED, SPURIOUS = 0.2, 0.02
@@ -33,8 +33,8 @@ MISSED, SPURIOUS = 0.2, 0.02
 
 def peaked(rng, readings, labels=READ, confidence=(0.0,) * 6, spacing=0.3) -> Baseline:
     """A baseline of nine modes, whose readings (ln f) have labels that the card does not state."""
-    whole = baseline(rng, N_EVERY, spacing=spacing)
-    order = [*labels, *(i for i in range(N_EVERY) if i not in labels)]
+    whole = baseline(rng, N_MODES, spacing=spacing)
+    order = [*labels, *(i for i in range(N_MODES) if i not in labels)]
     board = baseline(rng, len(labels)).board
     (setup,) = board.setups
     told = tuple(
@@ -42,23 +42,23 @@ def peaked(rng, readings, labels=READ, confidence=(0.0,) * 6, spacing=0.3) -> Ba
         for i, (one, at, known) in enumerate(zip(setup.readings, readings, confidence, strict=True))
     )
     setup = replace(setup, readings=told, missed=MISSED, spurious=SPURIOUS)
-    others = tuple(OtherMode(PLACE, (20 + i, 0)) for i in range(N_EVERY - len(labels)))
-    model = SimpleNamespace(setup=setup, others=others, residues=None, every_place=(PLACE,) * N_EVERY)
+    others = tuple(OtherMode(PLACE, (20 + i, 0)) for i in range(N_MODES - len(labels)))
+    model = SimpleNamespace(setup=setup, other_modes=others, residues=None, mode_places=(PLACE,) * N_MODES)
     every = PossibleModes(
         log_frequency=whole.log_frequency[order],
         slopes=whole.slopes[order],
         input_slopes=whole.input_slopes[order],
-        places=((PLACE,) * N_EVERY,),
+        places=((PLACE,) * N_MODES,),
         inputs=np.zeros(0),
         peaks=(PeakLikelihood.of(model),),
-        predict=lambda x: whole.every.predict(x)[:, order],
+        predict=lambda x: whole.possible_modes.predict(x)[:, order],
     )
     return Baseline(
         board=replace(board, setups=(setup,)),
         values=whole.values,
         log_rigidities=whole.log_rigidities,
         log_readings=np.asarray(readings),
-        every=every,
+        possible_modes=every,
         rows=np.arange(len(labels)),
         symmetry=whole.symmetry,
     )
@@ -66,7 +66,7 @@ def peaked(rng, readings, labels=READ, confidence=(0.0,) * 6, spacing=0.3) -> Ba
 
 def enumerated(base: Baseline) -> float:
     """ln of the evidence of no effect at a known noise, flat in the constants: over all sets of rising pairs."""
-    every, readings = base.every, base.residual + base.log_frequency
+    every, readings = base.possible_modes, base.residual + base.log_frequency
     peaks = np.argsort(readings)
     modes = np.argsort(every.log_frequency)[:-1]  # the last one is above all peaks
     logs = []
@@ -88,7 +88,7 @@ def enumerated(base: Baseline) -> float:
 
 def noisy(rng, spoilt=0.0, **stated):
     """Readings of the planted modes with noise; the third one off by so much."""
-    middle = baseline(np.random.default_rng(3), N_EVERY).log_frequency[READ]
+    middle = baseline(np.random.default_rng(3), N_MODES).log_frequency[READ]
     readings = middle + NOISE * rng.standard_normal(len(READ))
     readings[2] += spoilt
     return peaked(np.random.default_rng(3), readings, **stated)
@@ -112,20 +112,20 @@ def test_the_evidence_is_summed_over_all_assignments(spoilt, below, above):
 
 def with_every(none):
     """No effect on any of the nine modes."""
-    return replace(none, table=no_effect_cells(N_EVERY))
+    return replace(none, table=no_effect_cells(N_MODES))
 
 
 def planted():
     """A board whose third peak is the fourth mode, moved down by an effect to where the third one is expected."""
     rng = np.random.default_rng(11)
-    direction = 0.02 * rng.standard_normal(N_EVERY)
+    direction = 0.02 * rng.standard_normal(N_MODES)
     direction[3] = -0.3
     labels = [0, 1, 2, 4, 5, 7]
     truth = [0, 1, 3, 4, 5, 7]
-    whole = baseline(np.random.default_rng(3), N_EVERY)
+    whole = baseline(np.random.default_rng(3), N_MODES)
     readings = (whole.log_frequency + direction)[truth] + 0.3 * NOISE * rng.standard_normal(6)
     base = peaked(np.random.default_rng(3), readings, labels)
-    order = [*labels, *(i for i in range(N_EVERY) if i not in labels)]
+    order = [*labels, *(i for i in range(N_MODES) if i not in labels)]
     one = candidate(replace_all(base), "a", direction[order])
     levels = one_level(base)
     none = bare(base, levels)
@@ -137,18 +137,18 @@ def replace_all(base: Baseline) -> Baseline:
     """A baseline of all modes, for an effect that acts on all of them."""
     return replace(
         base,
-        board=baseline(np.random.default_rng(3), N_EVERY).board,
-        log_readings=base.every.log_frequency,
-        every=replace(base.every, peaks=(None,)),
-        rows=np.arange(N_EVERY),
+        board=baseline(np.random.default_rng(3), N_MODES).board,
+        log_readings=base.possible_modes.log_frequency,
+        possible_modes=replace(base.possible_modes, peaks=(None,)),
+        rows=np.arange(N_MODES),
     )
 
 
 def test_each_hypothesis_has_the_labels_that_it_makes_likely():
     ground, truth = planted()
     found = with_own_labels(ground)
-    assert found.hypotheses[1].own.rows.tolist() == truth
-    assert found.hypotheses[0].own.rows[2] != truth[2]
+    assert found.hypotheses[1].baseline.rows.tolist() == truth
+    assert found.hypotheses[0].baseline.rows[2] != truth[2]
 
 
 def test_labels_are_those_of_the_weighted_draws_whichever_way_estimates_most(monkeypatch):
@@ -160,7 +160,7 @@ def test_labels_are_those_of_the_weighted_draws_whichever_way_estimates_most(mon
     estimates = iter([0.0, honest.log_labels + 40.0])
     monkeypatch.setattr(peaks, "log_mean", lambda _: next(estimates))
     monkeypatch.setattr(peaks, "_LARGEST_DROP", 1e3)
-    assert peaks._sum_labellings(ground, ways).own.rows.tolist() == honest.own.rows.tolist() == truth
+    assert peaks._sum_labellings(ground, ways).baseline.rows.tolist() == honest.baseline.rows.tolist() == truth
 
 
 def test_certain_labels_leave_the_hypotheses_alone():
@@ -182,7 +182,7 @@ def test_a_reading_that_is_no_mode_is_left_out_of_folds():
     assert folded.ratio[0] == pytest.approx(rms[0] / rms[1])
     gains = log_score_gains(ground, base.residual, np.array([0, 0, 1, 0, 0, 0]))
     alone = np.log(6 * SPURIOUS) + base.log_readings[2] - base.log_readings.max()
-    given_the_others = log_score(ground, 0, base.residual, carried=np.flatnonzero(kept))
+    given_the_others = log_score(ground, 0, base.residual, carrying_readings=np.flatnonzero(kept))
     assert gains[2] == pytest.approx(alone - given_the_others)
     assert log_score_gains(ground, base.residual, np.zeros(6, dtype=int))[2] == 0.0
 
@@ -190,7 +190,7 @@ def test_a_reading_that_is_no_mode_is_left_out_of_folds():
 @pytest.mark.parametrize("confidence", [0.0, 0.9])
 def test_labels_are_exchanged_only_where_all_are_certain(confidence):
     """Elsewhere the sum over assignments does it, and two exchanges would be one explanation."""
-    near = baseline(np.random.default_rng(3), N_EVERY, spacing=0.05, parities=[(i % 2, 0) for i in range(N_EVERY)])
+    near = baseline(np.random.default_rng(3), N_MODES, spacing=0.05, parities=[(i % 2, 0) for i in range(N_MODES)])
     assert len(confusable_labels(near)) > 1
     doubted = peaked(np.random.default_rng(3), near.log_frequency[READ], confidence=(confidence,) * 6, spacing=0.05)
     assert not confusable_labels(doubted)
@@ -200,8 +200,8 @@ def test_the_sum_counts_sure_readings_once():
     """Readings whose label is certain enter with their own density, the others by their assignments."""
     base = noisy(np.random.default_rng(5), confidence=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     noise = np.full((3, 1), NOISE)
-    there = base.every.log_frequency + 0.003 * np.random.default_rng(2).standard_normal((3, N_EVERY))
+    there = base.possible_modes.log_frequency + 0.003 * np.random.default_rng(2).standard_normal((3, N_MODES))
     sure = norm.logpdf(base.log_readings[0], there[:, 0], NOISE)
-    others = base.every.peaks[0].log_likelihood(there, noise[:, 0])
+    others = base.possible_modes.peaks[0].log_likelihood(there, noise[:, 0])
     assert np.abs(sure).min() > 1.0
     assert log_likelihood_summed(base, there, noise) == pytest.approx(sure + others)

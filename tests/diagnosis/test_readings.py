@@ -22,11 +22,11 @@ def test_the_reading_that_is_wrong_is_named(mode, size, side):
     found = found_of(0.3 * NOISE * np.random.default_rng(2).standard_normal(8) + size * np.eye(8)[mode])
     label, hertz = found.ground.baseline.board.setups[0].labels[mode], 60.0 * np.exp(0.3 * mode)
     (told,) = suspect_readings(found)
-    assert told.off == pytest.approx(size, rel=0.2)
+    assert told.offset == pytest.approx(size, rel=0.2)
     assert wrong_reading(found) == (
         f"Read {label} again: without it the other readings agree with the model (p = {told.p_value:.3f}). It was read "
-        f"as {hertz:.6g} Hz, {1200 / np.log(2) * abs(told.off):.0f} cents {side} the {hertz * np.exp(-told.off):.4g} "
-        "Hz that they let expect."
+        f"as {hertz:.6g} Hz, {1200 / np.log(2) * abs(told.offset):.0f} cents {side} the "
+        f"{hertz * np.exp(-told.offset):.4g} Hz that they let expect."
     )
 
 

@@ -88,19 +88,19 @@ def test_the_null_control_finds_little_where_there_is_nothing_and_sees_what_ther
     ground, one = small
     rng = np.random.default_rng(6)
     calm = null_control(ground, rng, 1000)
-    assert calm.against.shape == (1000,)
+    assert calm.log_odds.shape == (1000,)
     assert calm.ratio is None
-    assert calm.flagged <= FALSE_ALARMS
+    assert calm.flagged_share <= FALSE_ALARMS
     there = run_search(ground, 1.5 * visible_of(one) + 0.001 * rng.standard_normal(6))
-    assert there.against_none == pytest.approx(np.log(there.probability[1] / there.probability[0]))
-    assert calm.percentile_of(there.against_none) > 95.0
-    assert calm.percentile_of(-np.inf) == 0.0
+    assert there.log_odds == pytest.approx(np.log(there.probability[1] / there.probability[0]))
+    assert calm.log_odds_percentile(there.log_odds) > 95.0
+    assert calm.log_odds_percentile(-np.inf) == 0.0
 
 
 def test_what_is_needed_begins_at_the_false_alarm_rate_or_at_certainty():
     """Of a hundred null sets two lie above; a control full of alarms does not ask for more than a tenth's odds."""
     even = NullControl(np.linspace(-3.0, 0.0, 101), None)
-    assert np.sum(even.against > even.needed_from) == 2
+    assert np.sum(even.log_odds > even.needed_from) == 2
     assert NullControl(np.full(100, 9.0), None).needed_from == pytest.approx(np.log(9.0))
 
 
@@ -108,13 +108,13 @@ def test_fewer_null_sets_are_made_where_chance_is_certain(small):
     """Odds at the middle of the null are judged by the first hundred; what may be needed asks for all of them."""
     ground, _ = small
     whole = null_control(ground, np.random.default_rng(8), 500)
-    middle, top = np.quantile(whole.against, [0.5, 0.99])
+    middle, top = np.quantile(whole.log_odds, [0.5, 0.99])
     few = null_control(ground, np.random.default_rng(8), 500, middle)
-    assert few.against.size == len(few.residuals) == 100
-    np.testing.assert_array_equal(few.against, whole.against[:100])
+    assert few.log_odds.size == len(few.residuals) == 100
+    np.testing.assert_array_equal(few.log_odds, whole.log_odds[:100])
     assert middle < few.needed_from
-    assert null_control(ground, np.random.default_rng(8), 500, top).against.size == 500
-    assert null_control(ground, np.random.default_rng(8), 250).against.size == 250
+    assert null_control(ground, np.random.default_rng(8), 500, top).log_odds.size == 500
+    assert null_control(ground, np.random.default_rng(8), 250).log_odds.size == 250
 
 
 def test_bounds_of_a_share_are_those_of_the_binomial_distribution():
@@ -146,13 +146,13 @@ def test_null_sets_are_made_to_choose(small):
     ground, _ = small
     residuals = simulate_noise(ground.baseline, np.random.default_rng(7), 100)
     forced, free = nested_leave_one_out(ground, residuals, ANY_LOG_ODDS), nested_leave_one_out(ground, residuals)
-    assert np.all(forced.chosen == 1)
-    assert np.mean(free.chosen == 0) > 0.8
+    assert np.all(forced.choices == 1)
+    assert np.mean(free.choices == 0) > 0.8
     control = force_choices(ground, null_control(ground, np.random.default_rng(7), 100))
     np.testing.assert_allclose(control.ratio, forced.ratio)
     assert control.ratio_to_beat < 1.0 < np.quantile(control.ratio, 0.95)
     assert control.ratio_to_beat == pytest.approx(np.quantile(forced.ratio, 0.05))
-    assert control.place_of(control.ratio_to_beat) == pytest.approx(95.0, abs=1.1)
+    assert control.ratio_percentile(control.ratio_to_beat) == pytest.approx(95.0, abs=1.1)
 
 
 @pytest.mark.parametrize("change", [{"width": 0.5}, {"width": 2.0}, {"noise": 1.5}])
@@ -171,7 +171,7 @@ def test_a_variant_is_the_search_with_that_prior(change):
     usual = searched(1.0, 1.0)
     wanted = searched(change.get("width", 1.0), change.get("noise", 1.0))
     found = vary_priors(usual, **change)
-    assert found.none == pytest.approx(wanted.none, rel=0.02)
+    assert found.probability_of_none == pytest.approx(wanted.probability_of_none, rel=0.02)
     np.testing.assert_allclose(found.log_evidence, wanted.log_evidence, atol=0.05)
     assert np.abs(found.log_evidence - usual.log_evidence).max() > 0.2  # control: the prior matters
 
@@ -185,9 +185,12 @@ def test_a_name_has_to_survive_widths_and_noises(small):
         "if the noise is 1.5 times smaller", "if the noise is 1.5 times larger", "under the exact law",
     ]  # fmt: skip
     usual = [
-        vary_priors(found, **change).none
+        vary_priors(found, **change).probability_of_none
         for change in ({"width": 0.5}, {"width": 2.0}, {"noise": 2 / 3}, {"noise": 1.5})
     ]
-    assert [other.none for _, other in told[:-1]] == pytest.approx(usual)
+    assert [other.probability_of_none for _, other in told[:-1]] == pytest.approx(usual)
     assert told[-1][1] is under_exact_law(found)
-    assert len({round(other.none, 6) for _, other in told[:-1]} | {round(found.none, 6)}) == 5
+    assert (
+        len({round(other.probability_of_none, 6) for _, other in told[:-1]} | {round(found.probability_of_none, 6)})
+        == 5
+    )

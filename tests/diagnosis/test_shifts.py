@@ -59,8 +59,8 @@ def test_every_effect_on_the_cantilever_is_as_full_solves_have_it(finnish_few):
 class NoPlate(FormLaw):
     """Frequencies of an effect that leaves no plate whatever its size, as a Poisson ratio beyond what D_y allows."""
 
-    def every_log_frequency(self, baseline, log_rigidities, values):
-        return np.full((len(log_rigidities), baseline.every.log_frequency.size), np.nan)
+    def mode_log_frequencies(self, baseline, log_rigidities, values):
+        return np.full((len(log_rigidities), baseline.possible_modes.log_frequency.size), np.nan)
 
 
 def test_an_effect_that_leaves_no_plate_is_not_tried(finnish_few):
@@ -70,7 +70,7 @@ def test_an_effect_that_leaves_no_plate_is_not_tried(finnish_few):
 
     pair = ("poisson_ratio", "fluid_loading")
     for tried, left in ((pair, ["fluid_loading"]), (pair[:1], [])):
-        found = run_search(prepare_search(finnish_few.ground.baseline, solve, tried=tried))
+        found = run_search(prepare_search(finnish_few.ground.baseline, solve, effects=tried))
         assert list(found.ground.candidates) == left
         assert found.probability.sum() == pytest.approx(1.0)
 
@@ -87,7 +87,7 @@ def test_the_constants_absorb_nothing_of_what_is_tabulated(finnish_few):
     base = finnish_few.ground.baseline
     for one in finnish_few.ground.candidates.values():
         kept = np.abs(one.fine.z).max(axis=1, initial=0.0) <= 1.0
-        assert np.abs(cents(one.fine.shift[kept] @ base.absorbing.T)).max() < CENT
+        assert np.abs(cents(one.fine.shift[kept] @ base.absorption.T)).max() < CENT
 
 
 def test_the_cells_hold_the_prior(finnish_few):
@@ -107,7 +107,7 @@ def test_a_law_made_for_another_board_serves_once_its_modes_are_placed(finnish_f
     elsewhere = base.log_rigidities + np.array([0.3, -0.2, 0.1])
     values = {**base.values, **dict(zip(("D_x", "D_y", "D_s"), np.exp(elsewhere), strict=True))}
     far = replace(base, log_rigidities=elsewhere, values=values)
-    placed = form_law(far, own.laws[0].form, half_width=0.8).placed(base)
+    placed = form_law(far, own.laws[0].form, half_width=0.8).with_modes_of(base)
     assert tabulate(base, [placed]).shift == pytest.approx(own.fine.shift, abs=CENT * np.log(2) / 1200)
 
 

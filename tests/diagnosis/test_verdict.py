@@ -65,7 +65,7 @@ def test_the_decision_table(case):
     assert verdict.best == rank_explanations(found)[0]
     is_nearest = case == "the best fails the gate"
     assert verdict.nearest == (verdict.best if is_nearest else None)
-    assert verdict.fitted_again == ((verdict.best,) if is_nearest else verdict.stands_for)
+    assert verdict.refitted_explanations == ((verdict.best,) if is_nearest else verdict.explanations)
     assert sum(one.support for one in rank_explanations(found)) == pytest.approx(sum(found.probability[1:]))
 
 
@@ -184,10 +184,10 @@ def test_a_name_that_another_assumption_changes_is_a_group_with_what_it_turned_i
     stays = turned({("a",): 0.75, ("b",): 0.25})
     changes = turned({("a",): 0.70, ("b",): 0.28, ("c",): 0.02})
     assert decided(found, others=[stays]).word == "named"
-    assert decided(found, others=[stays]).stands_for == (rank_explanations(found)[0],)
+    assert decided(found, others=[stays]).explanations == (rank_explanations(found)[0],)
     told = decided(found, others=[stays, changes])
     assert (told.word, told.effects, told.index) == ("indistinguishable group", ("a", "b"), 1)
-    assert [(one.members, round(one.support, 6)) for one in told.stands_for] == [(("a",), 0.9), (("b",), 0.06)]
+    assert [(one.members, round(one.support, 6)) for one in told.explanations] == [(("a",), 0.9), (("b",), 0.06)]
     assert told.reason == "if the noise is larger b may be as probable"
     gone = turned({(): 0.2, ("c",): 0.8})
     assert decided(found, others=[gone]).effects == ("a", "c")
@@ -196,7 +196,7 @@ def test_a_name_that_another_assumption_changes_is_a_group_with_what_it_turned_i
 def test_a_name_that_has_no_support_at_all_there_is_turned_by_the_three_best():
     found = found_with({("a",): 0.9, ("b",): 0.04, ("c",): 0.06})
     told = decided(found, others=[turned({("b",): 0.06, ("c",): 0.30, SWAPPED: 0.33, PAIR: 0.31})])
-    assert [one.members for one in told.stands_for] == [("a",), SWAPPED, PAIR, ("c",)]
+    assert [one.members for one in told.explanations] == [("a",), SWAPPED, PAIR, ("c",)]
     missing = found_with({})  # which does not know of it at all
     alone = replace(missing.ground, hypotheses=missing.ground.hypotheses[2:4])
     other = replace(missing, ground=alone, probability=np.array([0.2, 0.1]))

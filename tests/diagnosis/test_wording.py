@@ -12,7 +12,7 @@ import pytest
 from diagnoses import AFTER, AIR, BEFORE, DIAGNOSES, EXCHANGE, GRAIN, NEXT, TENSION, candidate
 from read_pages import Read
 
-from bayesplate.commands.shown import show_diagnosis
+from bayesplate.commands.printout import show_diagnosis
 from bayesplate.diagnosis.result import Amplitude, ModelErrors, diagnosis_json
 from bayesplate.diagnosis.tables import (
     answers_table,
@@ -108,7 +108,7 @@ def test_the_json_has_the_values_and_nothing_that_json_lacks():
 
 def test_every_word_of_the_verdict_and_every_error_has_its_words():
     assert set(VERDICTS) == set(get_args(VerdictWord))
-    read = [one.of(ModelErrors(**{name: i for i, name in enumerate(ERRORS)})) for one in MERITS]
+    read = [one.value_of(ModelErrors(**{name: i for i, name in enumerate(ERRORS)})) for one in MERITS]
     assert read == list(range(len(fields(ModelErrors))))
 
 

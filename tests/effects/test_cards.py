@@ -84,7 +84,7 @@ IMPLIED = [
 @pytest.mark.parametrize(("board", "names"), IMPLIED)
 def test_what_a_card_implies(board, names):
     assert implied_effects(board) == names
-    assert implied_effects(replace(board, implies=False)) == ()
+    assert implied_effects(replace(board, has_implied_effects=False)) == ()
 
 
 def test_what_a_setup_states_and_cannot_have_is_a_fault_there():
@@ -156,7 +156,7 @@ def test_it_is_said_where_the_sign_of_a_grain_angle_counts_and_one_alone_is_trie
     assert is_told(at_corner)
     assert not is_told(loaded(MIDDLE, "grain_angle"))
     assert not is_told(loaded(CORNER))
-    assert not is_told(replace(at_corner, chosen=GrainAngle.forms(at_corner)[-1].effects))
+    assert not is_told(replace(at_corner, effect_forms=GrainAngle.forms(at_corner)[-1].effects))
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,7 @@ def test_of_a_mixture_its_largest_parts_are_told(coefficients, words):
 
 def test_every_component_of_a_measured_board_has_a_look():
     board = prepare("spruce-free-2L").board
-    looks = {one.name: one.look for one in board.uncertain if one.is_component}
+    looks = {one.name: one.description for one in board.uncertain if one.is_component}
 
     assert set(looks) == {"thickness_profile.field_1", "thickness_profile.field_2", "outline_profile.field_1"}
     assert looks["thickness_profile.field_1"] == "at +1 thicker at mid-length and along both sides, 0.02 mm rms"

@@ -63,4 +63,4 @@ def test_takes_what_the_card_declares():
 def test_people_call_it_air_or_water():
     for value, word in ((99.0, "air"), (997.0, "water"), (790.0, "fluid")):
         density, _ = FluidLoading(MADE, density=Quantity.exact(value)).parameters()
-        assert density.words == f"density of the {word} of fluid loading"
+        assert density.display_name == f"density of the {word} of fluid loading"

@@ -44,7 +44,7 @@ def test_the_expansion_against_the_field_itself(kind, least, most):
     board = read_as_on_the_measured_boards()
     effect = ThicknessProfile.of(board, board.setups[0])
     profile, worst = effect.profile, 0.0
-    assert (len(profile.components), effect.goes_with) == (2, ("thickness",))
+    assert (len(profile.components), effect.followed_inputs) == (2, ("thickness",))
     for steps in ((2.0, 2.0, 2.0), (-2.0, 2.0, 2.0), (2.0, -2.0, 2.0)):
         thick = replace(FREE, h=profile.mean + steps[0] * profile.mean_sd)
         parameters = {f"thickness_profile.field_{k}": one for k, one in enumerate(steps[1:], start=1)}
@@ -60,7 +60,7 @@ def times(surface, factor):
 
 def added(profile, steps):
     """The profile moved by steps of what is open."""
-    rows = [profile.expected, *(times(one, step) for one, step in zip(profile.open, steps, strict=True))]
+    rows = [profile.expected, *(times(one, step) for one, step in zip(profile.uncertain_changes, steps, strict=True))]
     return Surface(profile.expected.degrees, tuple(np.sum([one.coefficients for one in rows], axis=0)))
 
 
@@ -85,9 +85,9 @@ def with_its_mean():
     """A board whose field goes with its mean alone, and three times as much as the readings say."""
     prepared = prepare("spruce-free-2R", ["thickness_profile"])
     effect = ThicknessProfile.of(prepared.board, prepared.board.setups[0])
-    profile = replace(effect.profile, components=(), with_mean=times(effect.profile.with_mean, 3.0))
+    profile = replace(effect.profile, components=(), mean_gain=times(effect.profile.mean_gain, 3.0))
     parameters = tuple(one for one in prepared.board.parameters if not one.is_of_effect)
-    board = replace(prepared.board, parameters=parameters, chosen=(replace(effect, profile=profile),))
+    board = replace(prepared.board, parameters=parameters, effect_forms=(replace(effect, profile=profile),))
     return pose(board, prepared.prior)
 
 

@@ -74,7 +74,7 @@ def hertz(plate: Plate, board: Board, effects: Sequence[str]) -> np.ndarray:
     at = {name: np.asarray(value) for name, value in values.items()}
     system = system_of(declared, declared.setups[0])
     plate_at = system.plate(at)
-    squares = solve(plate_at, system.weights(at).at(0), N_MODES + plate_at.n_beside).eigenvalues
+    squares = solve(plate_at, system.weights(at).at(0), N_MODES + plate_at.n_coordinates).eigenvalues
     return np.sqrt(squares) / (2.0 * np.pi)
 
 

@@ -76,7 +76,7 @@ def test_three_modes_that_leave_a_constant_open_name_it_and_what_would_help(hert
     assert "D_x (so" not in message
     assert "condition number" in message
     _, as_advised = remarks_of(cantilever(hertz, (0, 0), (0, 1), (1, 1), (0, 2)))
-    assert as_advised.blind() == ()
+    assert as_advised.undetermined_constants() == ()
 
 
 def test_of_several_setups_each_is_named_with_its_modes(hertz):
@@ -109,7 +109,7 @@ def test_of_constants_that_are_open_together_one_at_least_is_named():
     unseen = np.array([np.cos(0.7), np.sin(0.7), 0.0])
     seen = 0.5 * (np.eye(3) - np.outer(unseen, unseen))
     found = identifiability(seen, np.full(3, 0.003))
-    assert found.blind()
+    assert found.undetermined_constants()
     assert (found.errors_beside_known > np.log(2.0) / 1.96).any()
 
 
@@ -186,14 +186,14 @@ def test_leverages_and_errors_are_those_of_linear_regression():
     assert found.leverages == pytest.approx(np.diagonal(weighted @ inverse @ weighted.T), rel=1e-9)
     assert found.leverages.sum() == pytest.approx(3.0)
     assert found.condition_number == pytest.approx(np.linalg.cond(weighted))
-    assert found.blind() == ()
+    assert found.undetermined_constants() == ()
 
 
 @pytest.mark.parametrize(("factor", "blind"), [(1.9, ()), (2.1, ("D_s",))])
 def test_blind_is_what_stays_within_no_factor_of_two(factor, blind):
     """Three modes, each of one constant: the 95 % interval of D_s is the estimate times and over the factor."""
     scales = np.array([0.01, 0.01, 0.5 * np.log(factor) / 1.959964])
-    assert identifiability(0.5 * np.eye(3), scales).blind() == blind
+    assert identifiability(0.5 * np.eye(3), scales).undetermined_constants() == blind
 
 
 def test_a_direction_that_no_mode_sees_is_infinitely_uncertain():

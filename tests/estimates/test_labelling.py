@@ -35,7 +35,7 @@ def test_labels_are_given_from_the_least_probability_on(likelihood):
     model, peaks = likelihood
     shares = np.zeros(peaks.log_prior.shape)
     names = [str(label) for label in peaks.labels]
-    order = [int(i) for i in peaks.bare]
+    order = [int(i) for i in peaks.unlabelled]
     shares[order.index(0), names.index("(2,2)")] = 0.8
     shares[order.index(1), names.index("(3,1)")] = 0.55
 
@@ -56,7 +56,7 @@ def test_a_doubtful_label_that_stays_is_no_other_peaks():
     first, second = (peaks.labels.index(one.label) for one in doubtful)
     shares = np.zeros(peaks.log_prior.shape)
     shares[list(peaks.readings).index(1), first] = 0.8
-    shares[list(peaks.bare).index(0), second] = 0.9
+    shares[list(peaks.unlabelled).index(0), second] = 0.9
 
     labels = [one.label for one in label_likely_peaks(setup, peaks, shares, 0.5).readings]
     assert labels == [one.label for one in setup.readings]
@@ -86,8 +86,8 @@ def test_a_peak_below_all_open_modes_has_one_all_the_same():
     """Above the highest peak, far from it: whoever asks what the peak may be has something to look at."""
     setup = replace(setup_of(ritz.ALL_FREE, {beams: HERTZ[beams] for beams in FREE_LABELS}), peaks=peaks_of(40.0))
     model = with_other_modes(setup_model(system_of(BOARD, setup), VALUES), VALUES)
-    assert len(model.others) == 1
-    assert np.exp(model.every_log_frequency(VALUES, "linear")[0, -1]) > max(HERTZ.values())
+    assert len(model.other_modes) == 1
+    assert np.exp(model.mode_log_frequencies(VALUES, "linear")[0, -1]) > max(HERTZ.values())
 
 
 def test_a_model_labelled_anew_has_the_same_frequencies(likelihood):
@@ -97,8 +97,8 @@ def test_a_model_labelled_anew_has_the_same_frequencies(likelihood):
     setup = label_likely_peaks(model.setup, peaks, shares, 0.5)
     again = model.labelled_as(setup)
     values = {**VALUES, "D_x": 120.0, "D_y": 9.0, "D_s": 26.0}
-    before = dict(zip(model.every_beams, model.every_log_frequency(values, "linear")[0], strict=True))
-    after = dict(zip(again.every_beams, again.every_log_frequency(values, "linear")[0], strict=True))
+    before = dict(zip(model.mode_beams, model.mode_log_frequencies(values, "linear")[0], strict=True))
+    after = dict(zip(again.mode_beams, again.mode_log_frequencies(values, "linear")[0], strict=True))
 
     assert after == before
-    assert [reading.beams for reading in setup.readings] == list(again.every_beams[:6])
+    assert [reading.beams for reading in setup.readings] == list(again.mode_beams[:6])

@@ -55,7 +55,7 @@ def test_the_paper_s_table_is_reproduced(systems, name):
 def test_the_trimming_makes_the_spread(systems):
     """Of the positive estimates of the cantilever board, untrimmed: 24, 112 and 41 %, against 2.7, 1.9 and 4.0."""
     found = percentile_estimate(systems["finnish-spruce-cantilever"])
-    for column, kept, name in zip(found.estimates.T, found.kept.T, MODULI, strict=True):
+    for column, kept, name in zip(found.estimates.T, found.is_kept.T, MODULI, strict=True):
         positive = column[column > 0]
         assert positive.std(ddof=1) / positive.mean() > 8 * found.sd[name] / found.mean[name]
         assert abs(kept.sum() - 0.6 * positive.size) <= 1.5  # three fifths of the values, to the two at the ends
@@ -94,7 +94,7 @@ def test_only_positive_estimates_between_the_percentiles_are_kept():
         made_system(coefficients @ [30.0, 0.2, 6.0] * (1 + 0.1 * rng.normal(size=6)), coefficients)
     )
     assert (found.estimates < 0).any()
-    for column, kept, name in zip(found.estimates.T, found.kept.T, MODULI, strict=True):
+    for column, kept, name in zip(found.estimates.T, found.is_kept.T, MODULI, strict=True):
         ranked = np.sort(column[column > 0])
         ranks = (np.arange(1, ranked.size + 1) - 0.5) / ranked.size  # midpoint definition
         low, high = np.interp([0.2, 0.8], ranks, ranked)

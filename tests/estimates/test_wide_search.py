@@ -73,7 +73,7 @@ def test_tables_err_by_less_than_the_noise(found):
             model = setup_model(system_of(board, named), values)
             tabled = table(x[:2] - x[2:])[0] + 0.5 * x[2]
             there = tabled[[of_place[place.parity, place.rank] for place in model.places]]
-            assert np.abs(there - model.every_log_frequency(values, "linear")[0]).max() < noise, noise
+            assert np.abs(there - model.mode_log_frequencies(values, "linear")[0]).max() < noise, noise
 
 
 def test_a_prior_without_a_plate_leaves_nothing_to_guess(monkeypatch):

@@ -116,7 +116,7 @@ def found_pairs(one: Told) -> list[np.ndarray]:
     """The probabilities of all pairs: of those that are near none, zero."""
     assignments = one.assignments
     result = [np.zeros(each.shape) for each in one.log_pair]
-    for whole, near, pairs in zip(result, assignments.near, assignments.pairs(), strict=True):
+    for whole, near, pairs in zip(result, assignments.near_peaks, assignments.pairs(), strict=True):
         whole[near.pairs()] = pairs
     return result
 

@@ -45,7 +45,7 @@ def reading(beams, hertz, sign="", confidence=1.0) -> Reading:
 def model_of(setup: Setup, residues=None, beams=BEAMS) -> SimpleNamespace:
     labelled = [one.beams for one in setup.readings]
     others = tuple(OtherMode(PLACE, one) for one in beams if one not in labelled)
-    return SimpleNamespace(setup=setup, others=others, residues=residues, every_place=(PLACE,) * len(beams))
+    return SimpleNamespace(setup=setup, other_modes=others, residues=residues, mode_places=(PLACE,) * len(beams))
 
 
 def every_of(setup: Setup, modes=MODES):

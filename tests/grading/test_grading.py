@@ -178,8 +178,8 @@ def test_limits_are_met_with_the_share_of_the_draws_that_lie_within(values):
     }
 
     for name, inside in within.items():
-        assert graded.meets[name][0] == pytest.approx(inside.mean(), abs=0.01)
-    assert graded.meets_all[0] == pytest.approx((within["E_x"] & within["density"]).mean(), abs=0.01)
+        assert graded.limit_probabilities[name][0] == pytest.approx(inside.mean(), abs=0.01)
+    assert graded.all_limits_probability[0] == pytest.approx((within["E_x"] & within["density"]).mean(), abs=0.01)
 
 
 def test_tables_for_people_and_for_sheets(values, tmp_path):

@@ -97,7 +97,8 @@ def read_as(taken):
         at_hand = ReadingsAtHand(100.0 + every[None], 0.5 * every[None, :, None], every)
     one = ExplanationTerms(
         members=(), words="", probability=1.0, mean=np.zeros((1, 1)), covariance=np.eye(1)[None],
-        noise=np.full((1, 2), FIRST), middle=np.zeros((1, 0)), wanted=np.zeros((1, 0, 1)), again=at_hand,
+        noise=np.full((1, 2), FIRST), middle=np.zeros((1, 0)), target_slopes=np.zeros((1, 0, 1)),
+        readings_at_hand=at_hand,
     )  # fmt: skip
     solved = np.arange(2.0 * (N + 1)).reshape(2, -1)
     station = SimpleNamespace(base=SETUP, n_old=N)
@@ -143,6 +144,6 @@ def test_what_an_explanation_with_other_labels_takes_each_reading_for(rows, take
     found = _readings_at_hand(own, base, 10.0 + np.arange(8.0)[None], np.arange(8.0)[None, :, None])
 
     expected = np.where(np.isin(np.arange(8), none), np.nan, 10.0 + np.arange(8.0))
-    assert found.taken.tolist() == taken
+    assert found.reading_index.tolist() == taken
     assert found.shift[0] == pytest.approx(expected, nan_ok=True)
     assert np.delete(found.slopes[0, :, 0], none) == pytest.approx(np.delete(np.arange(8.0), none))

@@ -35,13 +35,14 @@ def found_of(whole, directions, residual, n):
     """A search of the first n modes. Cells of both boards leave the constants where they are, so that they agree."""
     (setup,) = whole.board.setups
     every = replace(
-        whole.every, log_frequency=whole.every.log_frequency[:n], slopes=whole.every.slopes[:n],
-        input_slopes=whole.every.input_slopes[:n], places=(whole.every.places[0][:n],),
-        predict=lambda x: whole.every.predict(x)[:, :n],
+        whole.possible_modes,
+        log_frequency=whole.possible_modes.log_frequency[:n], slopes=whole.possible_modes.slopes[:n],
+        input_slopes=whole.possible_modes.input_slopes[:n], places=(whole.possible_modes.places[0][:n],),
+        predict=lambda x: whole.possible_modes.predict(x)[:, :n],
     )  # fmt: skip
     base = replace(
         whole, board=replace(whole.board, setups=(replace(setup, readings=setup.readings[:n]),)),
-        log_readings=(whole.middle + residual)[:n], every=every, rows=np.arange(n),
+        log_readings=(whole.middle + residual)[:n], possible_modes=every, rows=np.arange(n),
     )  # fmt: skip
     candidates = {name: unmoved(made.candidate(base, name, d[:n]), d[:n]) for name, d in directions.items()}
     levels = noise_grid(base.board)
@@ -94,7 +95,9 @@ def test_probabilities_now_are_those_of_the_search(boards):
     beliefs = believed(found, NAMES)
 
     by_name = {one.members: one.probability for one in beliefs.explanations}
-    assert by_name == pytest.approx({(): found.none} | {(name,): found.inclusion(name) for name in NAMES})
+    assert by_name == pytest.approx(
+        {(): found.probability_of_none} | {(name,): found.inclusion(name) for name in NAMES}
+    )
     assert beliefs.entropy == pytest.approx(-sum(p * np.log(p) for p in by_name.values()))
 
 
@@ -107,7 +110,10 @@ def test_after_further_modes_they_are_those_of_a_search_that_has_them(boards):
 
     after = probabilities_after(beliefs, readings, read)[:, 0]
 
-    wanted = [whole.none if not one.members else whole.inclusion(one.members[0]) for one in beliefs.explanations]
+    wanted = [
+        whole.probability_of_none if not one.members else whole.inclusion(one.members[0])
+        for one in beliefs.explanations
+    ]
     assert after == pytest.approx(wanted, abs=0.03)
     without = tuple(np.where(np.arange(one.shape[2]) < len(RIGIDITIES), one, 0.0) for one in readings.slopes)
     control = replace(readings, shift=tuple(np.zeros_like(one) for one in readings.shift), slopes=without)
@@ -122,7 +128,7 @@ def test_moduli_have_the_variance_of_the_weighted_fit_without_an_effect(boards):
 
     slopes = found.ground.baseline.slopes
     wanted = [np.linalg.inv(slopes.T @ slopes) * noise[0] ** 2 for noise in one.noise]
-    drawn = one.wanted @ one.covariance @ np.swapaxes(one.wanted, 1, 2)
+    drawn = one.target_slopes @ one.covariance @ np.swapaxes(one.target_slopes, 1, 2)
     assert np.diagonal(drawn, axis1=1, axis2=2)[:, 2] == pytest.approx([w[2, 2] for w in wanted], rel=1e-6)
 
 
@@ -147,9 +153,9 @@ def test_the_readings_at_hand_are_expected_where_the_search_has_them(boards):
     found = boards[0][N_READ]
     read = found.residual + found.ground.baseline.middle
     for one in believed(found, NAMES).explanations:
-        expected = one.again.shift + np.einsum("tru,tu->tr", one.again.slopes, one.mean)
-        pull = np.einsum("tru,tr->tu", one.again.slopes, (read - expected) / one.noise**2)
-        assert list(one.again.taken) == list(range(N_READ))
+        expected = one.readings_at_hand.shift + np.einsum("tru,tu->tr", one.readings_at_hand.slopes, one.mean)
+        pull = np.einsum("tru,tr->tu", one.readings_at_hand.slopes, (read - expected) / one.noise**2)
+        assert list(one.readings_at_hand.reading_index) == list(range(N_READ))
         # normal equations: what is left over does not lean on the constants, whose prior is flat
         assert pull[:, : len(RIGIDITIES)] == pytest.approx(
             0.0, abs=1e-6 * np.abs(read - expected).max() / made.NOISE**2

@@ -23,7 +23,7 @@ def explanation(mean=0.0, probability=1.0, variance=(4.0, 1.0, 0.25), n_terms=1,
     return ExplanationTerms(
         members=(words,), words=words, probability=probability, mean=means,
         covariance=np.tile(np.diag(variance), (n_terms, 1, 1)), noise=np.full((n_terms, 1), SIGMA),
-        middle=np.zeros((n_terms, 3)), wanted=np.tile(np.eye(3), (n_terms, 1, 1)),
+        middle=np.zeros((n_terms, 3)), target_slopes=np.tile(np.eye(3), (n_terms, 1, 1)),
     )  # fmt: skip
 
 
@@ -135,4 +135,4 @@ def test_a_score_is_what_was_asked_for():
 
 def with_one_more(one):
     """The same with the first constant, under another name, before the three."""
-    return replace(one, middle=one.middle[:, [0, 0, 1, 2]], wanted=one.wanted[:, [0, 0, 1, 2]])
+    return replace(one, middle=one.middle[:, [0, 0, 1, 2]], target_slopes=one.target_slopes[:, [0, 0, 1, 2]])

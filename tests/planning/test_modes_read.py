@@ -30,7 +30,7 @@ def with_effect(monkeypatch, mean, solved):
     one = ExplanationTerms(
         members=("made",), words="", probability=1.0, mean=mean, noise=np.ones((n_terms, 1)),
         covariance=np.tile(0.01 * np.eye(n_u), (n_terms, 1, 1)), middle=np.zeros((n_terms, 0)),
-        wanted=np.zeros((n_terms, 0, n_u)), forms=(form,),
+        target_slopes=np.zeros((n_terms, 0, n_u)), forms=(form,),
     )  # fmt: skip
     monkeypatch.setattr(home, "_form_shift", solved)
     known = SimpleNamespace(board=SimpleNamespace(symmetry=SimpleNamespace(n=1)))

@@ -15,7 +15,7 @@ from bayesplate.planning.proposals import Planner, Proposal
 
 NOW = ExplanationTerms(
     members=(), words="made", probability=1.0, mean=np.zeros((1, 3)), covariance=np.eye(3)[None],
-    noise=np.full((1, 1), 0.1), middle=np.zeros((1, 3)), wanted=np.eye(3)[None],
+    noise=np.full((1, 1), 0.1), middle=np.zeros((1, 3)), target_slopes=np.eye(3)[None],
 )  # fmt: skip
 PLANNER = Planner(Beliefs((SimpleNamespace(board=SimpleNamespace(symmetry=ORTHOTROPIC)),), (NOW,)), 1)
 

@@ -76,9 +76,9 @@ def test_of_a_mode_that_has_lost_its_name_nothing_is_told(free):
     found = SolvedStation.of(free[0], board(FREE), VALUES)
     lost = replace(found, rows=[-1, *found.rows[1:]])
 
-    assert found.bare_and_added.shape == (1 + len(free[0].spots), len(free[0].setup.labels))
-    assert np.isnan(lost.bare_and_added[:, 0]).all()
-    np.testing.assert_array_equal(lost.bare_and_added[:, 1:], found.bare_and_added[:, 1:])
+    assert found.log_hertz_and_mass_shifts.shape == (1 + len(free[0].spots), len(free[0].setup.labels))
+    assert np.isnan(lost.log_hertz_and_mass_shifts[:, 0]).all()
+    np.testing.assert_array_equal(lost.log_hertz_and_mass_shifts[:, 1:], found.log_hertz_and_mass_shifts[:, 1:])
 
 
 def test_on_the_mesh_for_other_values_the_sides_serve_again_and_the_modes_are_the_same(free):
@@ -90,16 +90,18 @@ def test_on_the_mesh_for_other_values_the_sides_serve_again_and_the_modes_are_th
     of_first, of_own, of_again = ((one.modes.plate.x, one.modes.plate.y) for one in (first, own, again))
     assert all(one is other for one, other in zip(of_first, of_again, strict=True))
     assert [side.nodes.size for side in of_own] != [side.nodes.size for side in of_first]
-    np.testing.assert_allclose(again.bare_and_added, own.bare_and_added, atol=4e-4)  # either mesh is within 0.02 %
-    assert np.abs(again.bare_and_added - first.bare_and_added).max() > 0.1
+    np.testing.assert_allclose(
+        again.log_hertz_and_mass_shifts, own.log_hertz_and_mass_shifts, atol=4e-4
+    )  # either mesh is within 0.02 %
+    assert np.abs(again.log_hertz_and_mass_shifts - first.log_hertz_and_mass_shifts).max() > 0.1
 
 
 def test_of_several_sessions_only_the_last_goes_on():
     held, made = held_on_days("monday", "friday", "sunday"), board(FREE)
     held = replace(held, setups=(*held.setups, setup_of(CLAMPED, {(0, 0): 90.0}, name="clamped")))
 
-    assert [one.setup.name for one in stations(held, VALUES) if one.goes_on(held)] == ["sunday", "clamped"]
-    assert all(one.goes_on(made) for one in stations(made, VALUES))
+    assert [one.setup.name for one in stations(held, VALUES) if one.takes_readings(held)] == ["sunday", "clamped"]
+    assert all(one.takes_readings(made) for one in stations(made, VALUES))
 
 
 def test_a_mode_that_no_session_read_departs_from_the_plate_as_one_that_was_read_does():
@@ -110,7 +112,7 @@ def test_a_mode_that_no_session_read_departs_from_the_plate_as_one_that_was_read
     days = tuple(replace(one, readings=(*one.readings, new)) for one in held.setups)
     read = with_discrepancies(replace(held, setups=days))
     at = read.nominal() | VALUES
-    slopes = bare_law(read, next(one for one in old_stations(read, at) if one.goes_on(read)), at).slopes[0]
+    slopes = bare_law(read, next(one for one in old_stations(read, at) if one.takes_readings(read)), at).slopes[0]
     column = 3 + [one.key for one in read.uncertain].index(f"discrepancy {new.label}")
 
     unknown = unknown_discrepancy_variance(held, station.setup)
@@ -124,7 +126,7 @@ def test_planned_readings_carry_it(monkeypatch):
     held = held_on_days("monday", "friday")
     believed = prior_beliefs(held, load_prior("spruce"), np.random.default_rng(1))
     (known,) = believed.boards
-    law = next(one for one in known.laws if one.station.goes_on(held))
+    law = next(one for one in known.laws if one.station.takes_readings(held))
     last, further = law.station, station_readings(believed, known, law, np.random.default_rng(1)).further
     noise = believed.explanations[0].noise[:, 1] ** 2
 
@@ -166,7 +168,7 @@ def test_a_known_mass_off_its_place_adds_as_much_more_or_less_as_the_independent
     along = loaded(made, (x + wide, y)) - loaded(made, (x - wide, y))
     across = loaded(made, (x, y + wide)) - loaded(made, (x, y - wide))
 
-    off_place = free_law.off_place[-1, : len(READ)]
+    off_place = free_law.mass_shift_sd[-1, : len(READ)]
     assert off_place == pytest.approx(np.hypot(along, across) / 6.0, rel=0.1)
     relative = off_place / np.abs(free_law.solved[len(station.spots), : len(READ)])
     assert relative.max() > 2.0 * relative.min()

@@ -195,9 +195,9 @@ def test_a_magnet_that_bounces_takes_no_name_from_the_board():
     independent = generated(DRIVEN, [GeneratorExciter.at_resonance(38.6, 48e-3, at)], 8)
     table = correlations(independent, ("clamped",) * 4)[:2, 0]
     (parity,) = set(modes.parities[:2])
-    both = modes.by_class[parity].of([0, 1])
-    parts, squares = beam_parts(both.own, both.vectors)
-    column = both.own.plate.elastic_products[parity].index((0, 0))
+    both = modes.by_class[parity].at_ranks([0, 1])
+    parts, squares = beam_parts(both.symmetry_class, both.vectors)
+    column = both.symmetry_class.plate.elastic_products[parity].index((0, 0))
     own, whole = (
         product_fits(parts[:, [column]], np.diagonal(squares), share) for share in (both.on_plate, np.ones(2))
     )

@@ -108,14 +108,18 @@ def bump(x, y):
     return np.exp(x * y) + 0.3 * np.sin(3.0 * x + y)
 
 
-PLACE, BESIDE = PointMotion(((1.0, 0.3, 0.8), (-2.0, 0.9, 0.1))), PointMotion(((-1.0, 0.2, 0.2),), beside=1)
+PLACE, BESIDE = PointMotion(((1.0, 0.3, 0.8), (-2.0, 0.9, 0.1))), PointMotion(((-1.0, 0.2, 0.2),), coordinate=1)
 FURTHER = (
     PlateTerm(("slope_x", "slope_x")),
     EdgeTerm(0, (True, True), "w"),
     EdgeTerm(1, (True, True), "turn_y"),
-    PointTerm(((1.0, BESIDE, BESIDE), (0.5, PLACE, PointMotion(beside=0)))),
+    PointTerm(((1.0, BESIDE, BESIDE), (0.5, PLACE, PointMotion(coordinate=0)))),
 )
-HEAVY = (PointTerm(((0.3, PLACE, PLACE), (1.0, PointMotion(beside=0), PointMotion(beside=0)), (1.0, BESIDE, BESIDE))),)
+HEAVY = (
+    PointTerm(
+        ((0.3, PLACE, PLACE), (1.0, PointMotion(coordinate=0), PointMotion(coordinate=0)), (1.0, BESIDE, BESIDE))
+    ),
+)
 
 
 def varied(kinematics, is_split):
@@ -138,7 +142,7 @@ def test_the_pencil_of_a_class_is_its_terms_on_every_unknown(kinematics, is_spli
     plate = varied(kinematics, is_split)
     weights = some_weights(plate)
     assert len(plate.classes) == (4 if is_split else 1)
-    assert plate.n_beside == 2
+    assert plate.n_coordinates == 2
     for own in plate.classes:
         for found, expected in zip(dense(own, weights), whole(own, weights), strict=True):
             np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
@@ -168,7 +172,7 @@ def test_what_the_masses_give_to_coordinates_beside_the_plate():
     vectors = np.zeros((own.n_dof, 2))
     vectors[own.n_on_plate :] = [[1.0, 2.0], [3.0, 4.0]]
 
-    found = own.project_beside(vectors)
+    found = own.project_coordinates(vectors)
 
     np.testing.assert_array_equal(found[:-1], 0.0)
     np.testing.assert_allclose(found[-1], [[1.0 + 9.0, 2.0 + 12.0], [14.0, 4.0 + 16.0]])

@@ -219,7 +219,7 @@ def test_a_loaded_or_sprung_beam_has_the_wavenumbers_of_its_equation(ends, stiff
 
 def test_products_of_two_amounts_are_the_square_of_their_sum():
     """(z - w)^2 as one square, and as z^2 - 2 z w + w^2: a spring either way."""
-    rise, place = PointMotion(beside=0), PointMotion(((1.0, 0.7, 0.2),))
+    rise, place = PointMotion(coordinate=0), PointMotion(((1.0, 0.7, 0.2),))
     stretched = square((-1.0, 0.7, 0.2), beside=0)
     apart = PointTerm(((1.0, rise, rise), (-2.0, rise, place), (1.0, place, place)))
     (own,) = plate_of(THIN, line(FREE, 3), line(FREE, 3)).with_terms([stretched, apart], []).classes

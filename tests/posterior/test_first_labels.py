@@ -115,11 +115,11 @@ def test_peaks_that_fit_a_plate_with_its_grain_the_other_way_are_refused(monkeyp
     assert labels_of(proposed.board) == {round(hertz, 3): label for label, hertz in [*HERTZ.items()][:7]}
 
 
-def way(beams, log_rigidities, log_density, log_density_unlike):
+def way(beams, log_rigidities, log_density, log_density_at_model_error):
     (setup,) = board_with([(2, 0)], ()).setups
     reading = replace(setup.readings[0], label=Label(*beams))
     board = board_of(ritz.FREE_SPRUCE, [replace(setup, readings=(reading,))])
-    return Labelling(board, np.array(log_rigidities), log_density, log_density_unlike)
+    return Labelling(board, np.array(log_rigidities), log_density, log_density_at_model_error)
 
 
 HERE = way((2, 0), [4.6, 2.2, 3.2], 10.0, 5.0)

@@ -41,7 +41,7 @@ def test_the_log_density_of_one_part_is_that_of_the_student_distribution():
 
 def test_one_distribution_fitted_to_draws_has_their_mean_and_covariance():
     draws = np.random.default_rng(3).multivariate_normal(MEAN, COVARIANCE, (4, 25, 32))
-    found = Mixture.one_fitted(draws)
+    found = Mixture.fitted_single(draws)
     (centre,), (factor,) = found.centres, found.factors
     flat = draws.reshape(-1, 3)
     scale = factor @ factor.T * DEGREES_OF_FREEDOM / (DEGREES_OF_FREEDOM - 2)
@@ -65,7 +65,7 @@ def one_density(points):
 def test_a_mixture_fits_a_curved_posterior_better_than_one_distribution():
     """By the mean log density at draws that neither has seen, beyond four errors of the difference."""
     train, unseen = banana(3000, seed=1), banana(3000, seed=2)
-    gain = Mixture.fitted(train).log_density(unseen) - Mixture.one_fitted(train).log_density(unseen)
+    gain = Mixture.fitted(train).log_density(unseen) - Mixture.fitted_single(train).log_density(unseen)
     assert gain.mean() > 4 * gain.std() / np.sqrt(len(gain))
 
 

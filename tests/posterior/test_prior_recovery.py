@@ -24,7 +24,7 @@ from bayesplate.posterior.target import Posterior
 class WithoutReadings(Posterior):
     """The posterior of readings that say nothing."""
 
-    def log_likelihood_of(self, every_log_frequency, theta):
+    def log_likelihood_of(self, mode_log_frequencies, theta):
         return np.zeros((len(theta), len(self.factors)))
 
 

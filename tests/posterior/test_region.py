@@ -106,7 +106,7 @@ def test_the_mixing_pair_of_a_cantilever_is_where_the_linear_law_fails():
         assert found.posterior.law == law
         (model,), theta = found.posterior.models, draws(found, 1000)
         errors = linearisation_errors(prepared.board, [model], theta)
-        linear, exact = (model.every_log_frequency(found.parameters.values(theta), one) for one in ("linear", "exact"))
+        linear, exact = (model.mode_log_frequencies(found.parameters.values(theta), one) for one in ("linear", "exact"))
         assert errors == pytest.approx(1200 * (linear - exact) / np.log(2), rel=1e-12)
         rms[law] = dict(zip(map(str, model.setup.labels), np.sqrt(np.mean(errors**2, axis=0)), strict=True))
     pair = [rms["exact"].pop(label) for label in ("(2,0)", "(1,2)")]

@@ -134,7 +134,7 @@ def test_too_few_steps_do_not_pass_and_say_how_many_are_needed():
     assert f"{convergence.suggested_steps} steps after burn-in would do" in " ".join(convergence.reasons)
     assert convergence.suggested_steps > convergence.n_kept_steps
     assert chains.draws.shape == (4, 100, 32, 4)
-    assert chains.kept.shape == (4, 50, 32, 4)
+    assert chains.after_burn_in.shape == (4, 50, 32, 4)
 
 
 def test_separate_peaks_do_not_pass():

@@ -118,7 +118,9 @@ def test_a_peak_that_may_be_the_mode_is_moved_too():
     setup = replace(made.setups[0], readings=made.setups[0].readings[:3], peaks=peaks_of(300.0))
     beams, values = CANTILEVER_LABELS[3], {**made.nominal(), "discrepancy (0,2)[day 1 to day 2]": np.array([2.0, -1.0])}
     (model,) = models_at(replace(made, setups=(setup,)), [30.0, 1.6, 6.0])
-    model = replace(model, others=(OtherMode(ModePlace(Parity(0, 1), 1, 0.9), beams), OtherMode(model.places[0], None)))
+    model = replace(
+        model, other_modes=(OtherMode(ModePlace(Parity(0, 1), 1, 0.9), beams), OtherMode(model.places[0], None))
+    )
 
     assert model.discrepancies(values) == pytest.approx(DISCREPANCY * np.outer([2.0, -1.0], [0, 0, 0, 1, 0]))
 
@@ -132,12 +134,12 @@ def rough():
 def test_a_search_begins_where_the_board_is_and_not_where_its_plate_would_be(rough):
     """At the size at which it does nothing an effect shifts nothing, though the board is not its plate."""
     baseline = baseline_of(rough)
-    assert np.abs(baseline.every.discrepancy).max() > 1e-3
+    assert np.abs(baseline.possible_modes.discrepancy).max() > 1e-3
     for name in ("attached_mass", "density_gradient"):  # the one follows shapes, the other the ranks of classes
         every = forms(baseline.board)
         form = every[name][0]
-        nothing = {free.name: np.array([free.null + 1e-9]) for free in form.free}
-        law = form_law(baseline, form).placed(baseline)
+        nothing = {free.name: np.array([free.neutral_value + 1e-9]) for free in form.free}
+        law = form_law(baseline, form).with_modes_of(baseline)
         shift = law.log_frequencies(baseline, baseline.log_rigidities[None, :], nothing) - baseline.log_frequency
         assert np.abs(shift).max() < 2e-4, name
 
@@ -148,10 +150,10 @@ def test_a_scale_that_has_followed_the_residual_does_not_excuse_it(judge, rough,
     if judge == "fit":
         monkeypatch.setattr(home, "rescale_discrepancies", lambda board, values, slopes, inputs: (slopes, inputs))
     baseline = baseline_of(rough)
-    found = run_search(prepare_search(baseline, tried=()))
+    found = run_search(prepare_search(baseline, effects=()))
 
     assert rough.parameters.values(rough.centre[None])[SCALE][0] > 2.0 * DEFAULT_NOISE.median
-    of_plate = baseline.log_frequency - baseline.every.discrepancy
+    of_plate = baseline.log_frequency - baseline.possible_modes.discrepancy
     assert judge == "fit" or baseline.middle == pytest.approx(of_plate, abs=1e-9)
     assert (found.p_value(0) < 0.01) == (judge == "prior"), found.p_value(0)
 
@@ -165,7 +167,7 @@ def test_sessions_that_are_one_plate_have_one_law_and_others_each(effects):
     problem = pose(made, load_prior("weakly-informative"), law="exact")
     theta = np.random.default_rng(4).multivariate_normal(problem.centre, problem.covariance, 20)
 
-    first, *others = problem.posterior.every_log_frequency(theta)
+    first, *others = problem.posterior.mode_log_frequencies(theta)
 
     for other in others:
         # What the days share is all without a clamp, and their laws are made alike.
@@ -177,7 +179,7 @@ def test_what_an_effect_shifts_is_told_beside_the_discrepancies():
     """`check` and `diagnose` tell the same; the air makes every mode lower, whatever the board does otherwise."""
     problem = pose(board(is_rough=True), load_prior("weakly-informative"), law="linear")
     base = baseline_of(problem)
-    law = form_law(base, forms(problem.board)["fluid_loading"][0]).placed(base)
+    law = form_law(base, forms(problem.board)["fluid_loading"][0]).with_modes_of(base)
     nominal = {one.name: np.array([one.nominal]) for one in law.form.free}
     raw = law.log_frequencies(base, base.log_rigidities[None, :], nominal)[0] - base.log_frequency
     (told,) = signatures(problem, ["fluid_loading"])

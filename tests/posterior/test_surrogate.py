@@ -81,7 +81,7 @@ def test_points_that_are_no_plate_are_left_out_of_the_fit(problem):
     whole = LawPoints(theta, log_frequency, problem.posterior(theta))
     holed = LawPoints(theta, log_frequency.copy(), whole.log_density.copy())
     holed.log_frequency[3], holed.log_density[3] = np.nan, -np.inf
-    expected = Surrogate.fitted(whole.where(np.arange(80) != 3), columns)
+    expected = Surrogate.fitted(whole.select(np.arange(80) != 3), columns)
     assert np.array_equal(Surrogate.fitted(holed, columns).coefficients, expected.coefficients)
 
 
@@ -154,9 +154,9 @@ def test_a_law_that_was_asked_for_serves_alone(problem, exact):
 
 def test_the_frequencies_kept_with_the_draws_are_those_of_the_law_there(inference):
     draws = named_draws(inference, seed=1)
-    assert inference.every_log_frequency is not None
-    anew = inference.problem.posterior.every_log_frequency(draws.flat)
-    for kept, law in zip(draws.every_log_frequency, anew, strict=True):
+    assert inference.mode_log_frequencies is not None
+    anew = inference.problem.posterior.mode_log_frequencies(draws.flat)
+    for kept, law in zip(draws.mode_log_frequencies, anew, strict=True):
         # The rounding of eigenvalues, by how far the highest of a basis lies above those wanted.
         np.testing.assert_allclose(kept.reshape(law.shape), law, rtol=0, atol=1e-11)
 

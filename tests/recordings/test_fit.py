@@ -84,6 +84,8 @@ def test_the_jacobian_is_the_derivative():
     for k, (mode, which) in enumerate([(0, 0), (1, 0), (0, 1), (1, 1)]):
         step = np.zeros((2, 2))
         step[mode, which] = 1e-4
-        sums = [np.sum(np.abs(fit_at_poles(window(values), PAIR + sign * step).rest) ** 2, axis=0) for sign in (1, -1)]
+        sums = [
+            np.sum(np.abs(fit_at_poles(window(values), PAIR + sign * step).residual) ** 2, axis=0) for sign in (1, -1)
+        ]
         slope = -(sums[0] - sums[1]) / 2e-4 / at.variance
         assert scores[:, k] == pytest.approx(slope, rel=1e-3)

@@ -100,7 +100,7 @@ def test_files_are_repeats_only_where_both_places_are_known_and_the_same():
         files = [[replace(recording(TIMES, name=name), hammer=HAMMER, sensor=sensor)] for name in ("a.wav", "b.wav")]
         spectra = take_spectra(files, 500.0).spectra
 
-        assert len(spectra.between) == len(set(spectra.places)) == n_pairs
+        assert len(spectra.place_pairs) == len(set(spectra.places)) == n_pairs
 
 
 def test_what_cannot_be_used_is_refused_with_every_hit_and_every_file():

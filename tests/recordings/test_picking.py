@@ -66,7 +66,7 @@ def test_modes_beyond_the_asked_band_do_not_spoil_those_near_its_ends(heard):
 def test_residues_between_the_places_have_the_signs_and_sizes_of_the_shapes(picked):
     """The generator's own residues; modes that hardly answer at a place tell nothing of their sign."""
     every = np.stack([board().residues(hammer, SENSOR) for hammer in HAMMERS], axis=1)
-    answered = zip(picked.likely, picked.likely_answers, strict=True)
+    answered = zip(picked.likely, picked.likely_mobilities, strict=True)
     for mode, mobility in ((peak, np.real(one.mobility)) for peak, one in answered if peak.hz < 400.0):
         own = every[int(np.argmin(np.abs(board().damped - mode.hz)))]
         loud = np.abs(own) > 0.2 * np.abs(own).max()

@@ -96,7 +96,7 @@ def test_modes_beside_a_part_are_those_of_a_fit_without_it_and_others_stay(monke
 
     assert [peak.mode.frequency for peak in kept] == [375.0, 401.73, 404.22, 430.0]
     assert (left_out.mode.frequency, left_out.verdict.kind) == (404.65, f"part of {kept[2].pole[0]:.1f} Hz")
-    assert (kept[2].other.frequency, kept[2].doubt) == (404.65, 0.8)
+    assert (kept[2].other_fit.frequency, kept[2].doubt) == (404.65, 0.8)
 
 
 def test_damping_is_averaged_as_the_frequency_is_and_its_error_holds_both_fits():

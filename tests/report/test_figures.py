@@ -191,8 +191,8 @@ def test_figures_of_a_board_that_narrows_end_at_its_outline(tapered):
     assert (drawn[:, 1] > low - 0.01).all()
     assert (drawn[:, 1] < high + 0.01).all()
     shaped = system.shaped
-    assert shaped.as_stated(1.0, 0.5) == pytest.approx((1.0, 110 / 200), abs=0.003)
-    assert shaped.placed(*shaped.as_stated(0.7, 0.3)) == pytest.approx((0.7, 0.3))
+    assert shaped.from_plate(1.0, 0.5) == pytest.approx((1.0, 110 / 200), abs=0.003)
+    assert shaped.to_plate(*shaped.from_plate(0.7, 0.3)) == pytest.approx((0.7, 0.3))
 
 
 def test_the_table_of_inputs_says_what_became_of_an_effect(clamped):
@@ -299,7 +299,7 @@ def test_what_the_readings_made_of_each_prior(clamped):
 
     def told(mean, sd):
         draws = np.exp(mean + sd * np.array([-1.0, 1.0]))
-        return SampledQuantity("x", "", draws, Quantity.from_median(np.e, np.exp(0.5))).told
+        return SampledQuantity("x", "", draws, Quantity.from_median(np.e, np.exp(0.5))).change_text
 
     assert told(1.0, 0.005) == "100 times narrower"
     assert told(1.0, 0.2) == "2.5 times narrower"

@@ -60,7 +60,7 @@ def test_no_name_stands_over_another_whether_boards_have_one_density_or_many(spr
 
 def test_the_page_says_what_was_found(few):
     folder, graded, page = few
-    expected = float(graded.meets_all.sum())
+    expected = float(graded.all_limits_probability.sum())
 
     assert "6 of 7 boards were fitted" in page
     assert f"{expected:.1f} are to be expected" in page
@@ -86,7 +86,7 @@ def test_a_board_in_doubt_has_its_place_on_the_page_and_is_not_counted(tmp_path)
     assert text.count("Boards in doubt") >= 2
     assert text.count(EVIL) == 2  # the doubt, and the message of a board that was not fitted
     assert "1 board is in doubt" in text
-    assert f"{float(np.delete(graded.meets_all, 1).sum()):.1f} are to be expected" in text
+    assert f"{float(np.delete(graded.all_limits_probability, 1).sum()):.1f} are to be expected" in text
 
 
 def test_names_and_messages_stay_texts(tmp_path):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from bayesplate.campaign.summary import CampaignCheck
-from bayesplate.commands.shown import show_campaign_check, show_check, show_modes
+from bayesplate.commands.printout import show_campaign_check, show_check, show_modes
 from bayesplate.results.checking import CheckedEffect, CheckedMode, CheckedSetup, CheckReport
 from bayesplate.results.command_tables import check_tables, forward_table, methods_table, sheet_tables
 from bayesplate.results.comparison import (

@@ -11,7 +11,7 @@ import pytest
 from made_summaries import SUMMARY, mode, spread
 
 from bayesplate.commands.prepare import prepare
-from bayesplate.commands.shown import show_fit
+from bayesplate.commands.printout import show_fit
 from bayesplate.report import content
 from bayesplate.results.contract import Elastic
 from bayesplate.results.fit_tables import (

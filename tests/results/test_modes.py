@@ -15,7 +15,7 @@ from made_reports import fitted
 from made_summaries import SUMMARY
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.commands.shown import show_fit
+from bayesplate.commands.printout import show_fit
 from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.report.content import summary_sentences
 from bayesplate.results.contract import json_text

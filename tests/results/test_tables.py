@@ -13,7 +13,7 @@ from made_summaries import SUMMARY
 from payloads import DIRECTION_MARKS, EVERY, PAYLOADS, shown
 from read_pages import Read, faults
 
-from bayesplate.commands.shown import show_diagnosis, show_fit
+from bayesplate.commands.printout import show_diagnosis, show_fit
 from bayesplate.diagnosis.tables import candidates_table
 from bayesplate.results.layout import column_widths
 from bayesplate.results.tables import Table, escape, notebook_html, render, strip_control_characters

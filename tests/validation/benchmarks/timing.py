@@ -116,7 +116,7 @@ def our_sampling(problem: PosedProblem, seed: int) -> float:
     started = time.perf_counter()
     inference = infer(problem, SamplerSettings(seed=seed))
     seconds = time.perf_counter() - started
-    n_effective = inference.chains.kept[..., 0].size / inference.convergence.tau_max
+    n_effective = inference.chains.after_burn_in[..., 0].size / inference.convergence.tau_max
     if inference.surrogate is not None:
         n_effective = min(n_effective, inference.convergence.ess_min)
     return float(n_effective / seconds)

@@ -51,9 +51,9 @@ class OfBoth(Posterior):
 
     second: Posterior
 
-    def log_likelihood_of(self, every_log_frequency: Sequence[Floats], theta: Floats) -> Floats:
-        first = super().log_likelihood_of(every_log_frequency, theta)
-        return np.concatenate([first, self.second.log_likelihood_of(every_log_frequency, theta)], axis=1)
+    def log_likelihood_of(self, mode_log_frequencies: Sequence[Floats], theta: Floats) -> Floats:
+        first = super().log_likelihood_of(mode_log_frequencies, theta)
+        return np.concatenate([first, self.second.log_likelihood_of(mode_log_frequencies, theta)], axis=1)
 
 
 @lru_cache(maxsize=2)

@@ -55,7 +55,7 @@ def every_mode() -> SetupModel:
 def unread(values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
     """ln f of the mode that is not read, from values by name: (n_draws,) array."""
     model = every_mode()
-    return model.every_log_frequency(values, "linear")[:, model.every_beams.index(UNREAD)]
+    return model.mode_log_frequencies(values, "linear")[:, model.mode_beams.index(UNREAD)]
 
 
 def draw(rng: np.random.Generator) -> tuple[Truth, PosedProblem]:
@@ -63,9 +63,9 @@ def draw(rng: np.random.Generator) -> tuple[Truth, PosedProblem]:
     values = prior_values(DESIGN, DESIGN.prior_card, rng)
     noise = noises_of(DESIGN, rng, NOISE)
     model = every_mode()
-    read = model.every_log_frequency({name: np.asarray(value) for name, value in values.items()}, "linear")[0]
+    read = model.mode_log_frequencies({name: np.asarray(value) for name, value in values.items()}, "linear")[0]
     read = np.exp(read + noise[0] * rng.standard_normal(read.size))
-    sure = [model.every_beams.index(beams) for beams in SURE]
+    sure = [model.mode_beams.index(beams) for beams in SURE]
     hertz = dict(zip(SURE, read[sure].tolist(), strict=True))
     others = np.delete(read, sure)
     seen = others[(rng.random(others.size) >= MISSED) & (others < max(hertz.values()))]

@@ -17,9 +17,9 @@ from validation.calibration.truths import Design, Truth, draw_truth, make_proble
 
 from bayesplate.board.parameter import Parameter
 from bayesplate.campaign.boards import FittedBoard
+from bayesplate.campaign.combined import CombinedBoards, sample_shared
 from bayesplate.campaign.learning import SharedPosterior, learn_shared
 from bayesplate.campaign.shared import SharedParameter
-from bayesplate.campaign.together import CombinedBoards, sample_shared
 from bayesplate.errors import BayesplateError
 from bayesplate.posterior.convergence import Convergence, Gate
 from bayesplate.posterior.draws import named_draws
@@ -73,8 +73,10 @@ def learnt_from(truths: list[Truth], rng: np.random.Generator) -> SharedPosterio
 
 def repeated(learnt: SharedPosterior, times: int, rng: np.random.Generator) -> Chains:
     """What is shared by so many times as many boards, each of them there as often."""
-    once = learnt.together
-    often = CombinedBoards.of(once.shared, once.names * times, once.likelihoods * times, once.pulls * times)
+    once = learnt.combined
+    often = CombinedBoards.of(
+        once.shared, once.names * times, once.likelihoods * times, once.normal_likelihoods * times
+    )
     chains, convergence = sample_shared(often, settings(rng))
     _require(convergence)
     return chains
@@ -115,7 +117,7 @@ def simulate_one(index: int, times: int = 2) -> Record:
         ranks[TWICE] = {"shared": rank_of_shared(often, truths[0], for_mutants)}
     except BayesplateError as error:
         return record | {"error": f"{type(error).__name__}: {error}"}
-    of_board = {"effective": round(effective), "astray": round(float(learnt.astray.max()), 2)}
+    of_board = {"effective": round(effective), "astray": round(float(learnt.offsets.max()), 2)}
     return record | ranked(ranks, started) | of_board
 
 

@@ -58,9 +58,9 @@ class ByRow(Posterior):
     hertz: Floats = field(default_factory=lambda: np.empty((0, 0)))
     is_counted_twice: bool = False
 
-    def log_likelihood_of(self, every_log_frequency: Sequence[Floats], theta: Floats) -> Floats:
+    def log_likelihood_of(self, mode_log_frequencies: Sequence[Floats], theta: Floats) -> Floats:
         rows = np.arange(len(theta)) % len(self.hertz)
-        (predicted,) = self.labelled(every_log_frequency)
+        (predicted,) = self.labelled(mode_log_frequencies)
         (errors,) = self.readings
         told = replace(errors, frequency=self.hertz[rows])
         found = told.log_likelihood(predicted, np.exp(self.parameters.log_noise(theta))[:, 0])

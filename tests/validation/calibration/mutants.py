@@ -33,9 +33,9 @@ class CountedTwice(Posterior):
     mode: int = 0
 
     def log_likelihood_of(
-        self, every_log_frequency: Sequence[NDArray[np.float64]], theta: NDArray[np.float64]
+        self, mode_log_frequencies: Sequence[NDArray[np.float64]], theta: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        found = super().log_likelihood_of(every_log_frequency, theta)
+        found = super().log_likelihood_of(mode_log_frequencies, theta)
         return np.concatenate([found, found[:, [self.mode]]], axis=1)
 
 

@@ -189,7 +189,7 @@ def _measured(asked: Asked, rng: np.random.Generator) -> Record:
     seed = int(rng.integers(2**31))
     beliefs = search_beliefs(asked.found, load_prior("weakly-informative"), random_stream(seed, BELIEFS_STREAM))
     planner = Planner(beliefs, seed, EXPLANATIONS)
-    every = planner.ranked(least=float("-inf"))
+    every = planner.rank_proposals(least_gain=float("-inf"))
     listed = [one for one in every if one.entry.gain.score > FAINT_GAIN]
     if not listed:
         return {"silent": True}
@@ -220,26 +220,28 @@ def _measured(asked: Asked, rng: np.random.Generator) -> Record:
 def _at_random(planner: Planner, every: Sequence[Proposal], rng: np.random.Generator) -> Proposal:
     """One of all the things that could be measured; where modes are chosen for it, others in their place."""
     one = every[int(rng.integers(len(every)))]
-    if one.entry.what != "modes" or one.read is None:
+    if one.entry.what != "modes" or one.station_readings is None:
         return one
-    return _of_modes(planner, one, sorted(rng.choice(one.read.further.n, size=len(one.rows), replace=False).tolist()))
+    return _of_modes(
+        planner, one, sorted(rng.choice(one.station_readings.further.n, size=len(one.rows), replace=False).tolist())
+    )
 
 
 def _next_up(planner: Planner, every: Sequence[Proposal]) -> Proposal:
     """The next modes up in the session that goes on, as a proposal."""
-    of_modes = [one for one in every if one.entry.what == "modes" and one.read is not None]
+    of_modes = [one for one in every if one.entry.what == "modes" and one.station_readings is not None]
     if not of_modes:
         raise RuntimeError("no mode is left to be read in the session that goes on")
     best = max(of_modes, key=lambda one: len(one.rows))
-    assert best.read is not None
-    assert list(best.read.rows) == sorted(best.read.rows)
-    return _of_modes(planner, best, list(range(min(NEXT, best.read.further.n))))
+    assert best.station_readings is not None
+    assert list(best.station_readings.rows) == sorted(best.station_readings.rows)
+    return _of_modes(planner, best, list(range(min(NEXT, best.station_readings.further.n))))
 
 
 def _of_modes(planner: Planner, one: Proposal, some: Sequence[int]) -> Proposal:
     """A proposal of further modes with others in their place."""
-    assert one.read is not None
-    readings, rows = one.read.further.some(some), tuple(one.read.rows[i] for i in some)
+    assert one.station_readings is not None
+    readings, rows = one.station_readings.further.select(some), tuple(one.station_readings.rows[i] for i in some)
     entry = replace(one.entry, gain=planner.gain(readings, one.entry.cost_minutes))
     return replace(one, entry=entry, readings=readings, rows=rows)
 
@@ -247,9 +249,9 @@ def _of_modes(planner: Planner, one: Proposal, some: Sequence[int]) -> Proposal:
 def _read(asked: Asked, one: Proposal, rng: np.random.Generator) -> np.ndarray:
     """What the generator's board shows: ln f (Hz) of the modes, or the sizes that are looked at."""
     what = one.entry.what
-    if one.read is None:
+    if one.station_readings is None:
         return _looked_at(asked, one, rng)
-    station, design, truth = one.read.law.station, asked.planted.design, asked.planted.truth
+    station, design, truth = one.station_readings.law.station, asked.planted.design, asked.planted.truth
     setup = station.setup
     beams = tuple(setup.readings[i].beams for i in one.rows)
     covered = design.setups[0].covered if not station.is_new else 0.0

@@ -129,7 +129,7 @@ def _as_sure(problem: PosedProblem, draws: Draws) -> Board:
     """The board where every peak has its most probable label for sure; those that are likeliest none are dropped."""
     (setup,), (peaks,) = problem.board.setups, problem.posterior.peaks
     assert peaks is not None
-    every = draws.every_log_frequency[0]
+    every = draws.mode_log_frequencies[0]
     shares = peaks.probabilities(every.reshape(-1, every.shape[-1])[::20], draws.noise[..., 0].ravel()[::20])
     labelled = label_likely_peaks(setup, peaks, shares, 0.5)
     readings = tuple(replace(reading, confidence=1.0) for reading in labelled.readings)

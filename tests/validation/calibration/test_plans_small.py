@@ -21,7 +21,7 @@ def explanation(rng, members, probability):
     return ExplanationTerms(
         members=members, words="", probability=probability, mean=np.zeros((N_TERMS, 4)),
         covariance=np.tile(np.diag([1.0, 1.0, 1.0, 0.1]), (N_TERMS, 1, 1)), noise=np.full((N_TERMS, 1), NOISE),
-        middle=np.zeros((N_TERMS, 3)), wanted=np.tile(np.eye(3, 4), (N_TERMS, 1, 1)),
+        middle=np.zeros((N_TERMS, 3)), target_slopes=np.tile(np.eye(3, 4), (N_TERMS, 1, 1)),
     )  # fmt: skip
 
 

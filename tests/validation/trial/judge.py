@@ -107,10 +107,10 @@ def findings(found: SearchResult, planted: PlantedBoard, control: NullControl, r
         For draws of the constants.
     """
     verdict = decide_verdict(found, control)
-    folded = nested_errors_of_board(found, control, verdict.tried)
-    claim = judge_claim(found, verdict, control.without(folded.carried if folded else ()), folded)
+    folded = nested_errors_of_board(found, control, verdict.judged_index)
+    claim = judge_claim(found, verdict, control.without(folded.carrying_readings if folded else ()), folded)
     ranked = rank_explanations(found)
-    near = verdict.stands_for or (alternatives(found, ranked) if ranked else ())
+    near = verdict.explanations or (alternatives(found, ranked) if ranked else ())
     best = verdict.best
     return {
         "word": verdict.word,
@@ -123,8 +123,8 @@ def findings(found: SearchResult, planted: PlantedBoard, control: NullControl, r
         "best": list(best.members) if best else [],
         "support": _probability(best.support) if best else 0.0,
         "set": [[list(answer.members), _probability(answer.support)] for answer in near],
-        "none": _probability(found.none),
-        "gain_percentile": _rounded(control.percentile_of(found.against_none)),
+        "none": _probability(found.probability_of_none),
+        "gain_percentile": _rounded(control.log_odds_percentile(found.log_odds)),
         "inclusion": {name: _probability(found.inclusion(name)) for name in found.ground.candidates},
         "gate": {
             "bare": _probability(found.p_value(0)),
@@ -143,7 +143,7 @@ def traced(found: SearchResult, verdict: Verdict) -> list[int]:
     if verdict.word == "named":
         return [verdict.index]
     if verdict.word == "indistinguishable group":
-        return [answer.index for answer in verdict.stands_for]
+        return [answer.index for answer in verdict.explanations]
     return [0]
 
 

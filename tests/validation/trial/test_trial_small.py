@@ -93,9 +93,9 @@ def test_the_shared_law_is_that_of_the_board():
     """
     planted = plant_board(np.random.default_rng(2), Cell("null", "cantilever-6", 1), ())
     baseline = baseline_of_card(planted)
-    predicted = baseline.every.predict(baseline.log_rigidities[None, :])[0]
+    predicted = baseline.possible_modes.predict(baseline.log_rigidities[None, :])[0]
     assert 1200.0 / math.log(2.0) * (predicted - baseline.log_frequency) == pytest.approx(np.zeros(6), abs=1e-2)
-    larger = baseline.every.predict(baseline.log_rigidities[None, :] + math.log(1.1))[0]
+    larger = baseline.possible_modes.predict(baseline.log_rigidities[None, :] + math.log(1.1))[0]
     assert larger - predicted == pytest.approx(np.full(6, 0.5 * math.log(1.1)))  # f goes with the root of D
 
 
@@ -107,7 +107,7 @@ def test_null_simulations_are_shared_by_boards_of_a_setting():
     others = {Cell("null", "cantilever-6", 1, noise=noise).setting for noise in NOISES}
     assert len(others | {Cell("null", "cantilever-6", 1, 2.0).setting, Cell("null", "free-12", 1).setting}) == 5
     assert control_of(cell.setting) is control_of(Cell("null", "cantilever-6", 9).setting)
-    assert control_of(cell.setting).against.shape == (N_FEW_SETS,)
+    assert control_of(cell.setting).log_odds.shape == (N_FEW_SETS,)
     assert cell.setting.rng().random() == cell.setting.rng().random()
     assert len({one.rng().random() for one in others}) == 3
 

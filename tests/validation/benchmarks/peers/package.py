@@ -36,5 +36,5 @@ def sampled(problem: PosedProblem, seed: int) -> Sampled:
     started = time.perf_counter()
     inference = infer(problem, SamplerSettings(seed=seed))
     seconds = time.perf_counter() - started
-    kept = inference.chains.kept  # (ensemble, step, walker, column)
+    kept = inference.chains.after_burn_in  # (ensemble, step, walker, column)
     return Sampled(np.swapaxes(kept, 0, 1).reshape(kept.shape[1], -1, kept.shape[-1]), seconds)

@@ -17,7 +17,7 @@ class NormalLikelihood:
     """A normal likelihood of the shared parameters: exp(h'z - z'Pz / 2)."""
 
     precision: Floats  # (n_shared, n_shared) array: P, positive semi-definite
-    lean: Floats  # (n_shared,) array: h = P times the mode
+    precision_times_mode: Floats  # (n_shared,) array: h = P times the mode
 
     @classmethod
     def of_draws(cls, z: Floats, weights: Floats, priors: Sequence[Quantity] = ()) -> NormalLikelihood:
@@ -30,13 +30,15 @@ class NormalLikelihood:
         posterior_precision = np.linalg.inv(covariance)
         eigenvalues, directions = np.linalg.eigh(posterior_precision - np.diag(1.0 / prior_stats[:, 1]))
         precision = (directions * np.maximum(eigenvalues, 0.0)) @ directions.T
-        lean = posterior_precision @ mean - prior_stats[:, 0] / prior_stats[:, 1]
-        return cls(precision, (directions * (eigenvalues > 0.0)) @ directions.T @ lean)
+        precision_times_mode = posterior_precision @ mean - prior_stats[:, 0] / prior_stats[:, 1]
+        return cls(precision, (directions * (eigenvalues > 0.0)) @ directions.T @ precision_times_mode)
 
     def scattered(self, width: Floats) -> NormalLikelihood:
         """The likelihood of the middle about which the boards' own numbers scatter, with these standard deviations."""
         shrinkage = np.linalg.inv(np.eye(width.size) + self.precision * width**2)
-        return NormalLikelihood(np.asarray(shrinkage @ self.precision), np.asarray(shrinkage @ self.lean))
+        return NormalLikelihood(
+            np.asarray(shrinkage @ self.precision), np.asarray(shrinkage @ self.precision_times_mode)
+        )
 
 
 def prior_moments(prior: Quantity) -> tuple[float, float]:
@@ -48,7 +50,10 @@ def prior_moments(prior: Quantity) -> tuple[float, float]:
     return float(mean), float(variance)
 
 
-def normal_posterior(pulls: Sequence[NormalLikelihood]) -> tuple[Floats, Floats]:
+def normal_posterior(likelihoods: Sequence[NormalLikelihood]) -> tuple[Floats, Floats]:
     """Mean and covariance of z from several boards, its prior being standard normal."""
-    covariance = np.linalg.inv(np.eye(pulls[0].lean.size) + np.sum([pull.precision for pull in pulls], axis=0))
-    return covariance @ np.sum([pull.lean for pull in pulls], axis=0), covariance
+    covariance = np.linalg.inv(
+        np.eye(likelihoods[0].precision_times_mode.size)
+        + np.sum([likelihood.precision for likelihood in likelihoods], axis=0)
+    )
+    return covariance @ np.sum([likelihood.precision_times_mode for likelihood in likelihoods], axis=0), covariance

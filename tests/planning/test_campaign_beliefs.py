@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from bayesplate.board.material import ORTHOTROPIC
-from bayesplate.planning import together as home
+from bayesplate.planning import campaign as home
 from bayesplate.planning.beliefs import KnownBoard
+from bayesplate.planning.campaign import _further_board, _join_boards, _LinearBoard
 from bayesplate.planning.gains import PlannedReadings, expected_gain
-from bayesplate.planning.together import _further_board, _join_boards, _LinearBoard
 
 SD = 0.5
 NAMES = ("one", "two")
@@ -32,7 +32,7 @@ def linear(design):
     pull = precision[3:, 3:] - across.T @ np.linalg.solve(precision[:3, :3], across)
     symmetry = SimpleNamespace(free_of=lambda values: np.ones(3), n=ORTHOTROPIC.n)
     board = SimpleNamespace(symmetry=symmetry, name="made")
-    return _LinearBoard(KnownBoard(board, {}, (), np.eye(3, 5), pull=pull), np.array([SD]), precision)
+    return _LinearBoard(KnownBoard(board, {}, (), np.eye(3, 5), shared_precision=pull), np.array([SD]), precision)
 
 
 def together(*designs):

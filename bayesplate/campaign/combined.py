@@ -10,7 +10,7 @@ import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.campaign.likelihood import Likelihood, SharedLogDensity, moments, spread_points
-from bayesplate.campaign.pulls import NormalLikelihood, normal_posterior, prior_moments
+from bayesplate.campaign.normal_likelihood import NormalLikelihood, normal_posterior, prior_moments
 from bayesplate.campaign.scatter import Scatter, ScatteredLikelihood, expected_width, scatter_widths, scatters_of
 from bayesplate.campaign.shared import SharedParameter
 from bayesplate.diagnosis.terms import log_sum, normalised_weights
@@ -38,7 +38,7 @@ class CombinedBoards:
     shared: tuple[SharedParameter, ...]
     names: tuple[str, ...]  # of the boards
     likelihoods: tuple[Likelihood, ...]  # one per board, of its own numbers
-    pulls: tuple[NormalLikelihood, ...]  # one per board, the normal likelihood of its own numbers
+    normal_likelihoods: tuple[NormalLikelihood, ...]  # one per board, the normal likelihood of its own numbers
     points: Floats  # (n_points, n_coordinates) array: standard coordinates at which densities are summed
     log_spread: Floats  # (n_points,) array: ln of the density of these points
 
@@ -48,18 +48,18 @@ class CombinedBoards:
         shared: Sequence[SharedParameter],
         names: Sequence[str],
         likelihoods: Sequence[Likelihood],
-        pulls: Sequence[NormalLikelihood],
+        normal_likelihoods: Sequence[NormalLikelihood],
     ) -> CombinedBoards:
         """The boards combined, with points around the posteriors from all of them and from all but each."""
-        scattered_pulls = [pull.scattered(expected_width(shared)) for pull in pulls]
+        scattered_likelihoods = [likelihood.scattered(expected_width(shared)) for likelihood in normal_likelihoods]
         scatters = scatters_of(shared)
         spread = _points_around(
             [
-                _append_scatters(*normal_posterior([scattered_pulls[i] for i in indices]), scatters)
-                for indices in _leave_one_out(len(pulls))
+                _append_scatters(*normal_posterior([scattered_likelihoods[i] for i in indices]), scatters)
+                for indices in _leave_one_out(len(normal_likelihoods))
             ]
         )
-        combined = cls(tuple(shared), tuple(names), tuple(likelihoods), tuple(pulls), *spread)
+        combined = cls(tuple(shared), tuple(names), tuple(likelihoods), tuple(normal_likelihoods), *spread)
         for _ in range(_ROUNDS):
             if combined.fewest_points >= FEWEST_POINTS:
                 break
@@ -76,8 +76,8 @@ class CombinedBoards:
         """Each board's likelihood of the coordinates."""
         if len(self.coordinates) == len(self.shared):
             return self.likelihoods
-        pairs = zip(self.likelihoods, self.pulls, strict=True)
-        return tuple(ScatteredLikelihood(self.shared, own, pull) for own, pull in pairs)
+        pairs = zip(self.likelihoods, self.normal_likelihoods, strict=True)
+        return tuple(ScatteredLikelihood(self.shared, exact, normal) for exact, normal in pairs)
 
     @property
     def left_out(self) -> list[tuple[int, ...]]:
@@ -122,20 +122,20 @@ class CombinedBoards:
         scattered = np.random.default_rng(_LINE).standard_normal((len(self.points), n))
         return np.asarray(self.points[:, :n] + scatter_widths(self.shared, self.points) * scattered)
 
-    def taught(self, without: Collection[int] = ()) -> tuple[Floats, Floats]:
+    def moments_from_others(self, without: Collection[int] = ()) -> tuple[Floats, Floats]:
         """Mean and covariance of an unmeasured board's own numbers, as all boards but some teach them."""
         return moments(self._board_numbers, self.weights(without))
 
-    def taught_draws(self, rng: np.random.Generator, n: int, without: Collection[int] = ()) -> Floats:
-        """Draws of a board's own numbers as `taught`: (n, n_shared) array."""
+    def draws_from_others(self, rng: np.random.Generator, n: int, without: Collection[int] = ()) -> Floats:
+        """Draws of an unmeasured board's own numbers, as all boards but some teach them: (n, n_shared) array."""
         return self._board_numbers[rng.choice(len(self.points), size=n, p=self.weights(without))]
 
-    def under_all(self, board: int) -> tuple[Floats, Floats]:
+    def moments_from_all(self, board: int) -> tuple[Floats, Floats]:
         """Mean and covariance of a board's own numbers, given the other boards and its own readings."""
         log_weights = self._log_weights((board,)) + self.likelihoods[board].at(self._board_numbers)
         return moments(self._board_numbers, normalised_weights(log_weights))
 
-    def log_taught(self, without: Collection[int] = ()) -> SharedLogDensity:
+    def log_density_from_others(self, without: Collection[int] = ()) -> SharedLogDensity:
         """ln of the density of a board's own numbers as all boards but some teach them, not normalised.
 
         Where they scatter, it is that of a mixture of Student distributions fitted to draws of them: the uncertainty of
@@ -143,7 +143,7 @@ class CombinedBoards:
         """
         if len(self.coordinates) == len(self.shared):
             return lambda z: self.log_density(z, without)
-        draws = self.taught_draws(np.random.default_rng(_LINE), _N_MIXTURE_DRAWS, without)
+        draws = self.draws_from_others(np.random.default_rng(_LINE), _N_MIXTURE_DRAWS, without)
         # minus infinity where there is none
         bounds = np.array([parameter.prior.standard_bounds[0] for parameter in self.shared])
         for i in np.flatnonzero(np.isfinite(bounds)):  # their mirror image beside them, or the density would fall off
@@ -151,7 +151,7 @@ class CombinedBoards:
             mirrored[:, i] = 2.0 * bounds[i] - mirrored[:, i]
             draws = np.concatenate([draws, mirrored])
         mixture = Mixture.fitted(np.random.default_rng(_LINE).permutation(draws))
-        envelope = Mixture.one_fitted(draws)
+        envelope = Mixture.fitted_single(draws)
         reach = envelope.squared_distances(draws).max()
 
         def log_density(z: Floats) -> Floats:
@@ -184,11 +184,11 @@ class CombinedBoards:
 
 
 def sample_shared(
-    together: CombinedBoards, settings: SamplerSettings, progress: Callable[[Progress], None] | None = None
+    combined: CombinedBoards, settings: SamplerSettings, progress: Callable[[Progress], None] | None = None
 ) -> tuple[Chains, Convergence]:
     """Sample the shared numbers, then their scatters, in standard coordinates, from all boards."""
-    names = [coordinate.name for coordinate in together.coordinates]
-    return sample(together.log_density, *together.moments(), settings, names=names, progress=progress)
+    names = [coordinate.name for coordinate in combined.coordinates]
+    return sample(combined.log_density, *combined.moments(), settings, names=names, progress=progress)
 
 
 def shared_values(coordinates: Sequence[SharedParameter | Scatter], z: Floats) -> dict[str, Floats]:

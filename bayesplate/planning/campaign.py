@@ -12,7 +12,7 @@ from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.board.prior import PriorCard
-from bayesplate.campaign.given import ConditionalPosterior
+from bayesplate.campaign.conditional import ConditionalPosterior
 from bayesplate.campaign.scatter import expected_width
 from bayesplate.campaign.shared import SharedParameter
 from bayesplate.estimates.least_squares import weighted_least_squares
@@ -68,18 +68,18 @@ def _join_boards(linear_boards: Sequence[_LinearBoard], shared: Sequence[str]) -
     n_own = [len(linear.precision) - n for linear in linear_boards]
     starts, setups = np.cumsum([0, *n_own]), np.cumsum([0, *(len(linear.noise) for linear in linear_boards)])
     n_u = int(starts[-1]) + n
-    precision, wanted, middle = np.zeros((n_u, n_u)), np.zeros((n + n_of * len(linear_boards), n_u)), np.zeros(n)
-    precision[n_u - n :, n_u - n :] = wanted[:n, n_u - n :] = np.eye(n)
+    precision, target_slopes, middle = np.zeros((n_u, n_u)), np.zeros((n + n_of * len(linear_boards), n_u)), np.zeros(n)
+    precision[n_u - n :, n_u - n :] = target_slopes[:n, n_u - n :] = np.eye(n)
     known_boards = []
     for i, linear in enumerate(linear_boards):
-        board, columns = linear.known.board, np.r_[starts[i] : starts[i + 1], n_u - n : n_u]
+        board, columns = linear.known_board.board, np.r_[starts[i] : starts[i + 1], n_u - n : n_u]
         precision[np.ix_(columns, columns)] += linear.precision
-        log, gradient = log_moduli(board, np.log(board.symmetry.free_of(linear.known.values)))
+        log, gradient = log_moduli(board, np.log(board.symmetry.free_of(linear.known_board.values)))
         middle = np.r_[middle, log]
-        wanted[n + n_of * i : n + n_of * (i + 1), columns] = gradient @ linear.known.columns
+        target_slopes[n + n_of * i : n + n_of * (i + 1), columns] = gradient @ linear.known_board.columns
         wide = np.zeros((len(gradient.T), n_u))
-        wide[:, columns] = linear.known.columns
-        known_boards.append(replace(linear.known, columns=wide, first_setup=int(setups[i])))
+        wide[:, columns] = linear.known_board.columns
+        known_boards.append(replace(linear.known_board, columns=wide, first_setup=int(setups[i])))
     explanation = ExplanationTerms(
         members=(),
         words=NO_EFFECT,
@@ -88,7 +88,7 @@ def _join_boards(linear_boards: Sequence[_LinearBoard], shared: Sequence[str]) -
         covariance=np.asarray(np.linalg.inv(precision))[None],
         noise=np.concatenate([linear.noise for linear in linear_boards])[None],
         middle=middle[None],
-        wanted=wanted[None],
+        target_slopes=target_slopes[None],
     )
     return Beliefs(tuple(known_boards), (explanation,), tuple(shared), "campaign", (LINEAR_NOTE,))
 
@@ -100,7 +100,7 @@ class _LinearBoard(NamedTuple):
     parameters.
     """
 
-    known: KnownBoard
+    known_board: KnownBoard
     noise: Floats
     precision: Floats
 
@@ -134,13 +134,16 @@ def _weigh_readings(
         variance = noise[names.index(base.name)] ** 2 + ReadingErrors.of(base).own_variance
         precision += rows.T @ (rows / variance[:, None])
     coupling = precision[:n_own, n_own:]
-    pull = precision[n_own:, n_own:] - coupling.T @ np.linalg.solve(precision[:n_own, :n_own], coupling)
-    return _LinearBoard(KnownBoard(board, values, laws, columns, pull=pull), noise, precision)
+    shared_precision = precision[n_own:, n_own:] - coupling.T @ np.linalg.solve(precision[:n_own, :n_own], coupling)
+    return _LinearBoard(KnownBoard(board, values, laws, columns, shared_precision=shared_precision), noise, precision)
 
 
 def _informative_boards(boards: Sequence[KnownBoard]) -> list[int]:
     """Indices of the boards most informative about the shared parameters."""
-    information = [0.0 if known_board.pull is None else float(np.trace(known_board.pull)) for known_board in boards]
+    information = [
+        0.0 if known_board.shared_precision is None else float(np.trace(known_board.shared_precision))
+        for known_board in boards
+    ]
     return sorted(range(len(information)), key=lambda i: -information[i])[:_N_INFORMATIVE]
 
 
@@ -162,7 +165,7 @@ def _add_peaks(law: BareLaw) -> BareLaw:
     base = replace(station.base, readings=(*station.base.readings, *new))
     setup = replace(station.setup, readings=tuple(station.setup.readings[i] for i in order))
     taken = replace(station, setup=setup, base=base, n_old=n_old + len(peak_of))
-    return BareLaw(taken, law.solved[:, order], law.middle[order], law.slopes[:, order], law.off_place[:, order])
+    return BareLaw(taken, law.solved[:, order], law.middle[order], law.slopes[:, order], law.mass_shift_sd[:, order])
 
 
 def _board_columns(
@@ -193,7 +196,7 @@ def _board_columns(
 class FurtherBoard:
     """A further board that could be measured."""
 
-    like: Board
+    template: Board
     sentence: str
     labels: tuple[str, ...]  # of the modes to read
     readings: PlannedReadings  # its information about the shared parameters
@@ -219,8 +222,8 @@ def further_boards(
 
 def _further_board(beliefs: Beliefs, known_board: KnownBoard, sentence: str, labels: tuple[str, ...]) -> FurtherBoard:
     """A further board, with its information about the shared parameters as readings of noise one."""
-    assert known_board.pull is not None
-    values, directions = np.linalg.eigh(known_board.pull)
+    assert known_board.shared_precision is not None
+    values, directions = np.linalg.eigh(known_board.shared_precision)
     slopes = np.zeros((1, len(values), beliefs.explanations[0].mean.shape[1]))
     slopes[0, :, -len(values) :] = (directions * np.sqrt(np.maximum(values, 0.0))).T
     readings = PlannedReadings((np.zeros((1, len(values))),), (slopes,), (np.ones((1, len(values))),))
@@ -241,10 +244,10 @@ def _cut_board(
         replace(item, places=tuple((CUT_SHARE * x, y) for x, y in item.places)) for item in board.setups[0].attached
     )
     first = replace(board.setups[0], readings=(), peaks=(), attached=attached)
-    bare = replace(board.with_priors(cut), setups=(first,), chosen=())
+    bare = replace(board.with_priors(cut), setups=(first,), effect_forms=())
     values = {name: value for name, value in known_board.values.items() if name in bare.inputs or name in RIGIDITIES}
     values |= {name: np.asarray(CUT_SHARE * float(known_board.values[name])) for name in halved}
     law = station_laws(bare, values, prior, is_elsewhere=False)[0]
     readings = law.station.setup.readings[: len(board.setups[0].readings)]
     station = replace(law.station, base=replace(law.station.base, readings=readings), n_old=len(readings))
-    return _weigh_readings(bare, prior, shared, values, noise, (replace(law, station=station),)).known
+    return _weigh_readings(bare, prior, shared, values, noise, (replace(law, station=station),)).known_board

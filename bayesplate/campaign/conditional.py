@@ -57,11 +57,11 @@ class ConditionalPosterior:
             z[:, i] = shared.prior.standard(shared.from_board(values[name], values))
         return z
 
-    def theta(self, own: Floats, z: Floats) -> Floats:
+    def theta(self, own_theta: Floats, z: Floats) -> Floats:
         """All columns of the board, (n_draws, n_dim), from its own ones, (n_draws, n_own), and the shared z,
         (n_draws, n_shared)."""
-        theta = np.zeros((len(own), self._parameters.n_dim))
-        theta[:, self.own_columns] = own
+        theta = np.zeros((len(own_theta), self._parameters.n_dim))
+        theta[:, self.own_columns] = own_theta
         values = self._parameters.values(theta)
         for column, i in self._shared_by_column.items():
             shared = self.shared[i]
@@ -71,9 +71,9 @@ class ConditionalPosterior:
                 theta[:, column] = prior.standard(of_board)
         return theta
 
-    def log_density(self, own: Floats, z: Floats) -> Floats:
+    def log_density(self, own_theta: Floats, z: Floats) -> Floats:
         """ln of the likelihood times the prior of the board's own parameters: (n_draws,) array; -inf where it is 0."""
-        theta = self.theta(own, z)
+        theta = self.theta(own_theta, z)
         total = self._log_prior_of_own(theta)
         inside = np.isfinite(total) & np.isfinite(theta).all(axis=1)
         total[~inside] = -np.inf
@@ -89,7 +89,7 @@ class ConditionalPosterior:
         values = self._parameters.values(theta)
         total = np.zeros(len(theta))
         for shared in self.shared:
-            if shared.to:
+            if shared.ratio_to:
                 (parameter,) = shared.parameters(self.posterior.board)
                 ratio = shared.from_board(values[parameter.name], values)
                 with np.errstate(invalid="ignore"):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from linear_boards import exactly_together, joint_posterior, linear_boards, log_evidence, standard_shared
 
+from bayesplate.campaign.combined import FEWEST_POINTS, CombinedBoards, sample_shared
 from bayesplate.campaign.likelihood import SharedLikelihood
-from bayesplate.campaign.pulls import NormalLikelihood
-from bayesplate.campaign.together import FEWEST_POINTS, CombinedBoards, sample_shared
+from bayesplate.campaign.normal_likelihood import NormalLikelihood
 from bayesplate.posterior.sampling import SamplerSettings
 
 N = 6000
@@ -24,7 +24,7 @@ def together_of(boards, rng):
         return np.sum([one.prior.log_prior(z[:, i]) for i, one in enumerate(shared)], axis=0)
 
     found = [
-        SharedLikelihood.found(z, weights, N, log_prior, log_evidence([one]))
+        SharedLikelihood.from_draws(z, weights, N, log_prior, log_evidence([one]))
         for one, z in zip(boards, drawn, strict=True)
     ]
     names = [f"board {i}" for i in range(len(boards))]
