@@ -198,9 +198,15 @@ class Setup:
         if faults:
             raise InputError(faults)
         if not isinstance(edges, str) and set(edges) != set(EDGES):
-            faults.append(Fault(f"{name} edges", "a word for each of x0, x1, y0, y1", ", ".join(edges) or "none"))
+            stated_edges = ", ".join(map(str, edges)) or "none"
+            faults.append(Fault(f"{name} edges", "a word for each of x0, x1, y0, y1", stated_edges))
         words = dict.fromkeys(EDGES, edges) if isinstance(edges, str) else {edge: edges.get(edge, "") for edge in EDGES}
-        signs_by_label = {Label.parse(label_text(label)): sign for label, sign in (signs or {}).items()}
+        signs_by_label = {}
+        for label, sign in (signs or {}).items():
+            try:
+                signs_by_label[Label.parse(label_text(label))] = sign
+            except InputError as error:
+                faults += [replace(fault, place=f"{name} signs {fault.place}".rstrip()) for fault in error.faults]
         frequencies_by_label: dict[Label, Quantity] = {}
         for label, frequency in frequencies.items():
             try:

@@ -10,7 +10,7 @@ import numpy as np
 from bayesplate.arrays import Floats
 from bayesplate.campaign.conditional import ConditionalPosterior
 from bayesplate.campaign.evidence import bridge_sampling
-from bayesplate.campaign.likelihood import SharedLikelihood, SharedLogDensity, moments
+from bayesplate.campaign.likelihood import SharedLikelihood, moments
 from bayesplate.campaign.normal_likelihood import NormalLikelihood
 from bayesplate.campaign.shared import SharedParameter
 from bayesplate.diagnosis.terms import log_sum, normalised_weights
@@ -18,6 +18,7 @@ from bayesplate.posterior.draws import Draws, named_draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains, SamplerSettings, sample
+from bayesplate.posterior.starts import LogDensity
 from bayesplate.posterior.statistics import effective_draws, effective_share, resample
 from bayesplate.posterior.surrogate import LawPoints, Surrogate, n_terms, with_surrogate
 
@@ -59,7 +60,7 @@ class Sample:
     z: Floats
     log_weights: Floats
     n_independent: float
-    log_reference: SharedLogDensity
+    log_reference: LogDensity
     log_evidence: float
     log_frequencies: tuple[Floats, ...]
 
@@ -75,13 +76,13 @@ class Sample:
         enough = self.effective(self.weights) >= FEWEST_WEIGHTED_DRAWS
         return enough and effective_share(self.weights) >= _GOOD_SHARE
 
-    def weights_under(self, log_reference: SharedLogDensity) -> Floats:
+    def weights_under(self, log_reference: LogDensity) -> Floats:
         """Weights under which r is another density: (n,) array that sums to 1."""
         return normalised_weights(
             np.log(np.maximum(self.weights, _SMALLEST_WEIGHT)) + self._log_density_ratio(log_reference)
         )
 
-    def log_evidence_under(self, log_reference: SharedLogDensity) -> float:
+    def log_evidence_under(self, log_reference: LogDensity) -> float:
         """ln of the integral of r(z) L(z) where r is another density."""
         return self.log_evidence + float(
             log_sum(np.log(np.maximum(self.weights, _SMALLEST_WEIGHT)) + self._log_density_ratio(log_reference))
@@ -91,7 +92,7 @@ class Sample:
         """Number of independent draws of equal weight that are worth as much."""
         return effective_draws(weights) * self.n_independent / len(weights)
 
-    def _log_density_ratio(self, log_reference: SharedLogDensity) -> Floats:
+    def _log_density_ratio(self, log_reference: LogDensity) -> Floats:
         """ln of another r over this one at the draws: (n,) array."""
         with np.errstate(invalid="ignore"):
             change = log_reference(self.z) - self.log_reference(self.z)
@@ -154,7 +155,7 @@ class FittedBoard:
             self.own_sample.z, self.own_sample.weights, [parameter.prior for parameter in self.shared]
         )
 
-    def likelihood(self, sample: Sample, log_reference: SharedLogDensity) -> SharedLikelihood:
+    def likelihood(self, sample: Sample, log_reference: LogDensity) -> SharedLikelihood:
         """The board's likelihood of the shared parameters, from a sample weighted to another density r.
 
         Draws of a new walk lie away from the board's own, where the polynomial fitted to them is only extrapolated;
@@ -176,9 +177,7 @@ class FittedBoard:
         n_both = 4.0 / (1.0 / own_sample.effective(own_sample.weights) + 1.0 / n_effective)
         return SharedLikelihood.from_draws(z, both_weights, n_both, log_mixture, 0.0)
 
-    def sample_anew(
-        self, log_reference: SharedLogDensity, before: Sample, aim: tuple[Floats, Floats], seed: int
-    ) -> Sample:
+    def sample_anew(self, log_reference: LogDensity, before: Sample, aim: tuple[Floats, Floats], seed: int) -> Sample:
         """Sample the board under another density of the shared parameters, and weight the draws by the exact law.
 
         The surrogate of the board's own fit is poor away from it: while too few draws count by their weights, a new
@@ -216,7 +215,7 @@ class FittedBoard:
         return replace(best, log_evidence=log_evidence)
 
     def _walk(
-        self, surrogate: Surrogate | None, log_reference: SharedLogDensity, start: tuple[Floats, Floats], seed: int
+        self, surrogate: Surrogate | None, log_reference: LogDensity, start: tuple[Floats, Floats], seed: int
     ) -> tuple[Sample, LawPoints]:
         """Draws of a walk on a surrogate, weighted by the exact law, and the values of the law at the draws.
 
@@ -246,7 +245,7 @@ class FittedBoard:
             theta, np.concatenate(log_frequencies, axis=1), log_prob[picked_draws] + log_weights
         )
 
-    def moved(self, sample: Sample, log_density: SharedLogDensity, z: Floats, rng: np.random.Generator) -> Sample:
+    def moved(self, sample: Sample, log_density: LogDensity, z: Floats, rng: np.random.Generator) -> Sample:
         """Draws of a sample moved to other shared parameters, the board's own ones moved by linear regression.
 
         A draw has no weight where the model lacks a mode that was read.
@@ -271,9 +270,7 @@ class FittedBoard:
         log_weights = np.where(is_possible, 0.0, -np.inf)
         return Sample(theta, z, log_weights, sample.effective(sample.weights), log_density, np.nan, log_frequencies)
 
-    def _log_evidence(
-        self, log_reference: SharedLogDensity, theta: Floats, z: Floats, weights: Floats, seed: int
-    ) -> float:
+    def _log_evidence(self, log_reference: LogDensity, theta: Floats, z: Floats, weights: Floats, seed: int) -> float:
         """ln of the integral of r(z) L(z), from weighted draws of that density."""
         rng = np.random.default_rng([seed, _LINE, 1])
         picked_draws = rng.permutation(resample(weights, len(z), rng))
@@ -313,7 +310,7 @@ class FittedBoard:
         return inference, named_draws(inference, seed)
 
 
-def _log_joint_density(conditional: ConditionalPosterior, log_reference: SharedLogDensity) -> SharedLogDensity:
+def _log_joint_density(conditional: ConditionalPosterior, log_reference: LogDensity) -> LogDensity:
     """ln of the joint density of a board's own parameters and the shared ones, side by side, these with density r."""
     n_own = conditional.own_columns.size
 

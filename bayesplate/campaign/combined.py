@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from bayesplate.arrays import Floats
-from bayesplate.campaign.likelihood import Likelihood, SharedLogDensity, moments, spread_points
+from bayesplate.campaign.likelihood import Likelihood, moments, spread_points
 from bayesplate.campaign.normal_likelihood import NormalLikelihood, normal_posterior, prior_moments
 from bayesplate.campaign.scatter import Scatter, ScatteredLikelihood, expected_width, scatter_widths, scatters_of
 from bayesplate.campaign.shared import SharedParameter
@@ -17,6 +17,7 @@ from bayesplate.diagnosis.terms import log_sum, normalised_weights
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.mixture import Mixture
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
+from bayesplate.posterior.starts import LogDensity
 from bayesplate.posterior.statistics import effective_draws
 
 _LINE = 21
@@ -135,7 +136,7 @@ class CombinedBoards:
         log_weights = self._log_weights((board,)) + self.likelihoods[board].at(self._board_numbers)
         return moments(self._board_numbers, normalised_weights(log_weights))
 
-    def log_density_from_others(self, without: Collection[int] = ()) -> SharedLogDensity:
+    def log_density_from_others(self, without: Collection[int] = ()) -> LogDensity:
         """ln of the density of a board's own numbers as all boards but some teach them, not normalised.
 
         Where they scatter, it is that of a mixture of Student distributions fitted to draws of them: the uncertainty of

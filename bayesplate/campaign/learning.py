@@ -11,12 +11,13 @@ import numpy as np
 from bayesplate.arrays import Floats
 from bayesplate.campaign.boards import N_EXACT_DRAWS, FittedBoard, Sample
 from bayesplate.campaign.combined import CombinedBoards, sample_shared
-from bayesplate.campaign.likelihood import SharedLogDensity, moments
+from bayesplate.campaign.likelihood import moments
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings
+from bayesplate.posterior.starts import LogDensity
 
 LARGEST_OFFSET = 0.3
 """Standard deviations of the shared parameters by which a board's draws may be off their likelihood."""
@@ -97,7 +98,7 @@ def learn_shared(
 
 
 def _sample_under(
-    member: FittedBoard, sample: Sample, log_reference: SharedLogDensity, aim: tuple[Floats, Floats], seed: int
+    member: FittedBoard, sample: Sample, log_reference: LogDensity, aim: tuple[Floats, Floats], seed: int
 ) -> Sample:
     """A sample of a board under another density of the shared parameters: the one at hand if enough draws count there.
 
@@ -111,7 +112,7 @@ def _sample_under(
     return new_sample if new_sample.effective(new_sample.weights) > n_effective else sample
 
 
-def _log_halfway(member: FittedBoard, combined: CombinedBoards, board: int) -> SharedLogDensity:
+def _log_halfway(member: FittedBoard, combined: CombinedBoards, board: int) -> LogDensity:
     """ln of a density of the shared parameters halfway between the prior and what all boards but one teach."""
     log_density = combined.log_density_from_others((board,))
     return lambda z: 0.5 * (member.log_prior(z) + log_density(z))

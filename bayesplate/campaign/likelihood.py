@@ -14,7 +14,6 @@ Statistics 19 (1991).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations_with_replacement
@@ -25,9 +24,7 @@ from numpy.typing import NDArray
 
 from bayesplate.arrays import Floats
 from bayesplate.diagnosis.terms import log_sum, normalised_weights
-
-SharedLogDensity = Callable[[Floats], Floats]
-"""From (n, n_shared) standard coordinates of the shared parameters to (n,) logarithms of a density."""
+from bayesplate.posterior.starts import LogDensity
 
 
 class Likelihood(Protocol):
@@ -77,7 +74,7 @@ class SharedLikelihood:
 
     @classmethod
     def from_draws(
-        cls, z: Floats, weights: Floats, n_effective: float, log_reference: SharedLogDensity, log_evidence: float
+        cls, z: Floats, weights: Floats, n_effective: float, log_reference: LogDensity, log_evidence: float
     ) -> SharedLikelihood:
         """The likelihood from draws of a density proportional to r(z) L(z).
 

@@ -49,6 +49,8 @@ def grading_request(match: str | None, limit: Sequence[str], rigidity: float | N
 def _percents(match: str, faults: list[Fault]) -> dict[str, float]:
     """Tolerances by name; one number alone is that of each modulus."""
     items = [item.strip() for item in match.split(",") if item.strip()]
+    if not items:
+        faults.append(Fault("--match", _WANTED_PERCENTS, quote_text(match)))
     if len(items) == 1 and "=" not in items[0]:
         if not _is_percent(_number(items[0])):
             faults.append(Fault("--match", _WANTED_PERCENTS, quote_text(items[0])))

@@ -18,7 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.arrays import Floats
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board
 from bayesplate.board.sessions import readings_by_mode, rescale_discrepancies
 from bayesplate.estimates.least_squares import log_measured, reading_scales
@@ -30,8 +30,6 @@ from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.plate.naming import ModePlace
 from bayesplate.posterior.laplace import all_modes_predictor
 from bayesplate.posterior.posing import PosedProblem
-
-ModeIndices = NDArray[np.intp]  # indices of modes or readings
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +51,7 @@ class PossibleModes:
     discrepancy: Floats | float = 0.0
 
     @cached_property
-    def starts(self) -> ModeIndices:
+    def starts(self) -> Indices:
         """Index of the first mode of each setup: (n_setups,) array."""
         return np.cumsum([0, *(len(places) for places in self.places)])[:-1]
 
@@ -79,10 +77,10 @@ class Baseline:
     possible_modes: PossibleModes  # all modes that the readings may be
     # (n_modes,) array of int: the index in `possible_modes` of the mode that each reading is; -1: no mode, and then the
     # entries of the arrays below mean nothing for this reading
-    rows: ModeIndices
+    rows: Indices
     symmetry: tuple[tuple[bool, bool], ...]  # whether each setup's two halves are alike along x and along y
 
-    def labelled(self, rows: ModeIndices) -> Baseline:
+    def labelled(self, rows: Indices) -> Baseline:
         """The readings as other modes, by indices in `possible_modes` (-1: no mode); itself if none differs."""
         return self if np.array_equal(rows, self.rows) else replace(self, rows=rows)
 
@@ -96,7 +94,7 @@ class Baseline:
         return np.asarray(self.rows >= 0)
 
     @cached_property
-    def mode_readings(self) -> ModeIndices:
+    def mode_readings(self) -> Indices:
         """Indices of the readings that are a mode."""
         return np.flatnonzero(self.is_mode)
 
@@ -131,7 +129,7 @@ class Baseline:
         return tuple(places[row] for row in self.rows)
 
     @cached_property
-    def setup_index(self) -> ModeIndices:
+    def setup_index(self) -> Indices:
         """Which setup each reading belongs to: (n_modes,) array."""
         return np.repeat(np.arange(len(self.board.setups)), [len(setup.readings) for setup in self.board.setups])
 
@@ -141,7 +139,7 @@ class Baseline:
         return readings_by_mode(self.board)
 
     @cached_property
-    def mode_index(self) -> ModeIndices:
+    def mode_index(self) -> Indices:
         """Index in `readings_by_mode` of the mode of each reading: (n_modes,) array."""
         index = np.empty(self.n_modes, dtype=np.intp)
         for i, mode in enumerate(self.readings_by_mode):
@@ -195,7 +193,7 @@ class Baseline:
         return self.log_frequency + shift - predict(log_rigidities[None, :])[0], log_rigidities - self.log_rigidities
 
 
-def _predict_rows(predict: Predict, rows: ModeIndices) -> Predict:
+def _predict_rows(predict: Predict, rows: Indices) -> Predict:
     return predict.of(rows) if isinstance(predict, Predictor) else lambda x: predict(x)[:, rows]
 
 
@@ -230,7 +228,7 @@ def baseline_of(problem: PosedProblem) -> Baseline:
     )
 
 
-def labelled_rows(models: Sequence[SetupModel]) -> ModeIndices:
+def labelled_rows(models: Sequence[SetupModel]) -> Indices:
     """Index of each labelled mode among all modes of the models: (n_modes,) array."""
     starts = np.cumsum([0, *(len(model.mode_places) for model in models)])[:-1]
     return np.concatenate([start + np.arange(len(model.places)) for start, model in zip(starts, models, strict=True)])

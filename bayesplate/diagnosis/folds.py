@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.arrays import Floats
-from bayesplate.diagnosis.baseline import ModeIndices
+from bayesplate.arrays import Floats, Indices
 from bayesplate.diagnosis.hypotheses import Hypothesis, odds_against_none, probabilities
 from bayesplate.diagnosis.search import SearchGround, SearchResult
 from bayesplate.estimates.leave_one_out import CarryingMode, carrying_modes, leverages_of, unite_carrying_modes
@@ -37,7 +36,7 @@ class NestedErrors:
     # reading is no mode then
     after: Floats
     # (n_sets, n_modes) array of int: index of the hypothesis that the fold of each reading chose
-    choices: ModeIndices
+    choices: Indices
     # readings that count neither before nor after, because their mode alone carries a constant or a size
     carrying_readings: tuple[int, ...] = ()
 
@@ -85,7 +84,7 @@ def nested_leave_one_out(
 
 def choose_hypotheses(
     hypotheses: Sequence[Hypothesis], evidences: Floats, needed_from: float = NEEDED_LOG_ODDS
-) -> ModeIndices:
+) -> Indices:
     """Index of the most probable hypothesis with an effect, or 0 where the odds against no effect are too low.
 
     Of the shape of the (n_hypotheses, ...) evidences without their first axis.
@@ -106,7 +105,7 @@ def log_score(ground: SearchGround, index: int, residual: Floats, carrying_readi
 
 
 def log_score_gains(
-    ground: SearchGround, residual: Floats, choices: ModeIndices, carrying_readings: Collection[int] = ()
+    ground: SearchGround, residual: Floats, choices: Indices, carrying_readings: Collection[int] = ()
 ) -> Floats:
     """Gain in log density of the readings left out by the hypothesis that each fold chose: one per mode that counts."""
     scores = {int(index): _log_scores(ground, int(index), residual) for index in {0, *choices}}

@@ -9,9 +9,9 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from bayesplate.arrays import Floats
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board
-from bayesplate.diagnosis.baseline import Baseline, ModeIndices
+from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.shifts import Cells, JointLaws, combine_cells, no_effect_cells
 from bayesplate.diagnosis.terms import NoiseGrid, NormalTerms, log_sum, noise_grid, noise_reach, normalised_weights
 from bayesplate.effects import EFFECTS
@@ -69,7 +69,7 @@ class Hypothesis:
         arrays."""
         return residuals + (baseline.middle - self.baseline.middle)
 
-    def labelled(self, baseline: Baseline, rows: ModeIndices) -> Hypothesis:
+    def labelled(self, baseline: Baseline, rows: Indices) -> Hypothesis:
         """The same hypothesis with other labels of the readings, by indices of modes."""
         return replace(self, baseline=baseline.labelled(rows))
 

@@ -15,12 +15,12 @@ from itertools import combinations
 
 import numpy as np
 
-from bayesplate.arrays import Floats
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import RIGIDITIES, moduli
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.sessions import readings_by_mode
-from bayesplate.diagnosis.baseline import Baseline, ModeIndices, PossibleModes, baseline_of, labelled_rows, symmetry_of
+from bayesplate.diagnosis.baseline import Baseline, PossibleModes, baseline_of, labelled_rows, symmetry_of
 from bayesplate.diagnosis.peaks import likely_labels
 from bayesplate.effects import EFFECTS, Effect
 from bayesplate.estimates.least_squares import log_measured, reading_scales
@@ -148,7 +148,7 @@ def fit_with_effects(problem: PosedProblem, combination: Sequence[str] | None, n
     )
 
 
-def _likely_rows(problem: PosedProblem, law: Predictor, rows: ModeIndices, log_rigidities: Floats) -> ModeIndices:
+def _likely_rows(problem: PosedProblem, law: Predictor, rows: Indices, log_rigidities: Floats) -> Indices:
     """The likely labels of the readings at fitted constants, with the noise from the misfit there.
 
     `rows` where all labels are certain, and where the plate has another symmetry, so that its modes do not correspond.

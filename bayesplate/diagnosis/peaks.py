@@ -14,8 +14,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from bayesplate.arrays import Floats
-from bayesplate.diagnosis.baseline import Baseline, ModeIndices
+from bayesplate.arrays import Floats, Indices
+from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.draws import TermDraws, draw_hypothesis
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.search import SearchGround
@@ -87,7 +87,7 @@ def log_likelihood_of_labels(baseline: Baseline, log_readings: Floats, draws: Te
     return np.asarray(-0.5 * squares.sum(axis=1))
 
 
-def _annealed_labels(ground: SearchGround, hypothesis: Hypothesis) -> Iterator[ModeIndices]:
+def _annealed_labels(ground: SearchGround, hypothesis: Hypothesis) -> Iterator[Indices]:
     """Labellings under a hypothesis while the noise is reduced, starting from the labels of the board.
 
     At each noise the labels that are likely over all draws, and those at the few draws with the highest likelihood of
@@ -106,11 +106,11 @@ def _annealed_labels(ground: SearchGround, hypothesis: Hypothesis) -> Iterator[M
         yield rows
 
 
-def _labels_at_draws(ground: SearchGround, draws: TermDraws, fallback: ModeIndices) -> ModeIndices:
+def _labels_at_draws(ground: SearchGround, draws: TermDraws, fallback: Indices) -> Indices:
     return likely_labels(ground.baseline, draws.predicted, draws.noise, fallback)
 
 
-def likely_labels(baseline: Baseline, log_frequency: Floats, noise: Floats, default: ModeIndices) -> ModeIndices:
+def likely_labels(baseline: Baseline, log_frequency: Floats, noise: Floats, default: Indices) -> Indices:
     """Index of the likely mode of each reading at some draws: (n_modes,) array, -1 where there is none.
 
     `default` where too few readings have a likely mode.
@@ -133,9 +133,7 @@ def likely_labels(baseline: Baseline, log_frequency: Floats, noise: Floats, defa
     return rows if np.sum(rows >= 0) > baseline.log_rigidities.size else default
 
 
-def _label_hypothesis(
-    ground: SearchGround, hypothesis: Hypothesis, first_labellings: Iterable[ModeIndices]
-) -> Hypothesis:
+def _label_hypothesis(ground: SearchGround, hypothesis: Hypothesis, first_labellings: Iterable[Indices]) -> Hypothesis:
     """The hypothesis with its likely labels, its evidence summed over all assignments of peaks to modes.
 
     Starts from the first labellings, and those to which they lead under this hypothesis.

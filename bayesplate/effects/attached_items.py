@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesplate.board.attached import AttachedItem
-from bayesplate.board.board import Board, Values, board_density, vibrating_lengths
+from bayesplate.board.board import Board, Values, vibrating_lengths
+from bayesplate.board.checks import nominal_mass
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Floats
@@ -100,14 +101,8 @@ def _vibrating_range(values: Values, setup: Setup) -> tuple[tuple[float, float],
 
 def forgotten_items(board: Board, setup: Setup) -> list[PlacedItem]:
     """One small item at each of the places where a forgotten item might be."""
-    mass = Quantity.from_mean(0.0, _UNKNOWN_SHARE * board_mass(board), "normal", lower=0.0)
+    mass = Quantity.from_mean(0.0, _UNKNOWN_SHARE * nominal_mass(board), "normal", lower=0.0)
     return [PlacedItem(mass, _UNKNOWN_SOURCE, (place,)) for place in _likely_places(setup)]
-
-
-def board_mass(board: Board) -> float:
-    """Mass of the whole board at its nominal sizes, kg."""
-    values = board.nominal()
-    return float(board_density(values) * values["length_x"] * values["length_y"] * values["thickness"])
 
 
 def _likely_places(setup: Setup) -> Fractions:

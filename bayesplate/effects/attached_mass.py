@@ -12,13 +12,13 @@ import numpy as np
 
 from bayesplate.board.attached import AttachedItem
 from bayesplate.board.board import Board, Values, vibrating_lengths
+from bayesplate.board.checks import nominal_mass
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.setup import Setup
 from bayesplate.effects.attached_items import (
     Fractions,
     PlacedItem,
     Places,
-    board_mass,
     forgotten_items,
     fractions_on,
     item_on_board,
@@ -199,7 +199,7 @@ def heaviest_roving(board: Board, setup: Setup) -> float:
     if not _attached_items(setup):
         return 0.0
     masses = [item.mass.median for item in AttachedMass.of(board, setup).items if len(item.places) > 1]
-    return max(masses, default=0.0) / board_mass(board)
+    return max(masses, default=0.0) / nominal_mass(board)
 
 
 def _item_within(item: PlacedItem, shaped: Effect) -> PlacedItem:

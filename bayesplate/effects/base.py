@@ -23,10 +23,9 @@ from bayesplate.board.parameter import BOARD_OWNER, Owner, Parameter, parameter_
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.plate.fields import EdgeStrip, Field, Outline, TermGroup
-from bayesplate.plate.terms import Term, Weights
+from bayesplate.plate.terms import Term, Theory, Weights
 
 Scope = Literal["board", "setup"]
-Theory = Literal["thin", "shear-flexible"]
 Release = Literal["", "value", "slope"]
 """What clamped edges release in the presence of an effect, whose springs then hold it: nothing, deflection or slope."""
 WeightFunction = Callable[[Values, Setup], Floats]

@@ -25,7 +25,7 @@ HEAVIEST_GAS = 100.0
 WATER, NEAR_WATER = 997.0, 50.0
 """Densities, kg m^-3, by which the fluid is called air, water, or a fluid."""
 _SOURCES = (
-    "air at 20 degrees Celsius near sea level, within 5 %",
+    "air at 20 degrees Celsius near sea level",
     "nearly uniform from the open air (0) to a rigid wall around the board (1)",
 )
 

@@ -10,7 +10,8 @@ from bayesplate.board.board import Board, Values
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
-from bayesplate.effects.base import Effect, Ratio, Scope, Theory
+from bayesplate.effects.base import Effect, Ratio, Scope
+from bayesplate.plate.terms import Theory
 
 _SOURCE = "spruce, log-normal around published values of G_xz 0.5-0.75 GPa and G_yz 20-40 MPa, widened for other woods"
 _RIGID_MODULUS = 1e13

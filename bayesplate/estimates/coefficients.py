@@ -23,9 +23,9 @@ from bayesplate.frequencies.terms import shear_moduli
 from bayesplate.labels import Label
 from bayesplate.plate.beams import Beams
 from bayesplate.plate.naming import find_named_modes
+from bayesplate.plate.terms import Theory
 from bayesplate.plate.training import (
     MODULUS_FACTORS,
-    Theory,
     TrainingConstants,
     train,
     training_matrices,

@@ -12,11 +12,11 @@ import numpy as np
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Values
 from bayesplate.board.setup import Setup
-from bayesplate.effects.base import Effect, Theory, Variation
+from bayesplate.effects.base import Effect, Variation
 from bayesplate.frequencies.terms import along_grain
 from bayesplate.plate.fields import EdgeStrip, Fabric, Field, TermGroup, term_field_pairs
 from bayesplate.plate.shear import SHEAR_FLEXIBLE
-from bayesplate.plate.terms import Weights
+from bayesplate.plate.terms import Theory, Weights
 from bayesplate.plate.thin import THIN
 
 _GROUPS: tuple[TermGroup, ...] = ("along", "bending", "shear", "mass", "rotary")

@@ -17,8 +17,6 @@ from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.frequencies.residues import detection_share, sign_probabilities
 from bayesplate.labels import Label
 
-Integers = Indices
-
 _MOST_UNSIGNED = 6
 """Up to so many peaks of unknown sign, the likelihood is summed over both signs of each."""
 _DRAWS_AT_ONCE = 512
@@ -34,7 +32,7 @@ _SIGNS = {"+": 1, "-": -1, "": 0}
 class OrderedPeaks:
     """Peaks whose order of frequency is that of their modes: all peaks, or those that may have one sign."""
 
-    peaks: Integers  # (n_own,)
+    peaks: Indices  # (n_own,)
     log_sign: Floats  # (n_own, n_modes): ln of the probability that a mode has the sign of a peak
 
 
@@ -54,9 +52,9 @@ class PeakLikelihood:
     """
 
     errors: ReadingErrors  # of the peaks, in the order of frequency
-    readings: Integers  # (n_peaks,): index of each peak among the setup's readings; -1: it is none of them
-    unlabelled: Integers  # (n_peaks,): index among the setup's peaks without a label; -1: it has a label
-    columns: Integers  # (n_modes,): indices in the model of the modes that peaks may be, the labelled ones first
+    readings: Indices  # (n_peaks,): index of each peak among the setup's readings; -1: it is none of them
+    unlabelled: Indices  # (n_peaks,): index among the setup's peaks without a label; -1: it has a label
+    columns: Indices  # (n_modes,): indices in the model of the modes that peaks may be, the labelled ones first
     labels: tuple[Label | None, ...]
     log_prior: Floats  # (n_peaks, n_modes): ln prior of a pair: mode detected, peak not spurious, its label
     log_spurious: Floats  # (n_peaks,): ln of the probability of each peak if it is spurious
@@ -154,7 +152,7 @@ class PeakLikelihood:
         width = errors.resolution[0] / errors.frequency[0] if errors.rounded[0] else 1.0
         return float(self.log_spurious[peak] - np.log(width))
 
-    def _assignments(self, log_frequency: Floats, noise: Floats) -> tuple[Integers, Floats, Assignments]:
+    def _assignments(self, log_frequency: Floats, noise: Floats) -> tuple[Indices, Floats, Assignments]:
         """Modes in order of frequency, ln of the probability that each left no peak, and the ratios r_ij of pairs.
 
         The order is (n_modes, n_draws), or (n_modes, 1) where it is the same at all draws. Pairs that are not near each
@@ -208,7 +206,7 @@ class PeakLikelihood:
         return np.asarray(np.log(np.maximum(missed, _LEAST_MISSED)))
 
     @cached_property
-    def _peaks(self) -> Integers:
+    def _peaks(self) -> Indices:
         return np.concatenate([order.peaks for order in self.orders])
 
     @cached_property
@@ -237,7 +235,7 @@ def needs_assignment(setup: Setup) -> bool:
     return bool(setup.peaks) or not all(reading.is_sure for reading in setup.readings)
 
 
-def _orders(signs: Integers, n_modes: int, residues: Floats | None) -> Iterator[OrderedPeaks]:
+def _orders(signs: Indices, n_modes: int, residues: Floats | None) -> Iterator[OrderedPeaks]:
     """The peaks of each sign, those of unknown sign in both; or all peaks together."""
     unsigned = np.flatnonzero(signs == 0)
     log_sign = np.zeros((3, n_modes))
@@ -253,7 +251,7 @@ def _orders(signs: Integers, n_modes: int, residues: Floats | None) -> Iterator[
         yield OrderedPeaks(peaks, np.repeat(log_sign[sign][None], peaks.size, axis=0))
 
 
-def _log_labels(setup: Setup, readings: Integers, labels: Sequence[Label | None]) -> Floats:
+def _log_labels(setup: Setup, readings: Indices, labels: Sequence[Label | None]) -> Floats:
     """ln of the probability of each peak's label if the peak is each mode and, last, if it is spurious.
 
     A label is right with probability c, and otherwise belongs to each other mode with an equal share of 1 - c. A label

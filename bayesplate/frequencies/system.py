@@ -12,14 +12,14 @@ from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.setup import EdgeConditions, Setup
 from bayesplate.effects import effects_of
-from bayesplate.effects.base import Contribution, Effect, Mass, Stiffness, Theory
+from bayesplate.effects.base import Contribution, Effect, Mass, Stiffness
 from bayesplate.frequencies.fabric import fabric_of, in_plane_field, spread_over_fields
 from bayesplate.frequencies.terms import shear_term_weights, term_weights
 from bayesplate.plate.line import N_POINTS, N_POINTS_CUT, EndCondition, EndConditions, Line, line
 from bayesplate.plate.mesh import ELEMENTS_PER_SIDE, mesh
 from bayesplate.plate.plate import Plate, plate_of
 from bayesplate.plate.shear import SHEAR_ELEMENTS_PER_SIDE, SHEAR_FLEXIBLE
-from bayesplate.plate.terms import Weights
+from bayesplate.plate.terms import Theory, Weights
 from bayesplate.plate.thin import THIN
 
 WidthLimits = tuple[Floats, Floats]

@@ -11,9 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesplate.arrays import Floats
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import MODULI, RIGIDITIES, moduli
 from bayesplate.board.parameter import Parameter
@@ -23,8 +22,6 @@ from bayesplate.frequencies.prior_bands import prior_medians, with_rigidities
 from bayesplate.planning.laws import BareLaw, bare_law
 from bayesplate.planning.stations import new_stations, old_stations
 from bayesplate.posterior.parameters import Parameters
-
-IndexArray = NDArray[np.intp]
 
 N_TERMS = 96
 """Equally weighted terms that stand for an explanation."""
@@ -36,11 +33,11 @@ _STEP = 1e-4
 class FormTerms:
     """Terms of an explanation in which its effects have the same forms."""
 
-    rows: IndexArray  # (n,) array of int: indices of the terms
+    rows: Indices  # (n,) array of int: indices of the terms
     board: Board  # with the forms declared
     effects: tuple[str, ...]  # the effect of each parameter
     parameters: tuple[Parameter, ...]  # the uncertain sizes
-    columns: IndexArray  # (n_parameters,) array of int: columns of u that are their standard coordinates
+    columns: Indices  # (n_parameters,) array of int: columns of u that are their standard coordinates
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +47,7 @@ class ReadingsAtHand:
     shift: Floats  # (n_terms, n_readings) array: ln f (Hz) where u is zero; NaN of a reading that is no mode
     slopes: Floats  # (n_terms, n_readings, n_u) array
     # (n_readings,) array of int: the reading that has each label under the explanation; -1 for none
-    reading_index: IndexArray
+    reading_index: Indices
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from bayesplate.arrays import Floats
+from bayesplate.arrays import Floats, Indices
 from bayesplate.board.prior import PriorCard
 from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.diagnosis.forms import with_forms
@@ -30,7 +30,6 @@ from bayesplate.planning.beliefs import (
     Beliefs,
     ExplanationTerms,
     FormTerms,
-    IndexArray,
     KnownBoard,
     ReadingsAtHand,
     log_moduli,
@@ -146,7 +145,7 @@ def _readings_at_hand(terms_baseline: Baseline, base: Baseline, shift: Floats, s
 
 
 def _effect_sizes(
-    result: SearchResult, explanation: Explanation, cells: IndexArray, first: int
+    result: SearchResult, explanation: Explanation, cells: Indices, first: int
 ) -> tuple[tuple[FormTerms, ...], Floats, Floats]:
     """The forms of the effects in some cells of an explanation's table; standard coordinates of their sizes, and steps.
 
@@ -183,7 +182,7 @@ def _effect_sizes(
 
 
 def _condition_on_readings(
-    design: Floats, variance: Floats, residuals: Floats, used: IndexArray, n_constants: int
+    design: Floats, variance: Floats, residuals: Floats, used: Indices, n_constants: int
 ) -> tuple[Floats, Floats]:
     """Mean and covariance of u in some terms, given the residuals of the used readings."""
     design, residuals = design[:, used], residuals[:, used]

@@ -9,8 +9,8 @@ import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values, board_density, vibrating_lengths
+from bayesplate.board.checks import nominal_mass
 from bayesplate.board.sessions import rescale_discrepancies
-from bayesplate.effects.attached_items import board_mass
 from bayesplate.errors import BayesplateError
 from bayesplate.estimates.refit import sensitivities
 from bayesplate.frequencies.model import setup_model
@@ -99,7 +99,7 @@ class SolvedStation:
 
 def known_mass(board: Board) -> float:
     """The mass of a set of weights that is nearest to a fiftieth of the board's mass, kg."""
-    target = _MASS_SHARE * board_mass(board)
+    target = _MASS_SHARE * nominal_mass(board)
     return min(_WEIGHT_SET, key=lambda mass: abs(np.log(mass / target)))
 
 

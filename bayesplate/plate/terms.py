@@ -7,13 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.plate.fields import Outline, TermGroup, weights_within
 from bayesplate.plate.line import Line
+
+Theory = Literal["thin", "shear-flexible"]
 
 
 class Weights(NamedTuple):

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -22,10 +21,8 @@ from bayesplate.plate.naming import find_named_modes
 from bayesplate.plate.plate import Plate
 from bayesplate.plate.shear import SHEAR_CORRECTION, SHEAR_ELEMENTS_PER_SIDE, shear_flexible_plate
 from bayesplate.plate.solve import Modes, solve
-from bayesplate.plate.terms import Weights
+from bayesplate.plate.terms import Theory, Weights
 from bayesplate.plate.thin import thin_plate
-
-Theory = Literal["thin", "shear-flexible"]
 
 MODULUS_FACTORS = (0.8, 0.9, 1.0, 1.1, 1.2)
 """Factors on E_x and on E_y, in all combinations."""

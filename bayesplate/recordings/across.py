@@ -18,11 +18,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bayesplate.arrays import Floats
+from bayesplate.arrays import Floats, Indices
 from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.modes_found import Mode
 from bayesplate.recordings.plausibility import JudgedMode
-from bayesplate.recordings.spectra import RecordIndices, Spectra
+from bayesplate.recordings.spectra import Spectra
 
 MatchedPeaks = dict[int, JudgedMode]
 """The peaks of one mode, by the number of the set of records that shows them."""
@@ -58,7 +58,7 @@ class AveragedModes(NamedTuple):
 
 
 def average_modes(
-    spectra: Spectra, sets: Sequence[RecordIndices], judged_modes: Sequence[Sequence[JudgedMode]]
+    spectra: Spectra, sets: Sequence[Indices], judged_modes: Sequence[Sequence[JudgedMode]]
 ) -> AveragedModes:
     """Modes of all records from the peaks that each set of records shows by itself.
 
@@ -87,7 +87,7 @@ def average_modes(
     return AveragedModes(modes, spurious, kept_spectra, tuple(remarks))
 
 
-def _set_name(spectra: Spectra, records: RecordIndices) -> str:
+def _set_name(spectra: Spectra, records: Indices) -> str:
     """Name of a set of records: the file if the set is all of it, else the hit."""
     name = spectra.names[records[0]]
     is_whole = records.size == np.sum(spectra.files == spectra.files[records[0]])

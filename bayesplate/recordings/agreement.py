@@ -11,9 +11,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bayesplate.arrays import Bools, Complex, Floats
+from bayesplate.arrays import Bools, Complex, Floats, Indices
 from bayesplate.recordings.local_fit import STEADY_DECAY, Window, refine_poles
-from bayesplate.recordings.spectra import RecordIndices, Spectra
+from bayesplate.recordings.spectra import Spectra
 
 _MOST_PEAKS, _FEWEST_PEAKS, _MOST_RECORDS = 12, 2, 8
 _PROMINENCE = 12.0
@@ -27,7 +27,7 @@ _ALIKE_SCATTER = 0.025
 """Root mean square of poles over their decay rates up to which records have the same modes."""
 
 
-def agreeing_records(spectra: Spectra, lowest: float, highest: float) -> list[RecordIndices]:
+def agreeing_records(spectra: Spectra, lowest: float, highest: float) -> list[Indices]:
     """Sets of records that show the same modes, by their peaks between two frequencies.
 
     Either one set of all records, one set for each file, or one set for each of the clearest records.
@@ -46,7 +46,7 @@ def agreeing_records(spectra: Spectra, lowest: float, highest: float) -> list[Re
     return [all_records[spectra.files == file] for file in np.unique(spectra.files)]
 
 
-def _clearest_records(spectra: Spectra) -> RecordIndices:
+def _clearest_records(spectra: Spectra) -> Indices:
     """The records of each file that stand highest above their noise, as many as can be searched one by one."""
     snr = np.sum(np.abs(spectra.values / spectra.noise) ** 2, axis=0)
     files = np.unique(spectra.files)
@@ -63,7 +63,7 @@ def _median_scatter(squares: Floats) -> float:
     return float(finite[(finite.size - 1) // 2]) if finite.size >= _FEWEST_PEAKS else 0.0
 
 
-def _peak_poles(spectra: Spectra, lowest: float, highest: float) -> Iterator[tuple[Floats, Floats, RecordIndices]]:
+def _peak_poles(spectra: Spectra, lowest: float, highest: float) -> Iterator[tuple[Floats, Floats, Indices]]:
     """For each strong peak: (n, 2) poles of the records that show it, over its decay rate; their variances; files."""
     from scipy.signal import find_peaks, peak_widths
 
@@ -98,7 +98,7 @@ def _fit_pole(spectra: Spectra, values: Complex, near: Bools, start: Floats) -> 
     return (fit.poles[0], variances) if is_simple and is_sure and rings else None
 
 
-def _pole_scatter(poles: Floats, variances: Floats, files: RecordIndices) -> tuple[float, float]:
+def _pole_scatter(poles: Floats, variances: Floats, files: Indices) -> tuple[float, float]:
     """Variance of poles beyond their errors, within files and among files; NaN where there are too few records."""
     _, file_index, counts = np.unique(files, return_inverse=True, return_counts=True)
     means = np.stack([np.bincount(file_index, poles[:, k]) / counts for k in (0, 1)], axis=1)

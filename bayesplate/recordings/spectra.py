@@ -11,7 +11,6 @@ from bayesplate.arrays import Complex, Floats, Indices
 from bayesplate.recordings.hits import LONGEST_DURATION, Hit
 from bayesplate.recordings.signals import FrequencyResponse, Motion, Place, Recording
 
-RecordIndices = Indices
 PlacePair = tuple[Place | None, Place | None]
 """Places of hammer and sensor."""
 
@@ -30,8 +29,8 @@ class Spectra:
     values: Complex  # (n_lines, n_records): of the free decays, without a taper
     force: Complex | None  # (n_lines, n_records): of each hit from the same origin of time; 1 for frequency responses
     names: tuple[str, ...]
-    files: RecordIndices  # (n_records,): number of the file of each record
-    places: RecordIndices  # (n_records,): number of the pair of places of each record
+    files: Indices  # (n_records,): number of the file of each record
+    places: Indices  # (n_records,): number of the pair of places of each record
     place_pairs: tuple[PlacePair, ...]  # the pairs of places
     motion: Motion
     duration: float  # s, of each decay
@@ -48,7 +47,7 @@ class Spectra:
         top = np.abs(self.values).max(axis=0)
         return np.asarray(np.maximum(level, 1e-9 * top + 1e-300))
 
-    def of_records(self, records: RecordIndices) -> Spectra:
+    def of_records(self, records: Indices) -> Spectra:
         kept_places = np.unique(self.places[records])
         return replace(
             self,
@@ -126,7 +125,7 @@ def _force_spectrum(force: Floats, rate: float, hit: Hit, frequency: Floats) -> 
     return np.asarray(np.exp(-2j * np.pi * np.outer(frequency, times)) @ pulse / rate)
 
 
-def _group_by_places(records: Sequence[Recording | FrequencyResponse]) -> tuple[RecordIndices, tuple[PlacePair, ...]]:
+def _group_by_places(records: Sequence[Recording | FrequencyResponse]) -> tuple[Indices, tuple[PlacePair, ...]]:
     """Number of the pair of places of each record, and the pairs; a file with an unknown place is a pair of its own."""
     pairs = [(record.hammer, record.sensor) for record in records]
     keys = [record.name if None in pair else pair for pair, record in zip(pairs, records, strict=True)]

@@ -290,14 +290,14 @@ def grading_sentences(graded: Grading, summary: BatchSummary) -> tuple[str, ...]
         limits = ", ".join(limit_text(name, limit) for name, limit in graded.request.limits.items())
         n_sure, n_maybe = int((meets >= 0.9).sum()), int((meets >= 0.5).sum())
         sentences.append(
-            f"{limits}: {n_sure} boards meet this with 90 % or more, {n_maybe} with 50 % or more; "
+            f"{limits}: met with 90 % or more by {n_sure} of the boards, with 50 % or more by {n_maybe}; "
             f"{float(meets.sum()):.1f} are to be expected."
         )
     if graded.pairs:
         best = graded.pairs[0]
         first, second = graded.names[best.first], graded.names[best.second]
         sentences.append(
-            f"{len(graded.pairs)} pairs are proposed; the likeliest match is {first} with {second}, "
+            f"Pairs proposed: {len(graded.pairs)}; the likeliest match is {first} with {second}, "
             f"{percent(best.probability)}."
         )
     in_doubt = doubts_sentence(graded)

@@ -40,6 +40,7 @@ def test_everything_that_cannot_be_read_is_said_at_once():
             "E_x=10,E_x=20", ["E_x=11:", "density=:450", "E_x=:12"], None,
             [f"--match: {ONCE}", f"--limit E_x=:12: {ONCE} (both ends: LEAST:GREATEST)"],
         ),
+        (",", [], None, [f'{PERCENTS} ","']),
         ("0", ["E_x=11:11"], None, [f'{PERCENTS} "0"', f'--limit E_x=11:11: {RANGE} "11:11"']),
         (None, ["E_x=0:"], None, [f'--limit E_x=0:: {RANGE} "0:"']),
     ):  # fmt: skip
