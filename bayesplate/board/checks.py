@@ -9,6 +9,7 @@ from typing import Any
 
 from bayesplate.board.board import Board, board_density
 from bayesplate.board.inputs import INPUTS
+from bayesplate.board.measures import Place
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.repeated import CALIPER, FEELER, RULE, SCALES, are_equal
 from bayesplate.board.setup import Setup
@@ -19,7 +20,6 @@ Check = tuple[str, bool, str, str, str]
 """Place, whether it holds, wanted, got, remedy."""
 Remark = tuple[bool, str]
 """Whether the remark applies, and its sentence."""
-Point = tuple[float, float]
 
 LIGHTEST, HEAVIEST = 20.0, 25_000.0  # kg/m3: lighter than balsa foam, heavier than any metal in use
 _LIKELY_LIGHTEST, _LIKELY_HEAVIEST = 100.0, 9_000.0  # kg/m3: balsa and brass, between which a board is likely
@@ -205,7 +205,7 @@ def _attached_place_checks(board: Board, setup: Setup, section: str) -> Iterator
     yield from place_checks(board, setup, places)
 
 
-def place_checks(board: Board, setup: Setup, places: Mapping[str, Point]) -> Iterator[Check]:
+def place_checks(board: Board, setup: Setup, places: Mapping[str, Place]) -> Iterator[Check]:
     """Whether each named place, m, is on the part of the board that no clamp covers."""
     (left, right), (bottom, top) = _free_spans(board, setup).values()
     x_range, y_range = f"x {1e3 * left:g} to {1e3 * right:g} mm", f"y {1e3 * bottom:g} to {1e3 * top:g} mm"

@@ -25,12 +25,10 @@ from bayesplate.commands.options import FilePath, Option, path_option
 from bayesplate.effects.attached_mass import HEAVIEST_ROVING
 from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.reading import CHANNELS
-from bayesplate.recordings.signals import MOTIONS, Motion
-
-PlaceXY = tuple[float, float]
+from bayesplate.recordings.signals import MOTIONS, Motion, Place
 
 
-def _places_from_text(context: click.Context, option: click.Parameter, texts: tuple[str, ...]) -> list[PlaceXY]:
+def _places_from_text(context: click.Context, option: click.Parameter, texts: tuple[str, ...]) -> list[Place]:
     """Places "X,Y" in mm as m."""
     places = []
     for text in texts:
@@ -139,8 +137,8 @@ def band_faults(arguments: Mapping[str, Any], lowest: float, highest: float) -> 
 
 
 def places_by_file(
-    hammer: Sequence[PlaceXY], sensor: Sequence[PlaceXY], files: Sequence[object]
-) -> list[tuple[PlaceXY | None, PlaceXY | None]]:
+    hammer: Sequence[Place], sensor: Sequence[Place], files: Sequence[object]
+) -> list[tuple[Place | None, Place | None]]:
     """Hammer and sensor of each file, from none, one, or as many as there are files; None where nothing is known."""
     places_by_argument = [
         [*places] if len(places) > 1 else [places[0] if places else None] * len(files) for places in (hammer, sensor)
@@ -149,7 +147,7 @@ def places_by_file(
 
 
 def require_on_board(
-    board: Board, hammer: Sequence[PlaceXY], sensor: Sequence[PlaceXY], sensor_mass: tuple[float, float] | None
+    board: Board, hammer: Sequence[Place], sensor: Sequence[Place], sensor_mass: tuple[float, float] | None
 ) -> None:
     """Refuse places, m, and a mass of the sensor, kg, that a card of a board with one setup could not state."""
     (setup,) = board.setups
@@ -185,7 +183,7 @@ Rate = Annotated[
     Option("--rate", type=float, metavar="HZ", help="Samples per second, where a file does not say it."),
 ]
 Hammer = Annotated[
-    Sequence[PlaceXY],
+    Sequence[Place],
     Option(
         "--hammer",
         multiple=True,
@@ -195,7 +193,7 @@ Hammer = Annotated[
     ),
 ]
 Sensor = Annotated[
-    Sequence[PlaceXY],
+    Sequence[Place],
     Option(
         "--sensor", multiple=True, callback=_places_from_text, metavar="X,Y", help="Where the sensor was, mm; likewise."
     ),

@@ -19,7 +19,7 @@ _DASK_TIMEOUT = "20s"
 _PRELOADED_MODULES = ("bayesplate.commands.fit_board", "scipy.stats", "scipy.sparse.linalg", "emcee", "skfem")
 """What every fit imports, loaded once for all workers."""
 
-Key = TypeVar("Key")
+CallKey = TypeVar("CallKey")
 Call = tuple[Callable[..., Any], tuple[Any, ...]]
 """A function and its arguments, to be computed anywhere."""
 
@@ -28,11 +28,11 @@ class WorkerDied(Exception):
     """A worker ended without an answer: it was killed, or ran out of memory."""
 
 
-def compute_calls(free: list[Executor], calls: Iterable[tuple[Key, Call]]) -> Iterator[tuple[Key, Future[Any]]]:
+def compute_calls(free: list[Executor], calls: Iterable[tuple[CallKey, Call]]) -> Iterator[tuple[CallKey, Future[Any]]]:
     """Compute calls, one at a time in each executor; yields each when done, by its key. A worker's death costs one."""
-    pending: dict[Future[Any], tuple[Key, Executor]] = {}
+    pending: dict[Future[Any], tuple[CallKey, Executor]] = {}
 
-    def finished_calls() -> Iterator[tuple[Key, Future[Any]]]:
+    def finished_calls() -> Iterator[tuple[CallKey, Future[Any]]]:
         done, _ = wait(pending, return_when=FIRST_COMPLETED)
         for future in done:
             key, executor = pending.pop(future)
