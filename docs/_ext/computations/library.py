@@ -163,6 +163,7 @@ CHECKS = (
     ),
     ("trial-short", "make trial", "The same in a paragraph."),
     ("trial-again", "make trial-again", "The first boards of each of its cells, judged again: question by question."),
+    ("trial-warp-exciter", "make trial-warp-exciter", "Boards that are not flat or that an exciter drives, on trial."),
 )
 """Long checks: the stem of their page or printed output, the command that makes it, and what it shows."""
 TITLES = {"trial-short": "The trial in short"}

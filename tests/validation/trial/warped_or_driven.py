@@ -38,6 +38,9 @@ HEAD = (
     "in a frame a fifth of that. The exciter is one of 48 g, whose coil and suspension are drawn; the card names it "
     "and its place, and not what it weighs. Both keep the size that nature or the maker gave them.",
     "",
+    "A run before this one, of the same seed, named 28 of 150 free boards with warp wrongly, most as a stiff support: "
+    "`diagnose` tried cup with bow, or twist, and not all three. It tries them at once since.",
+    "",
 )
 
 
