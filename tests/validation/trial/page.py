@@ -117,7 +117,6 @@ def plain(value: Any) -> Any:
 
 def page(summary: Mapping[str, Any]) -> list[str]:
     """Lines of the page."""
-    boards = summary["boards"]
     return [
         "# The trial of `diagnose`",
         "",
@@ -132,14 +131,22 @@ def page(summary: Mapping[str, Any]) -> list[str]:
         "",
         BEFORE,
         "",
-        f"{boards['judged']} boards of {boards['wanted']} judged, {boards['failed']} gave no answer, base seed "
-        f"{summary['base_seed']}.",
-        *(f"- no answer: {one['cell']}, board {one['index']}: {one['error']}" for one in summary["failures"]),
+        *judged(summary),
         *_records(summary),
         "",
         *tables(summary),
         "",
         *CHANGED,
+    ]
+
+
+def judged(summary: Mapping[str, Any]) -> list[str]:
+    """How many boards were judged, and those that gave no answer."""
+    boards = summary["boards"]
+    return [
+        f"{boards['judged']} boards of {boards['wanted']} judged, {boards['failed']} gave no answer, base seed "
+        f"{summary['base_seed']}.",
+        *(f"- no answer: {one['cell']}, board {one['index']}: {one['error']}" for one in summary["failures"]),
     ]
 
 

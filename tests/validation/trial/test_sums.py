@@ -8,10 +8,11 @@ import json
 from pathlib import Path
 
 import pytest
+from validation.trial import warped_or_driven
 from validation.trial.again import told
-from validation.trial.cells import Cell
+from validation.trial.cells import WARPED_OR_DRIVEN, Cell
 from validation.trial.counts import is_best
-from validation.trial.made_records import made
+from validation.trial.made_records import found_right, made
 from validation.trial.page import in_short, page, plain, write
 from validation.trial.published import as_text, publish_records, published_records
 from validation.trial.summary import by_class, summarise
@@ -136,3 +137,13 @@ def test_boards_judged_again_are_worse_where_more_of_the_changed_ones_are_than_c
     assert told(before, [*wrong[:7], right[7]])[1]
     assert "7 of 8 boards have another verdict" in "\n".join(lines)
     assert "one cantilever-6 5c 2x, board 0: named (air) -> named (mass)" in "\n".join(lines)
+
+
+def test_the_page_of_warp_and_exciter_counts_who_is_named_in_part_and_rightly():
+    """Three boards are unexplained: one named in part rightly, one by what is not there, one not at all."""
+    cell = WARPED_OR_DRIVEN[3]
+    records = [made(cell, i, ["warp"], "unexplained") for i in range(3)] + [found_right(cell, 3, ["warp"])]
+    records[0]["in_part"], records[1]["in_part"] = ["warp"], ["fluid_loading"]
+    lines = warped_or_driven.page(plain(summarise(records, 8, WARPED_OR_DRIVEN)), records)
+    assert f"- {cell.name}: 3 unexplained, 2 named in part, 1 of these rightly" in lines
+    assert any(line.startswith("4 boards of 1450 judged, 0 gave no answer") for line in lines)

@@ -20,8 +20,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from validation import measured
 from validation.calibration.study import arguments
 from validation.trial.cells import WARPED_OR_DRIVEN
-from validation.trial.counts import Record, share
-from validation.trial.page import plain, tables
+from validation.trial.counts import Record, truth
+from validation.trial.page import judged, plain, tables
 from validation.trial.run import run
 from validation.trial.summary import summarise
 
@@ -46,17 +46,7 @@ HEAD = (
 
 def page(summary: Mapping[str, Any], records: Sequence[Record]) -> list[str]:
     """Lines of the page."""
-    boards = summary["boards"]
-    return [
-        *HEAD,
-        f"{boards['judged']} boards of {boards['wanted']} judged, {boards['failed']} gave no answer, base seed "
-        f"{summary['base_seed']}.",
-        *(f"- no answer: {one['cell']}, board {one['index']}: {one['error']}" for one in summary["failures"]),
-        "",
-        *_in_part(records),
-        "",
-        *tables(summary),
-    ]
+    return [*HEAD, *judged(summary), "", *_in_part(records), "", *tables(summary)]
 
 
 def _in_part(records: Sequence[Record]) -> list[str]:
@@ -65,8 +55,8 @@ def _in_part(records: Sequence[Record]) -> list[str]:
     for name in dict.fromkeys(record["cell"] for record in records):
         own = [record for record in records if record["cell"] == name and record["word"] == "unexplained"]
         part = [record for record in own if record["in_part"]]
-        right = share(part, lambda record: set(record["in_part"]) <= set(record["truth"]["effects"])).count
-        lines.append(f"- {name}: {len(own)} unexplained, {len(part)} named in part, {right:.0f} of these rightly")
+        right = sum(truth(record).issuperset(record["in_part"]) for record in part)
+        lines.append(f"- {name}: {len(own)} unexplained, {len(part)} named in part, {right} of these rightly")
     return lines
 
 
