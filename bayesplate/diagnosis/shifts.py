@@ -33,6 +33,8 @@ FINE_CELLS, COARSE_CELLS = (33, 11, 256), (9, 5, 27)
 
 _REACH = 3.0
 _OVERLAP = 0.5
+_POINT_DIGITS = 9
+"""Decimals of standard coordinates in which cells that touch have the same side."""
 _REFITS = 10
 _SETTLED_STEP = 2e-4
 _LONGEST_STEP = 0.3
@@ -188,16 +190,13 @@ def refitted_shifts(baseline: Baseline, law: FormLaw, z: Floats) -> tuple[Floats
 
 def _solve_cells(baseline: Baseline, law: FormLaw, z: Floats, step: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Shift and refit of cells, and their changes over one standard deviation of the cell along each parameter."""
-    shift, moved = refitted_shifts(baseline, law, z)
-    sides = []
-    for k in range(z.shape[1]):
-        side = step * (np.arange(z.shape[1]) == k)
-        above, below = (refitted_shifts(baseline, law, z + sign * side) for sign in (1.0, -1.0))
-        sides.append([0.5 * (after - before) for after, before in zip(above, below, strict=True)])
-    if not sides:
-        return shift, moved, np.zeros((*shift.shape, 0)), np.zeros((*moved.shape, 0))
-    slopes, moved_slopes = (np.stack(changes, axis=2) for changes in zip(*sides, strict=True))
-    return shift, moved, slopes, moved_slopes
+    n_parameters = z.shape[1]
+    sides = [sign * step * (np.arange(n_parameters) == k) for k in range(n_parameters) for sign in (1.0, -1.0)]
+    points = np.concatenate([z, *(z + side for side in sides)])
+    points, places = np.unique(np.round(points, _POINT_DIGITS), axis=0, return_inverse=True)
+    shift, moved = (values[places.reshape(-1, len(z))] for values in refitted_shifts(baseline, law, points))
+    slopes, moved_slopes = (np.moveaxis(0.5 * (values[1::2] - values[2::2]), 0, 2) for values in (shift, moved))
+    return shift[0], moved[0], slopes, moved_slopes
 
 
 def _is_finite(*values: Floats) -> NDArray[np.bool_]:

@@ -16,13 +16,13 @@ import numpy as np
 from bayesplate.arrays import Floats, Indices
 from bayesplate.plate.beams import Beams
 from bayesplate.plate.naming import ModePlace, assign_products, product_fits
-from bayesplate.plate.pencils import inverse_step, pencil_modes, pencil_values
+from bayesplate.plate.pencils import InverseStep, inverse_step, pencil_modes, pencil_values
 from bayesplate.plate.terms import Parity, Weights
 
 SPARE_MODES = 4
 """Modes of a class above the highest wanted mode for which the basis is made too."""
-_BATCH_SIZE = 512
-"""Draws whose small matrices are held at once."""
+_BATCH_SIZE = 64
+"""Draws whose small matrices are held at once: more of them leave the processor's cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +47,7 @@ class ReducedClass:
         return np.concatenate([self._eigenvalues(batch) for batch in _batches(weights)])
 
     def _eigenvalues(self, weights: Weights) -> Floats:
-        step = inverse_step(
-            _sum_terms(weights.stiffness, self.stiffness), self.mass(weights), self.n_kept, self.n_rigid
-        )
+        step = self._inverse_step(weights)
         values = (pencil_values(step.stiffness, step.mass) - step.shift)[:, self.n_rigid :]
         return np.where(values[:, :1] > 0.0, values, np.nan)
 
@@ -59,14 +57,21 @@ class ReducedClass:
         The vectors are combinations of the basis, normalised in the draw's mass. Neither is a number at a draw that is
         no plate.
         """
-        step = inverse_step(
-            _sum_terms(weights.stiffness, self.stiffness), self.mass(weights), self.n_kept, self.n_rigid
-        )
+        values, vectors = zip(*(self._modes(batch, n_modes) for batch in _batches(weights)), strict=True)
+        return np.concatenate(values), np.concatenate(vectors)
+
+    def _modes(self, weights: Weights, n_modes: int) -> tuple[Floats, Floats]:
+        step = self._inverse_step(weights)
         values, rotations = pencil_modes(step.stiffness, step.mass)
         elastic = slice(self.n_rigid, self.n_rigid + n_modes)
         values, vectors = (values - step.shift)[:, elastic], step.vectors @ rotations[:, :, elastic]
         is_plate = values[:, 0] > 0.0
         return np.where(is_plate[:, None], values, np.nan), np.where(is_plate[:, None, None], vectors, np.nan)
+
+    def _inverse_step(self, weights: Weights) -> InverseStep:
+        return inverse_step(
+            _sum_terms(weights.stiffness, self.stiffness), self.mass(weights), self.n_kept, self.n_rigid
+        )
 
     def mass(self, weights: Weights) -> Floats:
         """Mass matrices of many draws on the basis: (n_draws, r, r) array."""

@@ -9,10 +9,10 @@ import pytest
 from full_refits import full_refit
 from made_searches import baseline
 
-from bayesplate.diagnosis import joint
+from bayesplate.diagnosis import joint, shifts
 from bayesplate.diagnosis.laws import FormLaw, form_law
 from bayesplate.diagnosis.search import prepare_search, run_search
-from bayesplate.diagnosis.shifts import tabulate
+from bayesplate.diagnosis.shifts import refitted_shifts, tabulate
 from bayesplate.diagnosis.signatures import Signature, signatures
 from bayesplate.frequencies.laws import cents
 
@@ -99,6 +99,24 @@ def test_the_cells_hold_the_prior(finnish_few):
     for cells, accuracy in ((one.fine, 0.01), (one.coarse, 0.02)):
         mean = float(cells.weights @ free.prior.value(cells.z[:, 0]))
         assert mean == pytest.approx(free.prior.sd * np.sqrt(2 / np.pi), rel=accuracy)
+
+
+def test_a_side_of_two_cells_is_solved_once_and_is_that_of_a_refit_there(finnish_few, monkeypatch):
+    base = finnish_few.ground.baseline
+    (law,) = finnish_few.ground.candidates["fluid_loading"].laws
+    solved = []
+    monkeypatch.setattr(shifts, "refitted_shifts", lambda *call: solved.append(len(call[2])) or refitted_shifts(*call))
+    table = tabulate(base, [law], (5, 3, 27))
+    n = len(law.form.free)
+    n_middles = {1: 5, 2: 9}[n]
+    n_sides = {1: 6, 2: 2 * 3 * 4}[n]
+    assert solved == [n_middles + n_sides]
+    for cell in (0, table.n_cells - 1):
+        for k in range(n):
+            side = table.z_slopes[cell] * (np.arange(n) == k)
+            above, below = (refitted_shifts(base, law, table.z[[cell]] + sign * side) for sign in (1.0, -1.0))
+            assert table.slopes[cell, :, k] == pytest.approx(0.5 * (above[0] - below[0])[0], abs=1e-9)
+            assert table.moved_slopes[cell, :, k] == pytest.approx(0.5 * (above[1] - below[1])[0], abs=1e-9)
 
 
 def test_a_law_made_for_another_board_serves_once_its_modes_are_placed(finnish_few):
