@@ -43,7 +43,7 @@ def effect_entry(
         visible_rms_cents=finite_or_none(signature.visible_rms) if has_directions else None,
         visible_cents=tuple(finite_or_none(float(value)) if has_directions else None for value in signature.visible),
         below_detection_limit=signature.is_below_detection_limit,
-        bias_percent=signature.bias_percent,
+        bias_percent=signature.bias_percent if np.isfinite(list(signature.bias_percent.values())).all() else None,
         inclusion_probability=result.inclusion(candidate.name),
         inclusion_probability_with_doubled_priors=doubled_inclusion,
         log_bayes_factor=log_bayes_factor,

@@ -245,7 +245,7 @@ class EffectEntry:
     visible_rms_cents: float | None
     visible_cents: tuple[float | None, ...]  # the same mode by mode
     below_detection_limit: bool  # whether these readings could not show it even if it were there
-    bias_percent: Mapping[str, float]  # what ignoring it does to each modulus
+    bias_percent: Mapping[str, float] | None  # what ignoring it does to each modulus; None where there is no frequency
     inclusion_probability: float
     inclusion_probability_with_doubled_priors: float
     log_bayes_factor: float  # against no effect

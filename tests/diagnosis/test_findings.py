@@ -336,6 +336,18 @@ def test_three_modes_leave_nothing_to_judge_by():
     assert [amplitude.q05, amplitude.q50, amplitude.q95] == pytest.approx([0.0627, 0.6745, 1.96], abs=1.5 / 33)
 
 
+def test_an_effect_without_a_plate_at_its_usual_size_has_no_shift_and_no_bias():
+    found = made({})
+    name, candidate = next(iter(found.ground.candidates.items()))
+    nowhere = np.full_like(candidate.signature.raw, np.nan)
+    bias = dict.fromkeys(candidate.signature.bias_percent, np.nan)
+    signature = replace(candidate.signature, raw=nowhere, visible=nowhere, bias_percent=bias)
+    candidates = {**found.ground.candidates, name: replace(candidate, signature=signature)}
+    entry = entries(replace(found, ground=replace(found.ground, candidates=candidates)))[name]
+    assert (entry.raw_rms_cents, entry.visible_rms_cents, entry.bias_percent) == (None, None, None)
+    json_text(entry)
+
+
 def test_four_and_five_modes_are_judged():
     for n_modes in [4, 5]:
         found, told = judged(n_modes)
