@@ -10,6 +10,7 @@ values, as in `bayesplate.estimates.least_squares`. Only the constants are fitte
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -23,9 +24,10 @@ from bayesplate.board.sessions import readings_by_mode
 from bayesplate.diagnosis.baseline import Baseline, PossibleModes, baseline_of, labelled_rows, symmetry_of
 from bayesplate.diagnosis.peaks import likely_labels
 from bayesplate.effects import EFFECTS, Effect
+from bayesplate.errors import Fault, NotIdentifiableError
 from bayesplate.estimates.least_squares import log_measured, reading_scales
 from bayesplate.estimates.leave_one_out import PredictionErrors, prediction_errors
-from bayesplate.estimates.refit import normal_misfit, refit, sensitivities
+from bayesplate.estimates.refit import has_come_to_rest, normal_misfit, refit, sensitivities
 from bayesplate.frequencies.model import SetupModel, setup_model
 from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.system import system_of
@@ -59,7 +61,8 @@ class KnownFit:
 def known_fits(problem: PosedProblem, tell: Callable[[float], None] | None = None) -> tuple[KnownFit, ...]:
     """The board as it stands, then with its known effects in every combination of up to three, smaller ones first.
 
-    The combination of all effects that the card states is among them, however large.
+    The combination of all effects that the card states is among them, however large. One with which the readings no
+    longer determine the constants is left out.
     """
     board = problem.board
     declared = {name for name in known_effects(board) if name in board.effects}
@@ -69,10 +72,11 @@ def known_fits(problem: PosedProblem, tell: Callable[[float], None] | None = Non
         *(combination for combination in known_combinations(board) if set(combination) != declared or not is_stated),
     ]
     fits = []
-    for combination in all_combinations:
-        fits.append(known_fit(problem, combination))
+    for n_done, combination in enumerate(all_combinations, start=1):
+        with suppress(NotIdentifiableError):
+            fits.append(known_fit(problem, combination))
         if tell is not None:
-            tell(len(fits) / len(all_combinations))
+            tell(n_done / len(all_combinations))
     return tuple(fits)
 
 
@@ -105,7 +109,8 @@ def known_fit(problem: PosedProblem, combination: Sequence[str] | None = None) -
 def fit_with_effects(problem: PosedProblem, combination: Sequence[str] | None, n_first: int | None = None) -> Baseline:
     """The constants fitted to a board with known effects (None: as it stands), solved again where they move far.
 
-    They are fitted to the first `n_first` readings, by default to all.
+    They are fitted to the first `n_first` readings, by default to all. Raises NotIdentifiableError where they go on
+    beyond reach.
     """
     board = problem.board if combination is None else with_combination(problem.board, combination)
     inputs, log_rigidities = _inputs_of(problem, board), _estimated_log_rigidities(problem)
@@ -125,6 +130,9 @@ def fit_with_effects(problem: PosedProblem, combination: Sequence[str] | None, n
             previous_rows, rows = rows, _likely_rows(problem, law, rows, log_rigidities)
             if np.array_equal(rows, previous_rows):
                 break
+        if not has_come_to_rest(log_rigidities, _estimated_log_rigidities(problem), board.symmetry.n):
+            wanted = f"constants that the readings determine with {', '.join(board.effects) or 'no effect'}"
+            raise NotIdentifiableError(Fault(board.name, wanted, "a fit that goes on a thousandfold"))
         rows = previous_rows
         if np.abs(log_rigidities - start).max() <= _LAW_REACH:
             break

@@ -20,6 +20,7 @@ from bayesplate.diagnosis.claim import STANDARD_ERRORS, score_gain
 from bayesplate.diagnosis.known import KnownFit, effects_at_known_size, fit_with_effects, stated_effects
 from bayesplate.diagnosis.shifts import no_effect_cells
 from bayesplate.diagnosis.terms import NormalTerms, noise_grid, noise_reach
+from bayesplate.errors import NotIdentifiableError
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.results.contract import rms
@@ -73,11 +74,10 @@ def stated_claims(problem: PosedProblem, fits: Sequence[KnownFit]) -> tuple[Stat
     """Judge the stated effects of a board by modes left out, and by each further setup that states other sizes."""
     board = problem.board
     effects = stated_effects(board)
-    if not effects:
+    by_combination = {fit.combination: fit for fit in fits}
+    if not effects or not {(), effects} <= by_combination.keys():
         return ()
-    bare_fit, stated_fit = (
-        next(fit for fit in reversed(fits) if fit.combination == combination) for combination in ((), effects)
-    )
+    bare_fit, stated_fit = by_combination[()], by_combination[effects]
     before, after = bare_fit.errors.left_out, stated_fit.errors.left_out
     has_both = np.asarray(np.isfinite(before) & np.isfinite(after))
     has_both &= (bare_fit.errors.leverages.carries < 0) & (stated_fit.errors.leverages.carries < 0)
@@ -95,7 +95,10 @@ def _claims_of_further_setups(
 ) -> list[StatedClaim | None]:
     """Claims of further setups, predicted by the constants of the first setup."""
     n_first = len(problem.board.setups[0].readings)
-    fits = [fit_with_effects(problem, combination, n_first) for combination in ((), effects)]
+    try:
+        fits = [fit_with_effects(problem, combination, n_first) for combination in ((), effects)]
+    except NotIdentifiableError:  # the first setup does not determine the constants
+        return []
     claims = []
     for number, setup in enumerate(problem.board.setups):
         if setup.name in names:

@@ -10,8 +10,10 @@ import pytest
 from generator.boards import plant
 from scipy.stats import chi2
 
+from bayesplate import Board, Setup
 from bayesplate.board.material import RIGIDITIES, moduli
 from bayesplate.board.parameter import BOARD_OWNER, Owner
+from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.commands.problem import Problem
 from bayesplate.diagnosis import known
@@ -23,10 +25,13 @@ from bayesplate.diagnosis.known import (
     stated_effects,
     with_combination,
 )
+from bayesplate.diagnosis.stated import stated_claims
+from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import system_of
+from bayesplate.posterior.posing import pose
 
 FIEMME = "fiemme-spruce-clamped"
 SHEAR, AIR, MASS = "transverse_shear", "fluid_loading", "attached_mass"
@@ -166,6 +171,28 @@ def test_a_sensor_of_stated_mass_is_shown_by_leaving_it_out(tmp_path, monkeypatc
         None, (), (SHEAR,), (AIR,), (SHEAR, AIR), (SHEAR, MASS), (AIR, MASS), (SHEAR, AIR, MASS),
     )  # fmt: skip
     assert told == pytest.approx(np.arange(1.0, 9.0) / 8.0)
+
+
+THICK = dict(zip(
+    [(0, 0), (0, 1), (1, 0), (0, 2), (1, 1), (1, 2), (0, 3), (2, 0), (1, 3), (2, 1), (2, 2)],
+    [679.3, 1052.4, 1700.2, 1786.1, 1934.7, 2497.6, 2832.4, 3288.5, 3419.0, 3475.5, 3924.2],
+    strict=True,
+))  # fmt: skip
+"""Hz; products of beam functions on a clamped board, 11.9 and 3.06 GPa, as if it were thin."""
+
+
+def test_a_combination_with_which_nothing_bounds_the_constants_is_left_out():
+    """A board of 74 mm whose modes lie above all that a board that gives in shear can reach, however stiff."""
+    setup = Setup.from_frequencies(THICK, edges="clamped")
+    board = Board.from_numbers(
+        "thick", length_x=0.861, length_y=0.867, thickness=0.0745, density=375.0, poisson_xy=0.4, setups=[setup]
+    )
+    problem = pose(board, load_prior("spruce"))
+    with pytest.raises(NotIdentifiableError, match=r"thick: wanted constants that .* with transverse_shear, got a fit"):
+        known_fit(problem, (SHEAR,))
+    assert [fit.combination for fit in known_fits(problem)] == [(), (AIR,)]
+    stating = replace(problem, board=replace(board, effects=(SHEAR,)))
+    assert stated_claims(stating, [known_fit(problem)]) == ()
 
 
 def test_a_declared_size_of_the_library_is_fixed_in_combinations(tmp_path, monkeypatch):
