@@ -17,6 +17,8 @@ LONGEST_DURATION = 4.0
 """s of a decay that are used: by then boards are silent."""
 LEAST_FALL = 10.0
 """dB by which a decay must have fallen before the next hit."""
+_HISS_LINES = 11
+"""Neighbouring spectral lines whose median tells the hiss: a single line of hiss may be faint by chance."""
 BOUNCE_TIME = 0.1
 """s after a hit within which another one is a bounce of the hammer."""
 _AFTER_SOUND = 0.004
@@ -99,23 +101,27 @@ def _decay_fault(recording: Recording, onset: int, start: int, stop: int, end: s
 def _decay_fall(response: Floats, rate: float, onset: int, start: int, stop: int) -> float:
     """Fall of a decay in dB from its first tenth to its last, at the frequencies that the hit has raised.
 
-    Hum, a steady tone and rumble were there before the hit, and do not fall.
+    Hiss, hum, a steady tone and rumble were there before the hit, and do not fall: they are no part of the decay.
     """
+    from scipy.ndimage import median_filter
+
     slow, slow_rate = decimated_sounds(response, rate)[-1]
     onset, start, stop = (round(sample * slow_rate / rate) for sample in (onset, start, stop))
     tenth = max((stop - start) // 10, 1)
     slices = (slice(max(onset - tenth, 0), onset), slice(start, start + tenth), slice(stop - tenth, stop))
     before, first, last = (_line_powers(slow[part], tenth) for part in slices)
-    raised = first > 10.0 ** (LEAST_FALL / 10.0) * before
-    return 10.0 * float(np.log10(max(first[raised].sum(), 1e-300) / max(last[raised].sum(), 1e-300)))
+    steady = np.maximum(before, median_filter(before, _HISS_LINES) / np.log(2.0))  # the mean of hiss by its median
+    raised = first > 10.0 ** (LEAST_FALL / 10.0) * steady
+    decays = ((part - steady)[raised].sum() for part in (first, last))
+    return 10.0 * float(np.log10(np.divide(*(max(decay, 1e-300) for decay in decays))))
 
 
 def _line_powers(part: Floats, n: int) -> Floats:
-    """Power of each spectral line of a part of a signal, as if it had n samples: (n // 2 + 1,) array."""
+    """Power of each spectral line of a part of a signal, of hiss as if it had n samples: (n // 2 + 1,) array."""
     if not part.size:
         return np.zeros(n // 2 + 1)
     change = np.diff(part, prepend=part[0])  # rumble hardly changes
-    return np.asarray(np.abs(np.fft.rfft(np.hanning(part.size) * change, n)) ** 2)
+    return np.asarray(np.abs(np.fft.rfft(np.hanning(part.size) * change, n)) ** 2 * (n / part.size))
 
 
 def _gate_sample(decay: Floats, rate: float) -> int | None:

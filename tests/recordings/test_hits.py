@@ -51,6 +51,29 @@ def test_a_bounce_is_a_double_hit_and_the_others_are_used(has_force):
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize(("seed", "damping", "is_heard_out"), [(1, 0.02, True), (2, 0.02, True), (1, 0.0002, False)])
+def test_a_decay_that_sinks_into_the_hiss_has_fallen_and_one_that_rings_on_has_not(seed, damping, is_heard_out):
+    """Hiss of 2 or 0.5 per cent of the loudest sample; the modes fall by 40 dB and more, or by 1 to 7 dB."""
+    rate, rng = 22_050.0, np.random.default_rng(seed)
+    t = np.arange(round(8.2 * rate)) / rate
+    heard = np.zeros_like(t)
+    for at in np.array([0.1, 2.1, 4.1, 6.1]):
+        since = np.maximum(t - at, 0.0)
+        for hz in (40.9, 64.5, 104.9, 134.3, 178.9, 208.4, 294.4, 325.3):
+            heard += (
+                rng.uniform(0.2, 1.0) * np.exp(-2.0 * np.pi * hz * damping * since) * np.sin(2 * np.pi * hz * since)
+            )
+    heard += (0.02 if is_heard_out else 0.005) * np.abs(heard).max() * rng.standard_normal(t.size)
+
+    found = find_hits(Recording("tap.wav", rate, heard))
+
+    assert [round(hit.onset / rate, 1) for hit in found] == [0.1, 2.1, 4.1, 6.1]
+    if is_heard_out:
+        assert {hit.fault for hit in found} == {""}
+    else:
+        assert found[0].fault == "the next hit came before it had fallen by 10 dB"
+
+
 def test_noise_and_a_tone_alone_hold_no_hit():
     quiet = np.random.default_rng(2).standard_normal(24_000)
     tone = np.sin(np.pi / 4.0 * np.arange(60_000.0)) + 1e-3 * np.random.default_rng(3).standard_normal(60_000)
