@@ -102,7 +102,9 @@ def _split_channels(columns: Floats, recording: Recording, channels: str) -> lis
 
 def _drop_idle_channel(columns: Floats, recording: Recording) -> tuple[Floats, list[str]]:
     """Two channels without one that is silent or a copy of the other, and remarks on it."""
-    spans = np.ptp(columns, axis=0) if len(columns) else np.zeros(2)
+    if not len(columns):
+        return columns, []
+    spans = np.ptp(columns, axis=0)
     quiet = max(SILENT_LEVEL, _CROSSTALK * spans.max()) if np.isfinite(recording.full_scale) else SILENT_LEVEL
     silent = np.flatnonzero(spans <= quiet)
     if silent.size == 1 and rings(columns[:, 1 - silent[0]], recording.rate):

@@ -100,6 +100,15 @@ FAULTS = {
 }
 
 
+@pytest.mark.parametrize("channels", ["force,response", "response,response"])
+def test_a_file_of_two_channels_without_samples_is_refused(tmp_path, channels):
+    """Without a warning, which is an error in tests."""
+    wavfile.write(tmp_path / "unheard.wav", RATE, np.zeros((0, 2), np.int16))
+
+    with pytest.raises(InputError, match="wanted samples, got none"):
+        read_recordings([tmp_path / "unheard.wav"], channels=channels)
+
+
 def test_every_fault_of_every_file_is_told_at_once(tmp_path):
     for name, signal in SPOILT.items():
         stored = np.round(2.0**15 * signal).astype(np.int16) if name == "quiet" else signal
