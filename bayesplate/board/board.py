@@ -471,6 +471,12 @@ def board_density(values: Values) -> NDArray[np.float64]:
     return np.asarray(values["mass"] / (values["length_x"] * values["length_y"] * values["thickness"]))
 
 
+def nominal_mass(board: Board) -> float:
+    """Mean mass of the whole board, kg, from its mass or its density."""
+    means = board.nominal()
+    return float(board_density(means) * means["length_x"] * means["length_y"] * means["thickness"])
+
+
 def vibrating_lengths(values: Values, setup: Setup) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Side lengths left free by the clamps of a setup, m."""
     sides = []

@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
-from bayesplate.board.board import Board, board_density
+from bayesplate.board.board import Board, board_density, nominal_mass
 from bayesplate.board.inputs import INPUTS
 from bayesplate.board.measures import Place
 from bayesplate.board.quantity import Quantity
@@ -85,12 +85,6 @@ def readings_sha256(board: Board) -> str:
         for setup in board.setups
     ]
     return hashlib.sha256(repr((sizes, board.warp, readings)).encode()).hexdigest()
-
-
-def nominal_mass(board: Board) -> float:
-    """Mean mass of the whole board, kg, from its mass or its density."""
-    means = board.nominal()
-    return float(board_density(means) * means["length_x"] * means["length_y"] * means["thickness"])
 
 
 def _largest_value(quantity: Quantity) -> float:

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import click
 
-from bayesplate.board.board import Board
-from bayesplate.board.checks import faults_of, mass_check, nominal_mass, place_checks
+from bayesplate.board.board import Board, nominal_mass
+from bayesplate.board.checks import faults_of, mass_check, place_checks
 from bayesplate.board.values import Key, Refusal, read_items
 from bayesplate.board.words import did_you_mean, quote_text
 from bayesplate.commands.arguments import (

@@ -10,7 +10,6 @@ values, as in `bayesplate.estimates.least_squares`. Only the constants are fitte
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -62,7 +61,8 @@ def known_fits(problem: PosedProblem, tell: Callable[[float], None] | None = Non
     """The board as it stands, then with its known effects in every combination of up to three, smaller ones first.
 
     The combination of all effects that the card states is among them, however large. One with which the readings no
-    longer determine the constants is left out.
+    longer determine the constants is left out; there are no fits where they do not determine those of the board as it
+    stands.
     """
     board = problem.board
     declared = {name for name in known_effects(board) if name in board.effects}
@@ -73,8 +73,11 @@ def known_fits(problem: PosedProblem, tell: Callable[[float], None] | None = Non
     ]
     fits = []
     for n_done, combination in enumerate(all_combinations, start=1):
-        with suppress(NotIdentifiableError):
+        try:
             fits.append(known_fit(problem, combination))
+        except NotIdentifiableError:
+            if combination is None:
+                return ()
         if tell is not None:
             tell(n_done / len(all_combinations))
     return tuple(fits)
@@ -109,11 +112,12 @@ def known_fit(problem: PosedProblem, combination: Sequence[str] | None = None) -
 def fit_with_effects(problem: PosedProblem, combination: Sequence[str] | None, n_first: int | None = None) -> Baseline:
     """The constants fitted to a board with known effects (None: as it stands), solved again where they move far.
 
-    They are fitted to the first `n_first` readings, by default to all. Raises NotIdentifiableError where they go on
-    beyond reach.
+    They are fitted to the first `n_first` readings, by default to all. Raises NotIdentifiableError where these
+    do not determine them.
     """
     board = problem.board if combination is None else with_combination(problem.board, combination)
-    inputs, log_rigidities = _inputs_of(problem, board), _estimated_log_rigidities(problem)
+    inputs, estimate = _inputs_of(problem, board), _estimated_log_rigidities(problem)
+    log_rigidities = estimate
     models = problem.posterior.models if combination is None else _solve_models(problem, board, inputs, log_rigidities)
     rows = labelled_rows(models)
     for _ in range(_MOST_SOLVES):
@@ -130,9 +134,9 @@ def fit_with_effects(problem: PosedProblem, combination: Sequence[str] | None, n
             previous_rows, rows = rows, _likely_rows(problem, law, rows, log_rigidities)
             if np.array_equal(rows, previous_rows):
                 break
-        if not has_come_to_rest(log_rigidities, _estimated_log_rigidities(problem), board.symmetry.n):
+        if not has_come_to_rest(log_rigidities, estimate, board.symmetry.n):
             wanted = f"constants that the readings determine with {', '.join(board.effects) or 'no effect'}"
-            raise NotIdentifiableError(Fault(board.name, wanted, "a fit that goes on a thousandfold"))
+            raise NotIdentifiableError(Fault(board.name, wanted, "none near those of the board as it stands"))
         rows = previous_rows
         if np.abs(log_rigidities - start).max() <= _LAW_REACH:
             break

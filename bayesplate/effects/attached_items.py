@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesplate.board.attached import AttachedItem
-from bayesplate.board.board import Board, Values, vibrating_lengths
-from bayesplate.board.checks import nominal_mass
+from bayesplate.board.board import Board, Values, nominal_mass, vibrating_lengths
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Floats

@@ -11,8 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from bayesplate.board.attached import AttachedItem
-from bayesplate.board.board import Board, Values, vibrating_lengths
-from bayesplate.board.checks import nominal_mass
+from bayesplate.board.board import Board, Values, nominal_mass, vibrating_lengths
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.setup import Setup
 from bayesplate.effects.attached_items import (

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.arrays import Floats
-from bayesplate.board.board import Board, Values, board_density, vibrating_lengths
-from bayesplate.board.checks import nominal_mass
+from bayesplate.board.board import Board, Values, board_density, nominal_mass, vibrating_lengths
 from bayesplate.board.sessions import rescale_discrepancies
 from bayesplate.errors import BayesplateError
 from bayesplate.estimates.refit import sensitivities

@@ -112,8 +112,8 @@ def _decay_fall(response: Floats, rate: float, onset: int, start: int, stop: int
     before, first, last = (_line_powers(slow[part], tenth) for part in slices)
     steady = np.maximum(before, median_filter(before, _HISS_LINES) / np.log(2.0))  # the mean of hiss by its median
     raised = first > 10.0 ** (LEAST_FALL / 10.0) * steady
-    decays = ((part - steady)[raised].sum() for part in (first, last))
-    return 10.0 * float(np.log10(np.divide(*(max(decay, 1e-300) for decay in decays))))
+    at_first, at_last = (max(float((part - steady)[raised].sum()), 1e-300) for part in (first, last))
+    return 10.0 * float(np.log10(at_first / at_last))
 
 
 def _line_powers(part: Floats, n: int) -> Floats:

@@ -7,9 +7,9 @@ import re
 import pytest
 from stated import frequencies, millimetres, read
 
-from bayesplate.board.board import Board
+from bayesplate.board.board import Board, nominal_mass
 from bayesplate.board.campaign import load_campaign
-from bayesplate.board.checks import nominal_mass, physical_faults
+from bayesplate.board.checks import physical_faults
 from bayesplate.board.coefficients import load_coefficients
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity

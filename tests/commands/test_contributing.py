@@ -21,7 +21,7 @@ BOARD = "finnish-spruce-cantilever"
 IMPORTS = """
 from __future__ import annotations
 from typing import Annotated
-from bayesplate.board.checks import nominal_mass
+from bayesplate.board.board import nominal_mass
 from bayesplate.commands.arguments import check_arguments
 from bayesplate.commands.options import CARD, SetupFile
 from bayesplate.commands.prepare import CardSource

@@ -51,9 +51,9 @@ def test_a_bounce_is_a_double_hit_and_the_others_are_used(has_force):
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("seed", "damping", "is_heard_out"), [(1, 0.02, True), (2, 0.02, True), (1, 0.0002, False)])
+@pytest.mark.parametrize(("seed", "damping", "is_heard_out"), [(0, 0.02, True), (9, 0.02, True), (1, 0.0002, False)])
 def test_a_decay_that_sinks_into_the_hiss_has_fallen_and_one_that_rings_on_has_not(seed, damping, is_heard_out):
-    """Hiss of 2 or 0.5 per cent of the loudest sample; the modes fall by 40 dB and more, or by 1 to 7 dB."""
+    """Hiss of 3 or 0.5 per cent of the loudest sample; modes fall by 89 dB and more, or by 1 to 7 dB."""
     rate, rng = 22_050.0, np.random.default_rng(seed)
     t = np.arange(round(8.2 * rate)) / rate
     heard = np.zeros_like(t)
@@ -63,7 +63,7 @@ def test_a_decay_that_sinks_into_the_hiss_has_fallen_and_one_that_rings_on_has_n
             heard += (
                 rng.uniform(0.2, 1.0) * np.exp(-2.0 * np.pi * hz * damping * since) * np.sin(2 * np.pi * hz * since)
             )
-    heard += (0.02 if is_heard_out else 0.005) * np.abs(heard).max() * rng.standard_normal(t.size)
+    heard += (0.03 if is_heard_out else 0.005) * np.abs(heard).max() * rng.standard_normal(t.size)
 
     found = find_hits(Recording("tap.wav", rate, heard))
 

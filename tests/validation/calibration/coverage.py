@@ -141,7 +141,7 @@ def judge(records: Sequence[Record]) -> tuple[list[str], bool]:
     pooled = ", ".join(f"{c.name} {_share(c)}" for c in table if c.effect == "pooled")
     low, high = table[-1].band(level)
     verdict = "covered" if well and caught else "NOT COVERED"
-    missed = f"; MISSED: {len(failed)} boards gave no draws" if failed else ""
+    missed = f"; MISSED: {len(failed)} of {len(records)} boards without draws" if failed else ""
     lines.append(f"{verdict}: 90 % intervals hold the truth of {pooled}; {low} to {high} allowed{missed}")
     return lines, well and caught and not failed
 
