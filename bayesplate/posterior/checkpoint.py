@@ -20,7 +20,7 @@ from bayesplate.errors import CheckpointError, UnwritableError
 from bayesplate.files import write_bytes
 from bayesplate.locks import lock_folder
 
-FORMAT = 8
+FORMAT = 9
 """To be raised whenever the same seed would give other draws, so that two programs never share one run."""
 CHAINS = "chains.h5"
 EVERY_SECONDS = 5.0

@@ -36,9 +36,11 @@ class Ensembles:
         seed: int,
         shape: tuple[int, int],  # ensembles, and walkers of each
         initial_draws: Floats | None = None,  # (n_draws, n_dim) draws of nearly the same density
+        walk: int = 0,  # number of this walk among those of a run
     ) -> None:
         self.log_density, self.centre, self.factor, self.seed, self.shape = log_density, centre, factor, seed, shape
         self.initial_draws = initial_draws
+        self._stream = ("walk", walk) if walk else ()
         self.n_steps = 0
         self._backends: list[Any] = []
 
@@ -54,7 +56,7 @@ class Ensembles:
     @cached_property
     def pilot(self) -> Pilot:
         """The walk from the starts to where the ensembles begin."""
-        rng, n_walkers = random_stream(self.seed, "pilot"), self.shape[0] * self.shape[1]
+        rng, n_walkers = random_stream(self.seed, *self._stream, "pilot"), self.shape[0] * self.shape[1]
         if self.initial_draws is not None:
             return pilot_from_draws(self.log_density, self.initial_draws, rng, n_walkers)
         n_rounds = len(self.centre) ** 2 // _PAIRS_A_ROUND
@@ -88,7 +90,7 @@ class Ensembles:
         import emcee
 
         walkers = slice(ensemble, None, self.shape[0])
-        state = random_state(random_stream(self.seed, "ensemble", ensemble))
+        state = random_state(random_stream(self.seed, *self._stream, "ensemble", ensemble))
         return emcee.State(self.pilot.points[walkers], log_prob=self.pilot.log_prob[walkers], random_state=state)
 
 

@@ -2,13 +2,15 @@
 
 A pilot walks first, from three standard errors around the estimate to the posterior. The distribution of independent
 proposals is fitted to its draws, and the ensembles begin at its last points; its draws are not part of the result.
+Where the posterior has a second peak that few walkers of the pilot reached, these proposals miss it. A walk that does
+not pass the gate therefore serves as the pilot of the next one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -25,6 +27,8 @@ from bayesplate.posterior.convergence import (
 from bayesplate.posterior.ensembles import Ensembles
 from bayesplate.posterior.starts import LogDensity, cholesky_factor, guard_log_density
 
+_FIRST_WALKS = 2000, 4000
+"""Most steps of the first walks; the last one has what is left of all."""
 _FIRST_CHECK, _CHECK_RATIO = 200, 1.15
 _LONG_RUN = 4.0
 """Length of a run, over that which the gate wants, at which a small acceptance fails for good."""
@@ -105,11 +109,9 @@ def sample(
     checkpoint: Checkpoint | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> tuple[Chains, Convergence]:
-    """Sample until the gate passes or further steps are of no use.
+    """Sample until the gate passes or `settings.max_steps` are made; draws and verdict of the last walk.
 
-    Sampling stops without convergence after `settings.max_steps`, where more than twice as many would be needed, and
-    where the chains are four times as long as the gate wants and accept too few proposals. Any other rule may pass
-    later: effective draws add up, and a walker in a narrow region leaves it.
+    Up to two walks that do not pass are each followed by one that begins anew at their draws.
 
     The draws depend on the seed alone: a run that was killed and continued from its checkpoint gives the same bytes.
 
@@ -117,11 +119,53 @@ def sample(
     `initial_draws`, (n_draws, n_dim) of nearly the same density. Unless `passed`, nothing may be printed from the
     chains.
     """
-    n_walkers = settings.walkers(n_dim := len(centre))
+    shape = settings.n_ensembles, settings.walkers(n_dim := len(centre))
     names = tuple(names) or tuple(f"parameter {dim + 1}" for dim in range(n_dim))
     starts = np.asarray(centre), cholesky_factor(covariance)
-    shape = settings.n_ensembles, n_walkers
-    ensembles = Ensembles(guard_log_density(log_density, names), *starts, settings.seed, shape, initial_draws)
+    log_density = guard_log_density(log_density, names)
+    n_before = 0
+    for number, longest in enumerate((*_FIRST_WALKS, settings.max_steps)):
+        n_left = settings.max_steps - n_before
+        chains, convergence = _walk(
+            Ensembles(log_density, *starts, settings.seed, shape, initial_draws, number),
+            replace(settings, max_steps=min(longest, n_left)),
+            names,
+            checkpoint.part(f"walk-{number + 1}") if checkpoint and number else checkpoint,
+            _told_from(n_before, settings.max_steps, progress),
+        )
+        n_before += chains.draws.shape[1]
+        if convergence.passed or longest >= n_left:
+            break
+        initial_draws = chains.pooled
+    return chains, convergence
+
+
+def _told_from(
+    n_before: int, max_steps: int, progress: Callable[[Progress], None] | None
+) -> Callable[[Progress], None]:
+    """Progress of a walk as that of the whole run, of which `n_before` steps are made."""
+
+    def tell(walk: Progress) -> None:
+        if progress is not None:
+            progress(replace(walk, n_steps=n_before + walk.n_steps, max_steps=max_steps))
+
+    return tell
+
+
+def _walk(
+    ensembles: Ensembles,
+    settings: SamplerSettings,
+    names: Sequence[str],
+    checkpoint: Checkpoint | None,
+    progress: Callable[[Progress], None],
+) -> tuple[Chains, Convergence]:
+    """Advance the ensembles until the gate passes or further steps are of no use.
+
+    They stop without convergence after `settings.max_steps`, where more than twice as many would be needed, and where
+    the chains are four times as long as the gate wants and accept too few proposals. Any other rule may pass later:
+    effective draws add up, and a walker in a narrow region leaves it.
+    """
+    n_walkers, n_dim = ensembles.shape[1], len(ensembles.centre)
     identity = {"seed": settings.seed, "n_ensembles": settings.n_ensembles, "n_walkers": n_walkers, "n_dim": n_dim}
     context = nullcontext() if checkpoint is None else checkpoint.session(**identity, chunk_steps=settings.chunk_steps)
     with context as session:
@@ -142,7 +186,7 @@ def sample(
                         if session is not None:
                             session.save()
                         return chains, convergence
-            if progress is not None and n_steps:
+            if n_steps:
                 progress(Progress(n_steps, settings.max_steps, n_taus))
             ensembles.advance(settings.chunk_steps)
             if session is not None:

@@ -19,6 +19,7 @@ from emcee.backends import HDFBackend
 
 from bayesplate.errors import CheckpointError
 from bayesplate.posterior import checkpoint as checkpoint_module
+from bayesplate.posterior import sampling
 from bayesplate.posterior.checkpoint import CHAINS, Checkpoint
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import SamplerSettings, sample
@@ -74,6 +75,15 @@ def test_a_run_continued_equals_the_uninterrupted_one(folder, uninterrupted):
     assert n_saved(folder) == 30
     assert run(Checkpoint(folder, "f")) == uninterrupted
     assert n_saved(folder) == 50
+
+
+def test_a_run_continued_in_its_second_walk_equals_the_uninterrupted_one(tmp_path, monkeypatch):
+    monkeypatch.setattr(sampling, "_FIRST_WALKS", (20,))
+    checkpoint = Checkpoint(tmp_path, "f")
+    run(checkpoint, max_steps=40)
+    assert [n_saved(folder) for folder in (tmp_path, tmp_path / "walk-2")] == [20, 20]
+    assert run(checkpoint) == run()
+    assert [n_saved(folder) for folder in (tmp_path, tmp_path / "walk-2")] == [20, 30]
 
 
 def test_emcee_reads_the_chains(folder):

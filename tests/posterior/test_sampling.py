@@ -11,7 +11,7 @@ from scipy.stats import halfnorm
 from statistics_checks import differences_from_normal
 
 from bayesplate.errors import BayesplateError, InputError, NotConvergedError, NotIdentifiableError
-from bayesplate.posterior import ensembles
+from bayesplate.posterior import ensembles, sampling
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import SamplerSettings, is_hopeless, sample
 
@@ -146,6 +146,38 @@ def test_separate_peaks_do_not_pass():
     _, convergence = sample(two_peaks, np.zeros(3), np.eye(3), settings, names=("D_x", "D_y", "D_s"))
     assert not convergence.passed
     assert "D_x" in " ".join(convergence.reasons)
+
+
+def two_unequal_peaks(theta):
+    """Around the estimate a tenth of the probability; the rest eight standard deviations off, half as wide."""
+    far = (theta - 8.0 * np.eye(6)[0]) / 0.5
+    logs = -0.5 * np.sum(theta**2, axis=1), -0.5 * np.sum(far**2, axis=1) - 6.0 * np.log(0.5)
+    return np.logaddexp(np.log(0.1) + logs[0], np.log(0.9) + logs[1])
+
+
+def test_a_peak_that_few_walkers_reach_at_first_gets_its_share():
+    """Proposals fitted before the walkers have reached it miss it; a walk from their later draws does not."""
+    settings = SamplerSettings(seed=3, n_ensembles=2)
+    steps = []
+    chains, convergence = sample(
+        two_unequal_peaks, np.zeros(6), np.eye(6), settings, progress=lambda told: steps.append(told.n_steps)
+    )
+    assert convergence.passed, convergence.reasons
+    assert np.all(np.diff(steps) >= 0)
+    assert chains.draws.shape[1] < steps[-1]  # not the first walk
+    share = np.mean(chains.pooled[:, 0] > 4.0)
+    assert abs(share - 0.9) < 4.0 * np.sqrt(0.9 * 0.1 / convergence.ess[0])
+
+
+def test_all_walks_together_make_the_most_steps_at_most(monkeypatch):
+    monkeypatch.setattr(sampling, "_FIRST_WALKS", (100, 200))
+    settings = short(max_steps=450, gate=Gate(ess_min=1e9))
+    told = []
+    chains, convergence = sample(log_normal_density, MEAN, COVARIANCE, settings, progress=told.append)
+    assert not convergence.passed
+    assert chains.draws.shape[1] == 450 - 100 - 200
+    assert [one.n_steps for one in told] == [50, 150, 200, 250, 350, 400]  # none at the end of a walk
+    assert {one.max_steps for one in told} == {450}
 
 
 def test_a_part_of_the_posterior_that_few_starts_reach_is_left_again():
