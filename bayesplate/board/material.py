@@ -103,6 +103,11 @@ def moduli(D_x: ArrayLike, D_y: ArrayLike, D_s: ArrayLike, thickness: ArrayLike,
     return Moduli(D_x * factor, D_y * factor, np.asarray(3.0 * D_s / h**3))
 
 
+def moduli_of(values: Mapping[str, Floats]) -> Moduli:
+    """Moduli of a plate, Pa, from its rigidities, thickness and nu_xy by name."""
+    return moduli(*(values[name] for name in (*RIGIDITIES, "thickness", "poisson_xy")))
+
+
 def isotropic_moduli(E: ArrayLike, nu: ArrayLike) -> Moduli:
     """Moduli of an isotropic material from its E, Pa, and its Poisson ratio."""
     E = np.asarray(E, dtype=float)

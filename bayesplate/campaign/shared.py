@@ -10,7 +10,7 @@ import numpy as np
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.campaign import CampaignCard, SharedSection
-from bayesplate.board.material import MODULI, moduli
+from bayesplate.board.material import MODULI, moduli_of
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.effects import EFFECTS
@@ -57,7 +57,7 @@ class SharedParameter:
 
 def modulus(name: str, values: Values) -> Floats:
     """E_x, E_y or G_xy of a board from its rigidities: (n,) array, Pa; not a number where no material exists."""
-    constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
+    constants = moduli_of(values)
     return np.asarray(constants[MODULI.index(name)])
 
 

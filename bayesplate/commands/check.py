@@ -8,7 +8,7 @@ from typing import Annotated
 
 import numpy as np
 
-from bayesplate.board.material import MODULI, moduli
+from bayesplate.board.material import MODULI, moduli_of
 from bayesplate.campaign.conditional import ConditionalPosterior
 from bayesplate.campaign.normal_likelihood import NormalLikelihood, prior_moments
 from bayesplate.campaign.scatter import expected_width
@@ -113,8 +113,7 @@ def _check_board(problem: Problem, *, candidates: bool = True) -> CheckResult:
     posed = problem.posed
     board = posed.board
     estimate, identifiability = posed.estimate, posed.identifiability
-    D_x, D_y, D_s = estimate.rigidities
-    elastic = moduli(D_x, D_y, D_s, estimate.values["thickness"], estimate.values["poisson_xy"])
+    elastic = moduli_of(estimate.values)
     expected = expected_sd(posed)
     rows = [(setup.name, reading) for setup in board.setups for reading in setup.readings]
     residuals = cents(estimate.residuals)
@@ -189,7 +188,7 @@ def expected_sd(problem: PosedProblem) -> dict[str, float]:
     """Relative standard deviation of each modulus in the normal approximation of the posterior."""
     draws = np.random.default_rng(0).multivariate_normal(problem.centre, problem.covariance, _N_DRAWS)
     values = problem.parameters.values(draws)
-    constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
+    constants = moduli_of(values)
     return {name: float(np.nanstd(np.log(v))) for name, v in zip(MODULI, constants, strict=True)}
 
 

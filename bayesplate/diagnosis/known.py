@@ -17,7 +17,7 @@ import numpy as np
 
 from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board, Values
-from bayesplate.board.material import RIGIDITIES, moduli
+from bayesplate.board.material import moduli_of
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.sessions import readings_by_mode
 from bayesplate.diagnosis.baseline import Baseline, PossibleModes, baseline_of, labelled_rows, symmetry_of
@@ -97,14 +97,13 @@ def known_fit(problem: PosedProblem, combination: Sequence[str] | None = None) -
         baseline.log_rigidities[None, :],
         modes=[mode for mode in modes if mode],
     )
-    D_x, D_y, D_s, thickness, nu_xy = (baseline.values[name] for name in (*RIGIDITIES, "thickness", "poisson_xy"))
     combination = declared if combination is None else combination
     return KnownFit(
         combination=tuple(combination),
         effects=tuple(name for name in combination if name not in declared),
         without=tuple(name for name in declared if name not in combination),
         baseline=baseline,
-        moduli=np.array(moduli(D_x, D_y, D_s, thickness, nu_xy)),
+        moduli=np.array(moduli_of(baseline.values)),
         errors=errors.at(used_readings, baseline.n_modes),
     )
 

@@ -70,10 +70,6 @@ class AttachedMass(Effect):
         return cls(setup.owner, tuple(item_on_board(board, setup, item) for item in items))
 
     @classmethod
-    def is_implied(cls, board: Board) -> bool:
-        return any(cls.is_wanted(setup) for setup in board.setups)
-
-    @classmethod
     def is_wanted(cls, setup: Setup) -> bool:
         return any(item.mass is not None for item in _attached_items(setup))
 

@@ -166,7 +166,7 @@ class Effect(ABC):
     @classmethod
     def is_implied(cls, board: Board) -> bool:
         """Whether the card declares the effect by what it states: a mass, the air, readings with places."""
-        return False
+        return any(map(cls.is_wanted, board.setups))
 
     @classmethod
     def is_known(cls, board: Board) -> bool:

@@ -79,10 +79,6 @@ class Exciter(Effect):
         return 'no [[setup.attached]] of kind = "exciter" says that one was fixed to the board'
 
     @classmethod
-    def is_implied(cls, board: Board) -> bool:
-        return any(cls.is_wanted(setup) for setup in board.setups)
-
-    @classmethod
     def is_wanted(cls, setup: Setup) -> bool:
         """Whether the setup states what moves of an exciter: the whole, or the coil alone where the magnet is held."""
         return any(item.kind == cls.name and has_stated_mass(item) for item in setup.attached)

@@ -66,8 +66,8 @@ class FluidLoading(Effect):
         return replace(self, owner=setup.owner, aspect_ratio=aspect_ratio_of(board.nominal(), setup))
 
     @classmethod
-    def is_implied(cls, board: Board) -> bool:
-        return any(setup.fluid is not None for setup in board.setups)
+    def is_wanted(cls, setup: Setup) -> bool:
+        return setup.fluid is not None
 
     @property
     def fluid(self) -> str:

@@ -40,10 +40,6 @@ class SupportStiffness(Effect):
         return cls(setup.owner, stiffness=_PRIOR if setup.bounce is None else stiffness_of(board, setup.bounce))
 
     @classmethod
-    def is_implied(cls, board: Board) -> bool:
-        return any(map(cls.is_wanted, board.setups))
-
-    @classmethod
     def is_wanted(cls, setup: Setup) -> bool:
         return setup.bounce is not None
 

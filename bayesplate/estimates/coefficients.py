@@ -11,7 +11,7 @@ import numpy as np
 from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board, Values, vibrating_lengths
 from bayesplate.board.coefficients import CoefficientCard
-from bayesplate.board.material import RIGIDITIES, moduli
+from bayesplate.board.material import RIGIDITIES, moduli_of
 from bayesplate.board.setup import Setup
 from bayesplate.board.words import setup_places
 from bayesplate.effects.part import aspect_ratio_of
@@ -120,7 +120,7 @@ def _centre_of_training(model: SetupModel, values: Values) -> tuple[TrainingCons
     adjusted = model.system.adjusted(values)
     moduli_of_shear = zip(("G_xz", "G_yz"), shear_moduli(adjusted), strict=True)
     shear = {name: float(modulus) for name, modulus in moduli_of_shear if model.system.theory == "shear-flexible"}
-    E_x, E_y, G_xy = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
+    E_x, E_y, G_xy = moduli_of(values)
     centre = TrainingConstants(float(E_x), float(E_y), float(G_xy), float(values["poisson_xy"]), **shear)
     table = model.setup.published_coefficients
     printed = None if table is None else _constants_of(table)

@@ -6,7 +6,7 @@ import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, board_density
-from bayesplate.board.material import MODULI, RIGIDITIES, moduli
+from bayesplate.board.material import MODULI, RIGIDITIES, moduli_of
 from bayesplate.board.prior import PriorCard
 
 MOST_ORTHOTROPIC = 100.0
@@ -28,7 +28,7 @@ _USUAL_SHARES = (0.001, 0.999)
 def unusual_sentences(board: Board, prior: PriorCard, rigidities: Floats) -> tuple[str, ...]:
     """Sentences on an unusual density and on unusual constants that a board's readings imply; rigidities in N m."""
     values = board.nominal() | dict(zip(RIGIDITIES, rigidities, strict=True))
-    elastic = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
+    elastic = moduli_of(values)
     by_name = values | elastic._asdict()
     sentences, out_of_reach = [], []
     for name, constant_prior in prior.constants.items():

@@ -22,7 +22,7 @@ import numpy as np
 
 from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board, Values
-from bayesplate.board.material import RIGIDITIES, moduli
+from bayesplate.board.material import RIGIDITIES, moduli_of
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.reading import Peak, Reading
 from bayesplate.board.setup import DEFAULT_NOISE, Setup
@@ -153,10 +153,8 @@ def _log_prior_density(prior: PriorCard, nominal: Values) -> Callable[[Floats], 
     """ln of the prior density of ln D at the nominal inputs."""
 
     def log_prior(x: Floats) -> Floats:
-        D_x, D_y, D_s = np.exp(x).T
-        constants = {"D_x": D_x, "D_y": D_y, "D_s": D_s}
-        elastic = moduli(D_x, D_y, D_s, nominal["thickness"], nominal["poisson_xy"])
-        by_name = constants | elastic._asdict()
+        constants = dict(zip(RIGIDITIES, np.exp(x).T, strict=True))
+        by_name = constants | moduli_of({**nominal, **constants})._asdict()
         with np.errstate(invalid="ignore", divide="ignore"):
             log_densities = [
                 constant_prior.log_density_of_log(np.log(by_name[name]))

@@ -14,7 +14,7 @@ import numpy as np
 
 from bayesplate.arrays import Floats, Indices
 from bayesplate.board.board import Board, Values
-from bayesplate.board.material import MODULI, RIGIDITIES, moduli
+from bayesplate.board.material import MODULI, RIGIDITIES, moduli_of
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.quantity import Quantity
@@ -159,9 +159,7 @@ def log_moduli(board: Board, log_rigidities: Floats) -> tuple[Floats, Floats]:
     theta[1 : 1 + columns.size, columns] += _STEP * np.eye(columns.size)
     theta[1 + columns.size :, columns] -= _STEP * np.eye(columns.size)
     values = parameters.values(theta)
-    D_x, D_y, D_s = (values[name] for name in RIGIDITIES)
-    constants = moduli(D_x, D_y, D_s, values["thickness"], values["poisson_xy"])
-    logs = np.stack([np.log(np.broadcast_to(constant, len(theta))) for constant in constants])
+    logs = np.stack([np.log(np.broadcast_to(constant, len(theta))) for constant in moduli_of(values)])
     middle, above, below = np.split(logs, [1, 1 + columns.size], axis=1)
     return middle[:, 0], (above - below) / (2.0 * _STEP)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.board.board import board_density
-from bayesplate.board.material import MODULI, RIGIDITIES, DerivedQuantity, derived_quantities, moduli
+from bayesplate.board.material import MODULI, RIGIDITIES, DerivedQuantity, derived_quantities, moduli_of
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.streams import random_stream
@@ -57,7 +57,7 @@ def named_draws(inference: Inference, seed: int, mode_log_frequencies: Sequence[
     flat = inference.theta.reshape(-1, inference.theta.shape[-1])
     posterior = problem.posterior
     values = problem.parameters.values(flat)
-    constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
+    constants = moduli_of(values)
     noise = np.exp(problem.parameters.log_noise(flat))
     if mode_log_frequencies is None:
         mode_log_frequencies = inference.mode_log_frequencies

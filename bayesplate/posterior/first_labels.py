@@ -16,7 +16,7 @@ from scipy.special import softmax
 
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
-from bayesplate.board.material import MODULI, RIGIDITIES, Moduli, moduli
+from bayesplate.board.material import MODULI, RIGIDITIES, Moduli, moduli_of
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.setup import Setup
 from bayesplate.errors import NotIdentifiableError
@@ -62,9 +62,7 @@ class Labelling:
         """E_x, E_y, G_xy, Pa, at the nominal inputs."""
         nominal = self.board.nominal()
         rigidities = self.board.symmetry.rigidities(np.exp(self.log_rigidities), nominal["poisson_xy"])
-        return moduli(
-            rigidities["D_x"], rigidities["D_y"], rigidities["D_s"], nominal["thickness"], nominal["poisson_xy"]
-        )
+        return moduli_of({**nominal, **rigidities})
 
     @property
     def is_usual(self) -> bool:

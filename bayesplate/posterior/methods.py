@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Values
-from bayesplate.board.material import MODULI, RIGIDITIES, moduli, rigidities
+from bayesplate.board.material import MODULI, RIGIDITIES, moduli_of, rigidities
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.paper import PaperSystem
 from bayesplate.estimates.percentile import percentile_estimate
@@ -39,8 +39,7 @@ def point_methods(problem: PosedProblem, system: PaperSystem, expected_sd: Mappi
     `expected_sd` is the relative standard deviation of the weighted estimate of each modulus.
     """
     nominal, estimate, paper = problem.board.nominal(), problem.estimate, system.solve()
-    D_x, D_y, D_s = estimate.rigidities
-    weighted = _by_modulus(moduli(D_x, D_y, D_s, estimate.values["thickness"], estimate.values["poisson_xy"]))
+    weighted = _by_modulus(moduli_of(estimate.values))
     methods = [
         Method(
             "paper_least_squares",

@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
-from bayesplate.board.material import MODULI, RIGIDITIES, moduli
+from bayesplate.board.material import MODULI, RIGIDITIES, moduli_of
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.sessions import with_discrepancies
 from bayesplate.errors import InputError, NotIdentifiableError
@@ -172,7 +172,7 @@ def _require_reachable(posterior: Posterior, centre: Floats, covariance: Floats)
     if np.isfinite(posterior.log_prior_constants(posterior.parameters.within_bounds(draws))).any():
         return
     values = posterior.parameters.values_at(centre)
-    elastic = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
+    elastic = moduli_of(values)
     constants = values | elastic._asdict()
     outside = []
     for name, density in posterior.priors.items():

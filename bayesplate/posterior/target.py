@@ -10,7 +10,7 @@ import numpy as np
 
 from bayesplate.arrays import Bools, Floats
 from bayesplate.board.board import Board, Values
-from bayesplate.board.material import MODULI, RIGIDITIES, isotropic_moduli, moduli, rigidities
+from bayesplate.board.material import MODULI, RIGIDITIES, isotropic_moduli, moduli_of, rigidities
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.quantity import Quantity
 from bayesplate.frequencies.laws import LawName, cents
@@ -100,7 +100,7 @@ class Posterior:
         that of ln E by ln D of an isotropic board. Outside nu_xy nu_yx < 1 no material exists: the density is zero.
         """
         values = self.parameters.values(theta) if values is None else values
-        constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
+        constants = moduli_of(values)
         by_name = {**values, **constants._asdict()}
         densities = [prior.log_density_of_log(np.log(by_name[name])) for name, prior in self.priors.items()]
         return np.where(np.isnan(constants.E_x), -np.inf, np.sum(densities, axis=0))

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from bayesplate.arrays import Floats
-from bayesplate.board.material import MODULI, RIGIDITIES, moduli
+from bayesplate.board.material import MODULI, RIGIDITIES, moduli_of
 from bayesplate.estimates.identifiability import identifiability_remarks
 from bayesplate.estimates.leave_one_out import carrying_sentence
 from bayesplate.estimates.paper import PaperSystem, paper_system
@@ -170,10 +170,8 @@ def law_means(means: Mapping[str, float], effective: float) -> LawMeans:
 
 def _weighted_estimate(problem: PosedProblem) -> PointEstimate:
     estimate = problem.estimate
-    values = estimate.values
-    D_x, D_y, D_s = estimate.rigidities
-    elastic = moduli(D_x, D_y, D_s, values["thickness"], values["poisson_xy"])
-    return _point_estimate(np.stack(elastic), estimate.rigidities, problem.identifiability.condition_number)
+    elastic = np.stack(moduli_of(estimate.values))
+    return _point_estimate(elastic, estimate.rigidities, problem.identifiability.condition_number)
 
 
 def _point_estimate(elastic: Floats, constants: Floats, condition_number: float) -> PointEstimate:
