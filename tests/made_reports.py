@@ -16,7 +16,6 @@ from bayesplate.commands.fit import fit
 from bayesplate.commands.prepare import prepare
 from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Inference
 from bayesplate.report.page import fit_page, write_report
 from bayesplate.results.summary import Summary
 
@@ -31,21 +30,20 @@ class Fit:
     """A fit and its card."""
 
     card: Board
-    inference: Inference
     draws: Draws
     summary: Summary
 
     def write(self, folder: Path, diagnosis: Diagnosis | None = None) -> Path:
         """Its report in a folder."""
-        return write_report(folder, self.card, self.inference, self.draws, self.summary, diagnosis)
+        return write_report(folder, self.card, self.draws, self.summary, diagnosis)
 
     def page(self, title: str = "", source: str = "", diagnosis: Diagnosis | None = None) -> str:
         """Its page without figures, with another title and source."""
-        problem = self.inference.problem
+        problem = self.draws.problem
         board = replace(problem.board, title=title, source=source)
-        inference = replace(self.inference, problem=replace(problem, board=board))
+        draws = replace(self.draws, inference=replace(self.draws.inference, problem=replace(problem, board=board)))
         card = replace(self.card, title=title, source=source)
-        return fit_page(card, inference, self.draws, self.summary, {}, diagnosis)
+        return fit_page(card, draws, self.summary, {}, diagnosis)
 
 
 def fitted(card: str) -> Fit:
@@ -53,7 +51,7 @@ def fitted(card: str) -> Fit:
     with pytest.MonkeyPatch.context() as patched:
         sample_loosely(patched)
         result = fit(card)
-    return Fit(prepare(card).card, result.inference, result.draws, result.summary)
+    return Fit(prepare(card).card, result.draws, result.summary)
 
 
 def cut_off(figure: Figure, texts: Iterable[Text], margin: float = 0.0) -> list[str]:

@@ -103,9 +103,13 @@ class Sample:
 class FittedBoard:
     """A board that was fitted alone, the shared effects declared under their own priors."""
 
-    inference: Inference
     draws: Draws
     shared: tuple[SharedParameter, ...]
+
+    @property
+    def inference(self) -> Inference:
+        """The fit of the board alone."""
+        return self.draws.inference
 
     @property
     def name(self) -> str:
@@ -277,10 +281,8 @@ class FittedBoard:
         draws = np.column_stack([theta[:, self.conditional.own_columns], z])[picked_draws]
         return bridge_sampling(_log_joint_density(self.conditional, log_reference), draws, rng)
 
-    def posterior_of(
-        self, sample: Sample, weights: Floats, rng: np.random.Generator, seed: int
-    ) -> tuple[Inference, Draws]:
-        """An inference with the weighted draws of a sample, and the draws by name."""
+    def posterior_of(self, sample: Sample, weights: Floats, rng: np.random.Generator, seed: int) -> Draws:
+        """The weighted draws of a sample as those of an inference."""
         picked_draws = rng.permutation(resample(weights, len(self.draws.flat), rng))
         theta, log_frequencies = (
             sample.theta[picked_draws],
@@ -307,7 +309,7 @@ class FittedBoard:
         inference = Inference(
             problem, chains, convergence, chain_theta, chain_log_prob, tuple(log_frequencies), self.inference.surrogate
         )
-        return inference, named_draws(inference, seed)
+        return named_draws(inference, seed)
 
 
 def _log_joint_density(conditional: ConditionalPosterior, log_reference: LogDensity) -> LogDensity:

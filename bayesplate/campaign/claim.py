@@ -17,7 +17,6 @@ from bayesplate.campaign.learning import SharedPosterior
 from bayesplate.diagnosis.claim import STANDARD_ERRORS, score_gain
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Inference
 from bayesplate.results.contract import Spread
 
 _LEAST_PRECISION = 0.25
@@ -142,12 +141,12 @@ def taught_boards(posterior: SharedPosterior, before: Mapping[str, FittedBoard],
     for i, (name, left_out_board) in enumerate(judge_left_out_boards(combined).items()):
         rng = np.random.default_rng([seed, _LINE, i])
         bare_board = before[name]
-        _, draws = posterior.board_left_out(i, rng, seed)
+        draws = posterior.board_left_out(i, rng, seed)
         taught_values = shared_values(combined.shared, combined.draws_from_others(rng, _N_DRAWS, (i,)))
         boards[name] = TaughtBoard(
             log_score_gain=left_out_board.log_score - bare_board.own_sample.log_evidence,
-            before_rms_cents=rms_cents(bare_board.inference, bare_board.draws),
-            after_rms_cents=rms_cents(posterior.members[i].inference, draws),
+            before_rms_cents=rms_cents(bare_board.draws),
+            after_rms_cents=rms_cents(draws),
             p_value=left_out_board.p_value,
             refuses=left_out_board.refuses,
             others={
@@ -158,9 +157,9 @@ def taught_boards(posterior: SharedPosterior, before: Mapping[str, FittedBoard],
     return boards
 
 
-def rms_cents(inference: Inference, draws: Draws) -> float:
+def rms_cents(draws: Draws) -> float:
     """Rms error of the labelled modes, cents: measured over the posterior mean of the prediction."""
     predicted = draws.log_frequency.reshape(-1, draws.log_frequency.shape[-1])
-    measured = np.concatenate([setup.measured for setup in inference.problem.board.setups])
+    measured = np.concatenate([setup.measured for setup in draws.problem.board.setups])
     residuals = cents(np.log(measured) - np.log(np.exp(predicted).mean(axis=0)))
     return float(np.sqrt(np.mean(residuals**2)))

@@ -14,7 +14,6 @@ from bayesplate.campaign.combined import CombinedBoards, sample_shared
 from bayesplate.campaign.likelihood import moments
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings
 from bayesplate.posterior.starts import LogDensity
@@ -50,7 +49,7 @@ class SharedPosterior:
             offsets[i] = offset.max() - 2.0 * sample.effective(weights) ** -0.5
         return offsets
 
-    def board(self, index: int, rng: np.random.Generator, seed: int) -> tuple[Inference, Draws, float]:
+    def board(self, index: int, rng: np.random.Generator, seed: int) -> tuple[Draws, float]:
         """A board's posterior given all boards, and the number of independent draws on which it rests.
 
         The board's draws are weighted by the density of the shared parameters that the other boards teach; where too
@@ -60,9 +59,9 @@ class SharedPosterior:
         log_reference = combined.log_density_from_others((index,))
         sample = _sample_under(member, self.samples[index], log_reference, combined.moments_from_all(index), seed)
         weights = sample.weights_under(log_reference)
-        return *member.posterior_of(sample, weights, rng, seed), sample.effective(weights)
+        return member.posterior_of(sample, weights, rng, seed), sample.effective(weights)
 
-    def board_left_out(self, index: int, rng: np.random.Generator, seed: int) -> tuple[Inference, Draws]:
+    def board_left_out(self, index: int, rng: np.random.Generator, seed: int) -> Draws:
         """A board's posterior with the shared parameters that the others teach, and constants by its own readings.
 
         Each of its draws is moved to shared parameters that the others teach, and its own parameters by their linear

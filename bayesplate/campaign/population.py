@@ -29,7 +29,6 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.errors import Fault, InputError
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Chains, SamplerSettings, sample
 
 _LEAST_SD = 1e-3
@@ -48,14 +47,14 @@ class BoardConstants:
     slopes: Floats = field(default_factory=lambda: np.zeros((_N_CONSTANTS, 0)))
 
     @classmethod
-    def of(cls, inference: Inference, draws: Draws, shared: Floats | None = None) -> BoardConstants:
+    def of(cls, draws: Draws, shared: Floats | None = None) -> BoardConstants:
         """The likelihood from the posterior of a board, the prior of its constants divided out.
 
         `shared` are standard coordinates of the shared numbers at the draws, (n_draws, n_shared).
         """
-        name = inference.problem.board.name
+        name = draws.problem.board.name
         logs = np.column_stack([np.log(draws.moduli[name]).ravel() for name in MODULI])
-        log_prior = inference.problem.posterior.log_prior_constants(draws.flat)
+        log_prior = draws.problem.posterior.log_prior_constants(draws.flat)
         weights = np.exp(log_prior.min() - log_prior)
         mean = np.average(logs, axis=0, weights=weights)
         shared = np.empty((len(logs), 0)) if shared is None else shared

@@ -148,7 +148,7 @@ def _diagnose_boards(campaign: Campaign, unshared: Campaign, run: Run) -> Campai
     left_out_boards: Mapping[str, TaughtBoard] = {}
     claim: SharedClaim | None = None
     if after.shared_posterior is not None:
-        members = {name: FittedBoard(fit.inference, fit.draws, ()) for name, fit in before.items()}
+        members = {name: FittedBoard(fit.draws, ()) for name, fit in before.items()}
         left_out_boards = taught_boards(after.shared_posterior, members, run.seed)
         claim = judge_shared_effect(left_out_boards)
     diagnosis = _diagnosis(

@@ -214,19 +214,19 @@ def _fit_shared(
     """The shared parameters, every board given what all boards tell of them, and warnings."""
     if not campaign.shared:
         return None, alone, ()
-    members = [FittedBoard(fit.inference, fit.draws, campaign.shared) for fit in alone.values()]
+    members = [FittedBoard(fit.draws, campaign.shared) for fit in alone.values()]
     shared_posterior = learn_shared(members, SamplerSettings(seed=seed), stages.sampled)
     if not shared_posterior.convergence.passed:
         raise convergence_error(shared_posterior.convergence, subject="what the boards share")
     boards, effective = {}, {}
     for i, member in enumerate(shared_posterior.members):
         rng = np.random.default_rng([seed, _BOARD_STREAM, i])
-        inference, draws, effective[member.name] = shared_posterior.board(i, rng, seed)
+        draws, effective[member.name] = shared_posterior.board(i, rng, seed)
         fit_alone = alone[member.name]
-        assessment = assess(inference, draws)
+        assessment = assess(draws)
         sha256 = fit_alone.problem.prepared.card.sha256
-        summary = summarise(inference, draws, assessment, seed, versions(), sha256)
-        boards[member.name] = FitResult(fit_alone.problem, inference, draws, summary)
+        summary = summarise(draws, assessment, seed, versions(), sha256)
+        boards[member.name] = FitResult(fit_alone.problem, draws, summary)
     return shared_posterior, boards, learning_warnings(shared_posterior, effective)
 
 
@@ -243,7 +243,7 @@ def _population(
             member.name: member.conditional.z_of(boards[member.name].draws.flat)[:, unscattered]
             for member in shared_posterior.members
         }
-    constants = [BoardConstants.of(fit.inference, fit.draws, z[name]) for name, fit in boards.items()]
+    constants = [BoardConstants.of(fit.draws, z[name]) for name, fit in boards.items()]
     population = find_population(constants, campaign.population, SamplerSettings(seed=seed), common)
     if not population.convergence.passed:
         raise convergence_error(population.convergence, subject="the population of the boards' constants")

@@ -22,7 +22,7 @@ from bayesplate.files import make_folder, require_new_files, write_text
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.assessment import carried_in_fit, mode_errors
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Inference, infer
+from bayesplate.posterior.inference import infer
 from bayesplate.posterior.likely_labels import with_likely_labels
 from bayesplate.posterior.methods import Method, point_methods, posterior_method
 from bayesplate.posterior.posing import PosedProblem, pose
@@ -60,7 +60,7 @@ class CompareResult(Comparison):
         The posterior under the exact law, by theory of the plate.
     """
 
-    sampled: Mapping[str, tuple[Inference, Draws]] = field(metadata=NOT_IN_JSON, compare=False)
+    sampled: Mapping[str, Draws] = field(metadata=NOT_IN_JSON, compare=False)
 
     @property
     def summary(self) -> Comparison:
@@ -70,7 +70,7 @@ class CompareResult(Comparison):
     @property
     def plot(self) -> ComparePlots:
         """The figures: `comparison.plot.corner("thin")`."""
-        return ComparePlots({theory: draws for theory, (_, draws) in self.sampled.items()})
+        return ComparePlots(self.sampled)
 
     def to_arviz(self) -> dict[str, Any]:
         """The posterior of each theory as of `bayesplate.FitResult.to_arviz`: what `arviz.compare` takes.
@@ -81,8 +81,8 @@ class CompareResult(Comparison):
         """
         about = {"seed": str(self.seed), "prior": self.prior, "card_sha256": self.card_sha256}
         return {
-            theory: to_arviz(posterior_tree(inference, draws, about | {"theory": theory}))
-            for theory, (inference, draws) in self.sampled.items()
+            theory: to_arviz(posterior_tree(draws, about | {"theory": theory}))
+            for theory, draws in self.sampled.items()
         }
 
     def __repr__(self) -> str:
@@ -158,16 +158,16 @@ def compare(
         paper_system(problem.board, problem.estimate, coefficients, compared=False)
     theories: list[TheoryRow] = []
     carrying_modes: list[CarryingMode] = []
-    sampled: dict[str, tuple[Inference, Draws]] = {}
+    sampled: dict[str, Draws] = {}
     for problem in problems:
-        posteriors, inference, draws = _posteriors(problem, SamplerSettings(seed=seed), progress)
-        labelled = inference.problem  # as the draws label its peaks: all methods are held against the same readings
+        posteriors, draws = _posteriors(problem, SamplerSettings(seed=seed), progress)
+        labelled = draws.problem  # as the draws label its peaks: all methods are held against the same readings
         system = paper_system(labelled.board, labelled.estimate, coefficients)
         methods = [*point_methods(labelled, system, expected_sd(labelled)), *posteriors]
-        errors = mode_errors(inference, draws)
+        errors = mode_errors(draws)
         theories.append(theory_row(labelled, system, methods, errors))
-        carrying_modes += carried_in_fit(inference, errors)
-        sampled[theories[-1].theory] = inference, draws
+        carrying_modes += carried_in_fit(labelled.board, errors)
+        sampled[theories[-1].theory] = draws
     united_modes = unite_carrying_modes(carrying_modes)
     compared_theories = recompute_left_out_errors(theories, united_modes)
     result = CompareResult(
@@ -188,29 +188,25 @@ def compare(
     return result
 
 
-def _posteriors(
-    problem: PosedProblem, settings: SamplerSettings, progress: OnProgress
-) -> tuple[list[Method], Inference, Draws]:
+def _posteriors(problem: PosedProblem, settings: SamplerSettings, progress: OnProgress) -> tuple[list[Method], Draws]:
     """The posteriors of both laws, of the problem as the exact draws label its peaks.
 
     The wider, exact one is sampled; the linear one has its draws by weights, where these leave enough.
     """
-    inference, draws = _sample(problem, settings, progress)
-    problem = inference.problem
+    draws = _sample(problem, settings, progress)
+    problem = draws.problem
     methods = []
     for law in get_args(LawName):
-        weights = law_weights(inference, draws, law)
+        weights = law_weights(draws, law)
         if effective_draws(weights) >= FEWEST_DRAWS:
             methods.append(posterior_method(f"{law}_posterior", problem, draws, weights))
         else:
-            law_inference, law_draws = _sample(problem.under(law), settings, progress)
-            methods.append(
-                posterior_method(f"{law}_posterior", problem, law_draws, law_weights(law_inference, law_draws, law))
-            )
-    return methods, inference, draws
+            law_draws = _sample(problem.under(law), settings, progress)
+            methods.append(posterior_method(f"{law}_posterior", problem, law_draws, law_weights(law_draws, law)))
+    return methods, draws
 
 
-def _sample(problem: PosedProblem, settings: SamplerSettings, progress: OnProgress) -> tuple[Inference, Draws]:
+def _sample(problem: PosedProblem, settings: SamplerSettings, progress: OnProgress) -> Draws:
     inference = infer(problem, settings, progress=progress)
     if not inference.convergence.passed:
         raise convergence_error(inference.convergence, problem.doubts, consequence="nothing is compared")

@@ -84,7 +84,7 @@ class DiagnoseResult:
     def plot(self) -> DiagnosePlots:
         """The figures: `result.plot.signatures()`."""
         after = self.after
-        return DiagnosePlots(after.inference, after.draws, after.summary, self.diagnosis)
+        return DiagnosePlots(after.draws, after.summary, self.diagnosis)
 
     def to_arviz(self) -> Any:
         """The draws of the model that the diagnosis ends with, as of `bayesplate.FitResult.to_arviz`."""

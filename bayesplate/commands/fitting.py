@@ -44,8 +44,6 @@ class FitResult:
     Attributes
     ----------
     problem : Problem
-    inference : Inference
-        Chains and the verdict of the convergence gate.
     draws : Draws
         The thinned posterior by name.
     summary : Summary
@@ -55,21 +53,25 @@ class FitResult:
     """
 
     problem: Problem
-    inference: Inference
     draws: Draws
     summary: Summary
     folder: Path | None = None
 
+    @property
+    def inference(self) -> Inference:
+        """Chains and the verdict of the convergence gate."""
+        return self.draws.inference
+
     @cached_property
     def plot(self) -> FitPlots:
         """The figures: `result.plot.constants()`."""
-        return FitPlots(self.inference, self.draws, self.summary)
+        return FitPlots(self.draws, self.summary)
 
     @cached_property
     def tree(self) -> Any:
         """The draws as posterior.nc holds them: an xarray.DataTree."""
-        attributes = archive_attributes(self.inference, self.summary, self.problem.prepared.card.text)
-        return posterior_tree(self.inference, self.draws, attributes)
+        attributes = archive_attributes(self.draws.problem.prior, self.summary, self.problem.prepared.card.text)
+        return posterior_tree(self.draws, attributes)
 
     def to_arviz(self) -> Any:
         """The draws as ArviZ works with them: InferenceData in ArviZ 0.23, DataTree in 1.x; as in posterior.nc.
@@ -97,7 +99,7 @@ class FitResult:
         from bayesplate.report.page import write_report
 
         with catch_write_errors(folder / PAGE_FILE):
-            write_report(folder, self.problem.prepared.card, self.inference, self.draws, self.summary, diagnosis)
+            write_report(folder, self.problem.prepared.card, self.draws, self.summary, diagnosis)
 
     def __repr__(self) -> str:
         return repr(self.summary).replace("<Summary", "<FitResult", 1)
@@ -221,7 +223,7 @@ def compute_fit(
 ) -> FitResult:
     """Sample a problem, and once more under the exact law if the draws show that the linear one does not serve."""
 
-    def sample(posed: PosedProblem) -> tuple[Inference, Draws]:
+    def sample(posed: PosedProblem) -> Draws:
         checkpoint = None if checkpoints is None else law_checkpoint(checkpoints, problem, posed)
         inference = infer(posed, SamplerSettings(seed=seed), checkpoint=checkpoint, progress=progress)
         convergence = inference.convergence
@@ -239,16 +241,16 @@ def compute_fit(
             raise convergence_error(convergence, inference.problem.doubts, subject=subject)
         return with_likely_labels(inference, seed)
 
-    inference, draws = sample(problem.posed)
-    errors = linearisation(inference, draws)
+    draws = sample(problem.posed)
+    errors = linearisation(draws)
     is_linear = problem.law == "linear"
-    if problem.asked_law is None and is_linear and not linear_is_enough(inference, draws, errors):
+    if problem.asked_law is None and is_linear and not linear_is_enough(draws, errors):
         # The law was chosen by a normal approximation, which the draws correct.
-        inference, draws = sample(problem.posed.under("exact"))
-        errors = linearisation(inference, draws)
-    assessment = assess(inference, draws, errors)
-    summary = summarise(inference, draws, assessment, seed, versions(), problem.prepared.card.sha256)
-    return FitResult(problem, inference, draws, summary)
+        draws = sample(problem.posed.under("exact"))
+        errors = linearisation(draws)
+    assessment = assess(draws, errors)
+    summary = summarise(draws, assessment, seed, versions(), problem.prepared.card.sha256)
+    return FitResult(problem, draws, summary)
 
 
 def convergence_error(

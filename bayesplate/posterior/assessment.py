@@ -9,6 +9,7 @@ from typing import get_args
 import numpy as np
 
 from bayesplate.arrays import Floats
+from bayesplate.board.board import Board
 from bayesplate.board.sessions import readings_by_mode
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.leave_one_out import CarryingMode, PredictionErrors, carrying_modes, prediction_errors
@@ -17,10 +18,8 @@ from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.frequencies.spectrum import doubtful_labels, sign_conflicts, spectra
 from bayesplate.posterior.draws import Draws, posterior_mean_values
-from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.laplace import predictor, worst_cents
 from bayesplate.posterior.reweighting import linear_is_enough, linearisation, means_under
-from bayesplate.posterior.target import Posterior
 from bayesplate.posterior.veerings import contradicted_labels
 
 _N_STARTS = 500
@@ -43,14 +42,14 @@ class Assessment:
     doubts: tuple[str, ...]  # labels that the fit contradicts or that hardly fit, and signs that contradict them
 
 
-def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = None) -> Assessment:
+def assess(draws: Draws, linear_errors: Floats | None = None) -> Assessment:
     """Judge a converged fit; `linear_errors` are those of `linearisation`, if known."""
-    problem = inference.problem
+    problem = draws.problem
     models = problem.posterior.models
-    values = posterior_mean_values(problem, draws)
+    values = posterior_mean_values(draws)
     spectrum_by_setup = spectra(models, values)
-    errors = linearisation(inference, draws) if linear_errors is None else linear_errors
-    errors_of_modes = mode_errors(inference, draws)
+    errors = linearisation(draws) if linear_errors is None else linear_errors
+    errors_of_modes = mode_errors(draws)
     conflicts = (
         sentence
         for model in models
@@ -60,23 +59,23 @@ def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = No
     return Assessment(
         left_out=errors_of_modes.left_out,
         leverages=errors_of_modes.leverages.values,
-        carrying=carried_in_fit(inference, errors_of_modes),
+        carrying=carried_in_fit(problem.board, errors_of_modes),
         linear_errors=errors,
-        linear_is_enough=linear_is_enough(inference, draws, errors),
+        linear_is_enough=linear_is_enough(draws, errors),
         exact_worst=worst_cents(models),
-        surrogate_errors=_surrogate_errors(inference, draws),
-        means={law: means_under(inference, draws, law, errors) for law in get_args(LawName)},
-        doubts=(*labels_contradicted(problem.posterior, draws), *doubtful_labels(models), *conflicts),
+        surrogate_errors=_surrogate_errors(draws),
+        means={law: means_under(draws, law, errors) for law in get_args(LawName)},
+        doubts=(*labels_contradicted(draws), *doubtful_labels(models), *conflicts),
     )
 
 
-def mode_errors(inference: Inference, draws: Draws) -> PredictionErrors:
+def mode_errors(draws: Draws) -> PredictionErrors:
     """Prediction errors of the most likely constants under the exact law, in sample and left out.
 
     Both have the same estimator, with the likelihood of the fit at the posterior's median noise: rounded readings are
     intervals, a robust fit has Student's errors. Uncertain inputs are fitted within their priors.
     """
-    problem, noise = inference.problem, draws.median_noise
+    problem, noise = draws.problem, draws.median_noise
     predict = predictor(problem.board, problem.posterior.models, "exact", problem.centre)
     misfit = deviance_misfit(problem.posterior.readings, noise)
     starts = problem.centre[None, :]
@@ -88,23 +87,24 @@ def mode_errors(inference: Inference, draws: Draws) -> PredictionErrors:
     return prediction_errors(predict, target, misfit, starts, bounds, modes, scales)
 
 
-def carried_in_fit(inference: Inference, errors: PredictionErrors) -> tuple[CarryingMode, ...]:
+def carried_in_fit(board: Board, errors: PredictionErrors) -> tuple[CarryingMode, ...]:
     """Modes on which alone a constant or a size of the fit depends."""
-    board = inference.problem.board
     names = (*board.symmetry.moduli, *(parameter.effect or parameter.name for parameter in board.uncertain))
     return carrying_modes(board, errors.leverages, names)
 
 
-def labels_contradicted(posterior: Posterior, draws: Draws) -> tuple[str, ...]:
+def labels_contradicted(draws: Draws) -> tuple[str, ...]:
     """A sentence for each setup whose labels the draws contradict; under the linear law labels follow the shapes."""
+    posterior = draws.problem.posterior
     if posterior.law == "linear":
         return ()
     plates = draws.flat[:: max(1, len(draws.flat) // _N_NAMED)]
     return contradicted_labels(posterior.models, posterior.parameters.values(plates))
 
 
-def _surrogate_errors(inference: Inference, draws: Draws) -> Floats:
+def _surrogate_errors(draws: Draws) -> Floats:
     exact = np.concatenate(draws.flat_log_frequency, axis=1)
-    if inference.surrogate is None:
+    surrogate = draws.inference.surrogate
+    if surrogate is None:
         return exact[:0]
-    return np.asarray(cents(inference.surrogate.log_frequencies(draws.flat) - exact))
+    return np.asarray(cents(surrogate.log_frequencies(draws.flat) - exact))

@@ -17,10 +17,9 @@ from bayesplate.streams import random_stream
 
 @dataclass(frozen=True, eq=False)
 class Draws:
-    """Thinned draws of an inference; all arrays start with (n_chains, n_draws), chain = ensemble; SI."""
+    """Thinned draws of an inference by name; all arrays start with (n_chains, n_draws), chain = ensemble; SI."""
 
-    theta: Floats  # (..., n_dim)
-    log_posterior: Floats
+    inference: Inference
     rigidities: Mapping[str, Floats]
     moduli: Mapping[str, Floats]
     inputs: Mapping[str, Floats]
@@ -30,6 +29,21 @@ class Draws:
     mode_log_frequencies: tuple[Floats, ...]  # per setup (..., n_modes): labelled modes, then those that peaks may be
     log_likelihood: Floats  # (..., n_factors), in the order of `Posterior.factors`
     predictive: Floats  # (..., n_modes), Hz, readings of the next measurement: with noise, rounded as the readings
+
+    @property
+    def problem(self) -> PosedProblem:
+        """The problem that was sampled."""
+        return self.inference.problem
+
+    @property
+    def theta(self) -> Floats:
+        """The sampled parameters: (..., n_dim) array."""
+        return self.inference.theta
+
+    @property
+    def log_posterior(self) -> Floats:
+        """Log density of `theta` under the law or its surrogate."""
+        return self.inference.log_posterior
 
     @property
     def flat(self) -> Floats:
@@ -79,8 +93,7 @@ def named_draws(inference: Inference, seed: int, mode_log_frequencies: Sequence[
 
     derived = derived_quantities(constants, board_density(values))
     return Draws(
-        theta=inference.theta,
-        log_posterior=inference.log_posterior,
+        inference=inference,
         rigidities={name: shaped(values[name]) for name in RIGIDITIES},
         moduli={name: shaped(array) for name, array in zip(MODULI, constants, strict=True)},
         inputs={name: shaped(values[name]) for name in problem.parameters.inputs},
@@ -93,7 +106,7 @@ def named_draws(inference: Inference, seed: int, mode_log_frequencies: Sequence[
     )
 
 
-def posterior_mean_values(problem: PosedProblem, draws: Draws) -> dict[str, Floats]:
+def posterior_mean_values(draws: Draws) -> dict[str, Floats]:
     """Constants and inputs at their posterior means."""
     means = {name: np.asarray(values.mean()) for name, values in {**draws.rigidities, **draws.inputs}.items()}
-    return {**problem.board.nominal(), **means}
+    return {**draws.problem.board.nominal(), **means}

@@ -17,10 +17,10 @@ MOST_DRAWS_OF_LABELS = 2000
 """Largest number of draws for the probabilities of labels."""
 
 
-def with_likely_labels(inference: Inference, seed: int) -> tuple[Inference, Draws]:
-    """An inference whose peaks have their likely labels by its own draws, and these draws by name.
+def with_likely_labels(inference: Inference, seed: int) -> Draws:
+    """The draws of an inference by name, its peaks with their likely labels by these draws.
 
-    The same inference where no label changes; `seed` is for the predictive draws.
+    `seed` is for the predictive draws.
     """
     draws = named_draws(inference, seed)
     problem, previous = inference.problem, inference.problem.posterior
@@ -35,7 +35,7 @@ def with_likely_labels(inference: Inference, seed: int) -> tuple[Inference, Draw
         setups.append(setup)
     board = replace(problem.board, setups=tuple(setups))
     if board.setups == problem.board.setups or sum(len(setup.readings) for setup in setups) < board.symmetry.n:
-        return inference, draws
+        return draws
     estimate = weighted_least_squares(board, start=problem.estimate.rigidities)
     models = tuple(model.labelled_as(setup) for model, setup in zip(previous.models, setups, strict=True))
     posterior = Posterior(board, previous.prior, models, previous.law, previous.robust)
@@ -54,4 +54,4 @@ def with_likely_labels(inference: Inference, seed: int) -> tuple[Inference, Draw
     log_frequencies = [
         log_frequency[:, order] for log_frequency, order in zip(mode_log_frequencies, columns, strict=True)
     ]
-    return relabelled, named_draws(relabelled, seed, log_frequencies)
+    return named_draws(relabelled, seed, log_frequencies)

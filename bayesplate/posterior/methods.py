@@ -84,7 +84,7 @@ def posterior_method(name: str, problem: PosedProblem, draws: Draws, weights: Fl
         interval[modulus] = (float(low), float(high))
     sampled = {**draws.rigidities, **draws.inputs}
     means = {key: np.asarray(weighted_mean(values.ravel(), weights)) for key, values in sampled.items()}
-    at_means = prediction_misses(problem, {**posterior_mean_values(problem, draws), **means})
+    at_means = prediction_misses(problem, {**posterior_mean_values(draws), **means})
     return Method(name, mean, at_means, sd=sd, interval=interval)
 
 

@@ -14,7 +14,6 @@ from bayesplate.board.material import MODULI
 from bayesplate.estimates.paper import paper_system
 from bayesplate.estimates.percentile import PercentileEstimate, percentile_estimate
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Inference
 from bayesplate.report.style import (
     PAPER_COLOUR,
     POSTERIOR_COLOUR,
@@ -123,9 +122,9 @@ MOST_DRAWN_MODES = 12
 """Most modes of the picture of the percentile method: 4017 subsets; more take seconds and are too many to draw."""
 
 
-def percentiles_pictures(inference: Inference, draws: Draws) -> list[Picture]:
+def percentiles_pictures(draws: Draws) -> list[Picture]:
     """The picture of the percentile method; empty for a single estimate, for too many, or if none is positive."""
-    problem = inference.problem
+    problem = draws.problem
     system = paper_system(problem.board, problem.estimate, compared=False)
     if system.psi.size > MOST_DRAWN_MODES:
         return []

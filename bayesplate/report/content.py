@@ -12,7 +12,6 @@ from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import effect_name, join_words
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Inference
 from bayesplate.report.posterior import input_words
 from bayesplate.results.budget import budget, row_words
 from bayesplate.results.contract import Spread
@@ -123,10 +122,11 @@ def effect_sentences(summary: Summary, given_sentences: Sequence[str] = ()) -> l
     return [f"{name}: {sentence}" for name, sentence in effects if sentence not in given_sentences]
 
 
-def budget_table(inference: Inference, draws: Draws, summary: Summary) -> Table:
-    board = inference.problem.board
+def budget_table(draws: Draws, summary: Summary) -> Table:
+    problem = draws.problem
+    board = problem.board
     shares = budget(draws, board)
-    noise_sd = dict(zip(MODULUS_WORDS, inference.problem.identifiability.errors_of_rigidities, strict=True))
+    noise_sd = dict(zip(MODULUS_WORDS, problem.identifiability.errors_of_rigidities, strict=True))
     input_names = {parameter.name: input_words(parameter, board)[0] for parameter in board.uncertain}
 
     def inputs(name: str) -> str | None:

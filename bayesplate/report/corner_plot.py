@@ -13,7 +13,6 @@ from bayesplate.board.board import Board
 from bayesplate.board.material import MODULI
 from bayesplate.libraries import load_arviz
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.posing import PosedProblem
 from bayesplate.report.posterior import input_words
 from bayesplate.report.saving import matplotlib_defaults, save_figure
 from bayesplate.report.style import (
@@ -120,9 +119,9 @@ def write_corner_plot(
     save_figure(corner_figure(columns, marked), path)
 
 
-def corner_picture(problem: PosedProblem, draws: Draws) -> Picture:
+def corner_picture(draws: Draws) -> Picture:
     """The constants, the noise and the inputs that matter most against each other."""
-    columns = corner_columns(problem, draws)
+    columns = corner_columns(draws)
     alt = f"Draws in pairs of {', '.join(name.partition(',')[0] for name in columns)}. {_correlation_sentence(columns)}"
     caption = (
         "Each square shows two quantities at once; the lines hold half and nine tenths of the probability. A slanted "
@@ -157,17 +156,17 @@ def axis_label(name: str, side: float) -> str:
     return mathtext(name) if is_symbol(first) else name.replace("$", r"\$")
 
 
-def corner_columns(problem: PosedProblem, draws: Draws) -> dict[str, Floats]:
+def corner_columns(draws: Draws) -> dict[str, Floats]:
     """Moduli in GPa, the noise of each setup in %, and the inputs with the largest share in the moduli's variance."""
-    columns = {f"{name}, GPa": values * GPA for name, values in draws.moduli.items()}
-    setups = problem.board.setups
+    columns, board = {f"{name}, GPa": values * GPA for name, values in draws.moduli.items()}, draws.problem.board
+    setups = board.setups
     for i, setup in enumerate(setups[: MOST_COLUMNS - len(columns) - 1]):
         columns["noise, %" if len(setups) == 1 else f"noise {setup.name}, %"] = 100.0 * draws.noise[..., i]
     shares = input_shares(draws)
     largest_share = {name: max(by_input[name] for by_input in shares.values()) for name in draws.inputs}
-    inputs = [parameter.name for parameter in problem.board.uncertain if parameter.is_listed]
+    inputs = [parameter.name for parameter in board.uncertain if parameter.is_listed]
     for name in sorted(inputs, key=lambda name: -largest_share[name])[: MOST_COLUMNS - len(columns)]:
-        words, factor = words_and_factor(name, problem.board)
+        words, factor = words_and_factor(name, board)
         columns[words] = draws.inputs[name] * factor
     return columns
 

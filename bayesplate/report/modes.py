@@ -14,7 +14,6 @@ from bayesplate.estimates.sheet import N_POINTS, grid_points, labelled_shapes
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.posterior.draws import Draws, posterior_mean_values
-from bayesplate.posterior.inference import Inference
 from bayesplate.report.chladni import board_panel, draw_caption, draw_sand
 from bayesplate.report.style import (
     BLUE,
@@ -52,9 +51,9 @@ _MARGIN = 0.14
 _N_COLUMNS = 3
 
 
-def modes_pictures(inference: Inference, draws: Draws, summary: Summary) -> list[Picture]:
-    problem = inference.problem
-    shapes = labelled_shapes(problem.posterior.models, posterior_mean_values(problem, draws))
+def modes_pictures(draws: Draws, summary: Summary) -> list[Picture]:
+    problem = draws.problem
+    shapes = labelled_shapes(problem.posterior.models, posterior_mean_values(draws))
     caption = (
         "Black lines stay at rest, so sand gathers there; white and grey parts move against each other. "
         f"{'x' if problem.board.isotropic else 'The grain'} runs from left to right. The predicted frequency is the "

@@ -14,7 +14,6 @@ from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.diagnosis.tables import write_diagnosis_tables
 from bayesplate.files import make_folder, write_text
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Inference
 from bayesplate.report import content
 from bayesplate.report.board import board_picture
 from bayesplate.report.constants import constants_picture, percentiles_pictures
@@ -55,24 +54,21 @@ class PagePicture(NamedTuple):
 
 
 @matplotlib_defaults()
-def write_report(
-    folder: Path, card: Board, inference: Inference, draws: Draws, summary: Summary, diagnosis: Diagnosis | None = None
-) -> Path:
+def write_report(folder: Path, card: Board, draws: Draws, summary: Summary, diagnosis: Diagnosis | None = None) -> Path:
     """Write report.html, its figures as PNG and SVG, and the tables for other programs; returns the path of the page.
 
-    Files of an earlier report are replaced. With a diagnosis, `inference`, `draws` and `summary` are those of the
-    refitted model.
+    Files of an earlier report are replaced. With a diagnosis, `draws` and `summary` are those of the refitted model.
     """
-    title = inference.problem.board.title or summary.name
+    title = draws.problem.board.title or summary.name
     make_folder(folder)
     write_constants(folder, quoted_summary(summary, diagnosis), title)
     if diagnosis is not None:
         write_diagnosis_tables(folder, diagnosis, title)
-    groups = fit_pictures(inference, draws, summary, diagnosis)
+    groups = fit_pictures(draws, summary, diagnosis)
     return save_page(
         folder / PAGE_FILE,
         groups,
-        lambda page_pictures: fit_page(card, inference, draws, summary, page_pictures, diagnosis),
+        lambda page_pictures: fit_page(card, draws, summary, page_pictures, diagnosis),
     )
 
 
@@ -91,10 +87,8 @@ def save_page(
     return path
 
 
-def fit_pictures(
-    inference: Inference, draws: Draws, summary: Summary, diagnosis: Diagnosis | None = None
-) -> dict[str, list[Picture]]:
-    problem = inference.problem
+def fit_pictures(draws: Draws, summary: Summary, diagnosis: Diagnosis | None = None) -> dict[str, list[Picture]]:
+    problem = draws.problem
     board = problem.board
     first, more = _diagnosis_pictures(diagnosis)
     return {
@@ -102,15 +96,15 @@ def fit_pictures(
         "diagnosis_more": more,
         "constants": [constants_picture(summary, draws.moduli)],
         "board": [board_picture(board)],
-        "modes": modes_pictures(inference, draws, summary),
+        "modes": modes_pictures(draws, summary),
         "errors": [*spectrum_pictures(summary), residuals_picture(summary)],
         "folded": [
             shares_picture(summary, problem.identifiability),
-            *percentiles_pictures(inference, draws),
+            *percentiles_pictures(draws),
             predictive_picture(summary, draws.predictive),
-            priors_picture(problem, draws),
-            corner_picture(problem, draws),
-            health_picture(inference),
+            priors_picture(draws),
+            corner_picture(draws),
+            health_picture(draws.inference),
         ],
     }
 
@@ -134,13 +128,12 @@ def _page_picture(picture: Picture, svg: bytes) -> PagePicture:
 
 def fit_page(
     card: Board,
-    inference: Inference,
     draws: Draws,
     summary: Summary,
     pictures: Mapping[str, Sequence[PagePicture]],
     diagnosis: Diagnosis | None = None,
 ) -> str:
-    problem = inference.problem
+    problem = draws.problem
     board, prior = problem.board, problem.prior
     return render_page(
         "report.html",
@@ -158,7 +151,7 @@ def fit_page(
             "makers": content.makers_table(summary),
             "ratios": content.ratios_table(summary),
             "laws": content.laws_table(summary),
-            "budget": content.budget_table(inference, draws, summary),
+            "budget": content.budget_table(draws, summary),
             "inputs": content.inputs_table(board, summary),
             "setups": content.setups_table(board),
             "modes": content.modes_tables(summary),

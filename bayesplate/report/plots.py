@@ -15,7 +15,6 @@ from bayesplate.estimates.sheet import Sheet
 from bayesplate.planning.bench import Bench
 from bayesplate.planning.plan import Plan
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.report.board import board_picture
 from bayesplate.report.campaign import boards_picture, common_picture, left_out_picture, shared_picture
@@ -47,7 +46,6 @@ class Plots:
 class FitPlots(Plots):
     """The figures of a fit."""
 
-    inference: Inference
     draws: Draws
     summary: Summary
 
@@ -57,8 +55,8 @@ class FitPlots(Plots):
 
     def modes(self, setup: str | None = None) -> Figure:
         """Chladni figures of the fitted modes of a setup, the first unless named, measured and predicted."""
-        names = [setup.name for setup in self.inference.problem.board.setups]
-        return modes_pictures(self.inference, self.draws, self.summary)[_name_index("setup", setup, names)].figure
+        names = [setup.name for setup in self.draws.problem.board.setups]
+        return modes_pictures(self.draws, self.summary)[_name_index("setup", setup, names)].figure
 
     def corner(self, names: Sequence[str] = MODULI) -> Figure:
         """Every pair of quantities, by the package corner; least-squares estimates are marked.
@@ -72,7 +70,7 @@ class FitPlots(Plots):
             raise InputError(Fault("names", wanted, repr(names) if isinstance(names, str) else f"{list(names)}"))
         for name in names:
             _name_index("name", name, list(quantities))
-        axes = {name: words_and_factor(name, self.inference.problem.board) for name in names}
+        axes = {name: words_and_factor(name, self.draws.problem.board) for name in names}
         estimate = self.summary.weighted_least_squares
         marked = {name: estimate[name] if name in estimate.NAMES else None for name in names}
         return corner_figure(
@@ -83,11 +81,11 @@ class FitPlots(Plots):
 
     def pairs(self) -> Figure:
         """Every pair of the constants, the noise and the inputs that matter most, as in the report."""
-        return corner_picture(self.inference.problem, self.draws).figure
+        return corner_picture(self.draws).figure
 
     def priors(self) -> Figure:
         """Prior and posterior of every sampled quantity."""
-        return priors_picture(self.inference.problem, self.draws).figure
+        return priors_picture(self.draws).figure
 
     def residuals(self) -> Figure:
         """Residual and left-out error of each mode, cents."""
@@ -99,21 +97,21 @@ class FitPlots(Plots):
 
     def shares(self) -> Figure:
         """Energy of each mode by constant, and its leverage."""
-        return shares_picture(self.summary, self.inference.problem.identifiability).figure
+        return shares_picture(self.summary, self.draws.problem.identifiability).figure
 
     def percentiles(self) -> Figure:
         """The percentile method's estimates beside the posterior."""
-        picture = next(iter(percentiles_pictures(self.inference, self.draws)), None)
+        picture = next(iter(percentiles_pictures(self.draws)), None)
         wanted, got = "a board of a few modes more than three", "too few, too many, or no estimate"
         return _figure_of_picture(picture, "plot.percentiles", wanted, got)
 
     def sampler(self) -> Figure:
         """Mean of each ensemble, step by step."""
-        return health_picture(self.inference).figure
+        return health_picture(self.draws.inference).figure
 
     def board(self) -> Figure:
         """The board to scale, its edges, hammer and sensors."""
-        return board_picture(self.inference.problem.board).figure
+        return board_picture(self.draws.problem.board).figure
 
 
 @dataclass(frozen=True, eq=False, repr=False)

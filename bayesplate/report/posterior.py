@@ -15,7 +15,6 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.board.sessions import DISCREPANCY
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
-from bayesplate.posterior.posing import PosedProblem
 from bayesplate.report.style import (
     BLACK,
     BLUE,
@@ -72,8 +71,9 @@ class SampledQuantity:
         return "as before: nothing was learned"
 
 
-def sampled_quantities(problem: PosedProblem, draws: Draws) -> list[SampledQuantity]:
+def sampled_quantities(draws: Draws) -> list[SampledQuantity]:
     """All quantities with a prior that were sampled: constants, noise, uncertain inputs, effects."""
+    problem = draws.problem
     constants, setups = {**draws.moduli, **draws.rigidities}, problem.board.setups
     units = {name: ("GPa", GPA) if name in MODULI else ("N m", 1.0) for name in constants}
     rows = [(name, *units[name], constants[name], prior) for name, prior in problem.prior.constants.items()]
@@ -97,11 +97,11 @@ def input_words(parameter: Parameter, board: Board) -> tuple[str, float, str]:
     return f"{parameter.display_name or parameter.key}{owner}", factor, unit
 
 
-def priors_picture(problem: PosedProblem, draws: Draws) -> Picture:
+def priors_picture(draws: Draws) -> Picture:
     """Prior and posterior of the sampled quantities, at most `MOST_PANELS` of them."""
     from matplotlib.figure import Figure
 
-    all_quantities = sampled_quantities(problem, draws)
+    all_quantities = sampled_quantities(draws)
     quantities = all_quantities[:MOST_PANELS]
     height = _TOP + -(-len(quantities) // 2) * _ROW + _BOTTOM
     figure = Figure(figsize=(FIGURE_WIDTH, height))

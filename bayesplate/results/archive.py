@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.arrays import Floats
-from bayesplate.board.prior import StatedPrior
+from bayesplate.board.prior import PriorCard, StatedPrior
 from bayesplate.files import write_bytes
 from bayesplate.libraries import load_arviz
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Inference
 from bayesplate.results.contract import as_json
 from bayesplate.results.summary import Summary
 
@@ -61,14 +60,12 @@ def write_tree(path: Path, tree: Any) -> None:
     write_bytes(Path(path), bytes(tree.to_netcdf(None, engine="h5netcdf")))
 
 
-def archive_attributes(inference: Inference, summary: Summary, card_text: str) -> dict[str, str]:
+def archive_attributes(prior: PriorCard, summary: Summary, card_text: str) -> dict[str, str]:
     """Origin of a fit as attributes of its archive; the model and the sampler's entries are those of its summary."""
     return {
         "card": card_text,
-        "prior": inference.problem.prior.name,
-        "priors": json.dumps(
-            {name: _prior_content(prior) for name, prior in inference.problem.prior.stated_constants.items()}
-        ),
+        "prior": prior.name,
+        "priors": json.dumps({name: _prior_content(stated) for name, stated in prior.stated_constants.items()}),
         "model": json.dumps(as_json(summary.model)),
         "sampler": json.dumps(as_json(summary.sampler)),
         "versions": json.dumps(as_json(summary.versions)),
@@ -77,12 +74,12 @@ def archive_attributes(inference: Inference, summary: Summary, card_text: str) -
     }
 
 
-def posterior_tree(inference: Inference, draws: Draws, attributes: Mapping[str, str]) -> Any:
+def posterior_tree(draws: Draws, attributes: Mapping[str, str]) -> Any:
     """The draws of a fit by the names of the archive: xarray.DataTree.
 
     Its group log_prior holds one variable per factor of the prior: constants, noise, and inputs if any is uncertain.
     """
-    problem = inference.problem
+    problem = draws.problem
     board = problem.board
     factors = problem.posterior.log_prior_factors(draws.flat)
     all_sure = not any(problem.posterior.peaks)
@@ -99,7 +96,7 @@ def posterior_tree(inference: Inference, draws: Draws, attributes: Mapping[str, 
             },
             "log_likelihood": {likelihood: ((*DRAW_DIMENSIONS, dimension), draws.log_likelihood)},
             "posterior_predictive": {"frequency": ((*DRAW_DIMENSIONS, "reading"), draws.predictive)},
-            "sample_stats": sample_stats(draws.log_posterior, inference.convergence),
+            "sample_stats": sample_stats(draws.log_posterior, draws.inference.convergence),
             "observed_data": {"frequency": (("reading",), np.concatenate([setup.measured for setup in board.setups]))},
         },
         {

@@ -66,8 +66,9 @@ def ratio_cents(measured: float, predicted: float) -> float:
     return float(cents(np.log(measured / predicted)))
 
 
-def mode_rows(problem: PosedProblem, draws: Draws, assessment: Assessment) -> tuple[ModeRow, ...]:
+def mode_rows(draws: Draws, assessment: Assessment) -> tuple[ModeRow, ...]:
     """One row per labelled mode, setup after setup."""
+    problem = draws.problem
     predicted = np.exp(draws.log_frequency).reshape(-1, draws.log_frequency.shape[-1])
     rounding = rounding_intervals(problem)
     placed_readings = [
@@ -175,8 +176,9 @@ class Spectrum:
     modes: tuple[PredictedMode, ...]  # in the order of frequency, up to a little above the highest peak
 
 
-def assigned_peaks(problem: PosedProblem, draws: Draws) -> tuple[tuple[AssignedPeak, ...], tuple[Spectrum, ...]]:
+def assigned_peaks(draws: Draws) -> tuple[tuple[AssignedPeak, ...], tuple[Spectrum, ...]]:
     """The peaks whose label is not sure, by frequency, and the modes of their setups, averaged over the posterior."""
+    problem = draws.problem
     peaks: list[AssignedPeak] = []
     spectra = []
     for i, (setup, likelihood) in enumerate(zip(problem.board.setups, problem.posterior.peaks, strict=True)):

@@ -17,7 +17,6 @@ from bayesplate.estimates.undeclared_air import air_sentence
 from bayesplate.posterior.assessment import Assessment
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains
@@ -59,14 +58,14 @@ def unconverged_summary(
 
 
 def summarise(
-    inference: Inference, draws: Draws, assessment: Assessment, seed: int, versions: Mapping[str, str], card_sha256: str
+    draws: Draws, assessment: Assessment, seed: int, versions: Mapping[str, str], card_sha256: str
 ) -> Summary:
     """The summary of a converged fit."""
-    problem = inference.problem
+    problem, inference = draws.problem, draws.inference
     board = problem.board
     system = paper_system(board, problem.estimate, compared=False)
-    rows = mode_rows(problem, draws, assessment)
-    peaks, spectra = assigned_peaks(problem, draws)
+    rows = mode_rows(draws, assessment)
+    peaks, spectra = assigned_peaks(draws)
     paper_rigidities, surrogate_errors = system.solve(), assessment.surrogate_errors
     return Summary(
         format=FORMAT,
@@ -78,7 +77,7 @@ def summarise(
         converged=True,
         elastic=Elastic(**{name: Spread.of(values, "Pa") for name, values in draws.moduli.items()}),
         rigidity=Rigidity(**{name: Spread.of(values, "N m") for name, values in draws.rigidities.items()}),
-        effects=_effect_spreads(problem, draws),
+        effects=_effect_spreads(draws),
         noise={setup.name: Spread.of(draws.noise[..., i], "1") for i, setup in enumerate(board.setups)},
         inputs={
             parameter.name: Spread.of(draws.inputs[parameter.name], parameter.unit)
@@ -143,14 +142,14 @@ def sampler_health(chains: Chains, convergence: Convergence) -> SamplerHealth:
     )
 
 
-def _effect_spreads(problem: PosedProblem, draws: Draws) -> dict[str, dict[str, dict[str, Spread]]]:
+def _effect_spreads(draws: Draws) -> dict[str, dict[str, dict[str, Spread]]]:
     """Parameters of the declared effects, by board or setup, effect and parameter; exact ones have no spread."""
     result: dict[str, dict[str, dict[str, Spread]]] = {}
 
     def input_values(name: str) -> Floats:
-        return draws.inputs[name] if name in draws.inputs else np.array(problem.board.inputs[name].mean)
+        return draws.inputs[name] if name in draws.inputs else np.array(draws.problem.board.inputs[name].mean)
 
-    for model in problem.posterior.models:
+    for model in draws.problem.posterior.models:
         for effect in model.system.effects:
             owner = result.setdefault(effect.owner.title, {})
             owner[effect.name] = {

@@ -104,7 +104,7 @@ def test_a_board_that_was_walked_anew_is_known_where_its_own_draws_are_as_well()
     """The others learn of it from there: from draws near what they teach it alone, its peak would be extrapolated."""
     rng, grid = np.random.default_rng(6), np.linspace(-6.0, 6.0, 24001)[:, None]
     prior = Quantity.from_mean(0.0, 1.0, "normal")
-    member = FittedBoard(None, None, (SimpleNamespace(prior=prior),))
+    member = FittedBoard(None, (SimpleNamespace(prior=prior),))
 
     def log_likelihood(z):
         """A narrow peak, and a wide foot of what the board's noise makes up for."""

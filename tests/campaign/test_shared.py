@@ -87,7 +87,7 @@ def test_the_truth_is_inside_and_sharing_narrows(fitted_campaign):
 def test_what_is_told_of_boards_that_are_left_out(fitted_campaign):
     """Against each board alone, which here has the sensor as well."""
     learnt, alone = fitted_campaign.shared_posterior, fitted_campaign.alone
-    members = {name: FittedBoard(one.inference, one.draws, ()) for name, one in alone.items()}
+    members = {name: FittedBoard(one.draws, ()) for name, one in alone.items()}
     taught = taught_boards(learnt, members, 1)
 
     for i, (told, score) in enumerate(
@@ -95,7 +95,7 @@ def test_what_is_told_of_boards_that_are_left_out(fitted_campaign):
     ):
         name = learnt.members[i].name
         assert told.log_score_gain == pytest.approx(score.log_score - members[name].own_sample.log_evidence)
-        assert told.before_rms_cents == pytest.approx(rms_cents(alone[name].inference, alone[name].draws))
+        assert told.before_rms_cents == pytest.approx(rms_cents(alone[name].draws))
         assert told.after_rms_cents == pytest.approx(told.before_rms_cents, rel=0.3)
         others = fitted_campaign.summary.shared[SHARED].others[name]
         assert told.others[SHARED].mean == pytest.approx(others.mean, rel=0.05)
@@ -105,7 +105,7 @@ def test_what_is_told_of_boards_that_are_left_out(fitted_campaign):
 @pytest.mark.slow
 def test_a_sensor_on_all_boards_is_claimed_from_those_left_out(campaign, fitted_campaign):
     before = fit_boards(_without_shared(campaign), Run())
-    members = {name: FittedBoard(one.inference, one.draws, ()) for name, one in before.items()}
+    members = {name: FittedBoard(one.draws, ()) for name, one in before.items()}
     taught = taught_boards(fitted_campaign.shared_posterior, members, 1)
 
     assert judge_shared_effect(taught).holds
@@ -123,7 +123,7 @@ def test_a_board_that_is_left_out_has_what_the_others_teach(fitted_campaign, sca
     members = tuple(replace(one, shared=shared) for one in fitted_campaign.shared_posterior.members)
     learnt = learn_shared(members, SamplerSettings(seed=1)) if scatter else fitted_campaign.shared_posterior
     for i, member in enumerate(learnt.members):
-        _, draws = learnt.board_left_out(i, np.random.default_rng(0), 1)
+        draws = learnt.board_left_out(i, np.random.default_rng(0), 1)
         z = member.conditional.z_of(draws.flat)[:, 0]
         mean, covariance = learnt.combined.moments_from_others((i,))
         n = len(np.unique(z))
@@ -139,11 +139,11 @@ def test_a_draw_that_ends_where_there_is_no_plate_has_no_weight(fitted_campaign)
     member, drawn = fitted_campaign.shared_posterior.members[0], fitted_campaign.shared_posterior.samples[0]
     z = np.concatenate([[[100.0]], np.full((199, 1), drawn.z.mean())])
     moved = member.moved(drawn, member.log_prior, z, np.random.default_rng(0))
-    inference, draws = member.posterior_of(moved, moved.weights, np.random.default_rng(0), 1)
+    draws = member.posterior_of(moved, moved.weights, np.random.default_rng(0), 1)
 
     assert moved.weights[0] == 0.0
     assert moved.weights[1:] == pytest.approx(1.0 / 199)
-    assert np.isfinite(rms_cents(inference, draws))
+    assert np.isfinite(rms_cents(draws))
 
 
 def others_at(member, sds):

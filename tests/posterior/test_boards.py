@@ -94,7 +94,7 @@ def test_weights_and_errors_of_the_paper_boards_know_the_rounding(fits, name):
     assert found == pytest.approx(known.constants, rel=1e-3)
     assert found != pytest.approx(alike.constants, rel=2e-3)  # control: all readings alike
 
-    errors = rms(mode_errors(fits[name].inference, fits[name].draws).in_sample), summary.error.leave_one_out_rms_cents
+    errors = rms(mode_errors(fits[name].draws).in_sample), summary.error.leave_one_out_rms_cents
     assert errors == pytest.approx(known.errors, abs=ROUNDING)
     assert abs(errors[1] - alike.errors[1]) > 5 * ROUNDING  # control: without the rounding
 

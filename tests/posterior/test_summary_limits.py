@@ -46,8 +46,8 @@ def inference():
 def summary_of(inference, errors=0.0):
     """The summary where the linear law errs by this share of the noise, in every mode and draw."""
     draws = named_draws(inference, 1)
-    off = np.full_like(linearisation(inference, draws), errors * cents(np.median(draws.noise)))
-    return summarise(inference, draws, assessed(inference, draws, off), 1, {}, "")
+    off = np.full_like(linearisation(draws), errors * cents(np.median(draws.noise)))
+    return summarise(draws, assessed(draws, off), 1, {}, "")
 
 
 def is_told(inference, sentence, errors=0.0):

@@ -53,7 +53,7 @@ def test_its_error_over_the_posterior_is_stated_and_small_beside_the_noise(probl
     draws = inference.chains.pooled[::20]
     exact = np.concatenate(problem.posterior.log_frequencies(draws), axis=1)
     errors = cents(inference.surrogate.log_frequencies(draws) - exact)
-    stated = assess(inference, named_draws(inference, 5)).surrogate_errors
+    stated = assess(named_draws(inference, 5)).surrogate_errors
     rms, as_stated = (float(np.sqrt(np.mean(e**2))) for e in (errors, stated))
     assert 0.5 * as_stated < rms < 2 * as_stated
     assert np.sqrt(np.mean(errors**2, axis=0)).max() < LINEAR_SHARE * cents(noise_of(problem))

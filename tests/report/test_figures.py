@@ -34,7 +34,7 @@ from bayesplate.results.words import MISSING
 
 @pytest.fixture(scope="module")
 def drawn(clamped):
-    groups = fit_pictures(clamped.inference, clamped.draws, clamped.summary, DIAGNOSES["named"])
+    groups = fit_pictures(clamped.draws, clamped.summary, DIAGNOSES["named"])
     return {one.name: one for found in groups.values() for one in found}
 
 
@@ -158,8 +158,8 @@ def test_a_plate_without_grain_is_drawn_and_told_so():
         words = [picture.alt, picture.caption, modulus_title("E_x", isotropic=isotropic)]
         constants = {"D_x": np.float64(13e3), "D_y": np.float64(13e3), "D_s": np.float64(18e3)}
         values = {**board.nominal(), **constants}
-        posed, draws = Problem.from_card(board).posed, SimpleNamespace(rigidities=constants, inputs={})
-        (modes,) = modes_pictures(SimpleNamespace(problem=posed), draws, SimpleNamespace(modes=()))
+        draws = SimpleNamespace(problem=Problem.from_card(board).posed, rigidities=constants, inputs={})
+        (modes,) = modes_pictures(draws, SimpleNamespace(modes=()))
         words.append(modes.caption)
         drawn = chladni_sheet(sheet(board, system_of(board, board.setups[0]), values, "as given")).texts
         words += [text.get_text() for text in (*panel.texts, *drawn)]
@@ -273,10 +273,10 @@ def test_the_expected_readings_have_a_bar_where_all_round_to_one(clamped):
 
 def test_no_word_is_cut_off_or_too_small(drawn, clamped):
     """Nor by rigidities of 20 000 N m, as well known as those of the board: no number stands apart as an offset."""
-    chains = clamped.inference.chains
+    chains = clamped.draws.inference.chains
     draws = chains.draws.copy()
     draws[..., :3] = np.log(2e4) + draws[..., :3] - draws[..., :3].mean(axis=(0, 1, 2))
-    large = health_picture(replace(clamped.inference, chains=replace(chains, draws=draws)))
+    large = health_picture(replace(clamped.draws.inference, chains=replace(chains, draws=draws)))
 
     assert set(drawn) == {*FIGURES, "before-after", "null-control", "signatures"}
     for picture in (*drawn.values(), large):
@@ -305,7 +305,7 @@ def test_what_the_readings_made_of_each_prior(clamped):
     assert told(1.0, 0.2) == "2.5 times narrower"
     assert told(1.0, 0.5) == "as before: nothing was learned"
     assert told(1.2, 0.5) == "moved, as wide as before"
-    found = {one.name: one for one in sampled_quantities(clamped.inference.problem, clamped.draws)}
+    found = {one.name: one for one in sampled_quantities(clamped.draws)}
     assert np.log(found["E_x"].prior.median) == pytest.approx(np.log(3))
     mean = clamped.summary.elastic.E_x.mean / 1e9
     assert np.log(found["E_x"].draws).mean() == pytest.approx(np.log(mean), rel=1e-3)
@@ -334,7 +334,7 @@ def test_percentiles_are_of_the_modes_that_the_table_has():
 
     def drawn_of(**changed):
         problem = Problem.from_card(replace(board, setups=(replace(board.setups[0], **changed),))).posed
-        drawn = percentiles_pictures(SimpleNamespace(problem=problem), SimpleNamespace(moduli=moduli))
+        drawn = percentiles_pictures(SimpleNamespace(problem=problem, moduli=moduli))
         return len(problem.board.setups[0].readings), drawn
 
     n_readings, (picture,) = drawn_of(peaks=(Peak(Quantity.exact(898.0)),))

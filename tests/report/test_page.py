@@ -173,7 +173,7 @@ def test_a_diagnosis_brings_its_figures_tables_and_constants(clamped, tmp_path, 
     places = dict.fromkeys(("constants", "board", "modes", "errors", "folded"), ())
     monkeypatch.setattr(
         "bayesplate.report.page.fit_pictures",
-        lambda inference, draws, summary, diagnosis: {
+        lambda draws, summary, diagnosis: {
             **places,
             **dict(zip(("diagnosis_first", "diagnosis_more"), _diagnosis_pictures(diagnosis), strict=True)),
         },

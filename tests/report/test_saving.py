@@ -14,10 +14,10 @@ from bayesplate.report.constants import constants_picture
 STYLE = {"axes.facecolor": "black", "font.family": "serif", "savefig.bbox": "tight", "text.usetex": True}
 
 
-def two_pictures(inference, draws, summary, diagnosis):
+def two_pictures(draws, summary, diagnosis):
     """Two of the report, as quick to draw as any."""
     places = dict.fromkeys(("diagnosis_first", "diagnosis_more", "modes", "errors", "folded"), ())
-    constants, board = constants_picture(summary, draws.moduli), board_picture(inference.problem.board)
+    constants, board = constants_picture(summary, draws.moduli), board_picture(draws.problem.board)
     return places | {"constants": [constants], "board": [board]}
 
 

@@ -33,9 +33,9 @@ def rows():
     problem = SimpleNamespace(board=SimpleNamespace(setups=(SETUP,)), posterior=posterior)
     rng = np.random.default_rng(1)
     log_frequency = np.log([56.0, 101.0]) + 0.02 * rng.standard_exponential((4, 500, 2))
-    draws = SimpleNamespace(log_frequency=log_frequency)
+    draws = SimpleNamespace(log_frequency=log_frequency, problem=problem)
     assessment = SimpleNamespace(left_out=np.log([1.01, np.nan]), leverages=np.array([0.25, 0.75]))
-    return mode_rows(problem, draws, assessment), np.exp(log_frequency)
+    return mode_rows(draws, assessment), np.exp(log_frequency)
 
 
 def test_residuals_are_those_of_the_prediction_beside_them(rows):

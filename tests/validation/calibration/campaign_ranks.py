@@ -65,7 +65,7 @@ def learnt_from(truths: list[Truth], rng: np.random.Generator) -> SharedPosterio
     for truth in truths:
         inference = infer(make_problem(DESIGN, truth), settings(rng, gate))
         _require(inference.convergence)
-        members.append(FittedBoard(inference, named_draws(inference, int(rng.integers(2**31))), (shared(),)))
+        members.append(FittedBoard(named_draws(inference, int(rng.integers(2**31))), (shared(),)))
     learnt = learn_shared(members, settings(rng))
     _require(learnt.convergence)
     return learnt
@@ -109,9 +109,9 @@ def simulate_one(index: int, times: int = 2) -> Record:
     try:
         truths = draw(for_truth)
         learnt = learnt_from(truths, for_draws)
-        inference, draws, effective = learnt.board(0, for_draws, int(for_draws.integers(2**31)))
-        unread = held_out(DESIGN, inference.problem)
-        own = ranks_among(inference.problem, truths[0], ranked_draws(draws.flat, for_draws), unread)
+        draws, effective = learnt.board(0, for_draws, int(for_draws.integers(2**31)))
+        unread = held_out(DESIGN, draws.problem)
+        own = ranks_among(draws.problem, truths[0], ranked_draws(draws.flat, for_draws), unread)
         ranks = {"production": {**own, "shared": rank_of_shared(learnt.chains, truths[0], for_draws)}}
         often = repeated(learnt, times, for_mutants)
         ranks[TWICE] = {"shared": rank_of_shared(often, truths[0], for_mutants)}

@@ -28,7 +28,7 @@ from bayesplate.commands.prepare import PreparedBoard, prepare
 from bayesplate.errors import BayesplateError
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws, named_draws
-from bayesplate.posterior.inference import Inference, infer
+from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.reweighting import linear_is_enough
 from bayesplate.posterior.sampling import SamplerSettings
@@ -162,7 +162,7 @@ def _frequencies(
     return frequencies(plate, acting, setup.beams, CASES[name].n)
 
 
-def fitted(problem: PosedProblem, settings: Settings, rng: np.random.Generator) -> tuple[Inference, Draws, int]:
+def fitted(problem: PosedProblem, settings: Settings, rng: np.random.Generator) -> tuple[Draws, int]:
     """Draws of a problem and how many runs they took; under the exact law where the linear one turns out too rough.
 
     A run that fails the gate is started anew with other random numbers: to leave the board out would favour easy ones.
@@ -174,8 +174,8 @@ def fitted(problem: PosedProblem, settings: Settings, rng: np.random.Generator) 
         if not inference.convergence.passed:
             continue
         draws = named_draws(inference, seed)
-        if problem.posterior.law == "exact" or linear_is_enough(inference, draws):
-            return inference, draws, attempt
+        if problem.posterior.law == "exact" or linear_is_enough(draws):
+            return draws, attempt
         problem = problem.under("exact")
     assert inference is not None
     raise BayesplateError("; ".join(inference.convergence.reasons) or "no law serves")
@@ -249,13 +249,13 @@ def cover_one(settings: Settings, name: str, index: int) -> dict[str, Any]:
             place = _place(design, for_truth)
             truth = draw_truth(name, prepared(Path(folder), name, unread(design), place), place, for_truth)
             asked = prepared(Path(folder), name, truth.hertz, place)
-            inference, draws, attempts = fitted(pose(asked.board, asked.prior), settings, for_draws)
+            draws, attempts = fitted(pose(asked.board, asked.prior), settings, for_draws)
         except BayesplateError as error:
             return record | {"error": f"{type(error).__name__}: {error}"}
     return record | {
         "quantities": intervals(asked.board, truth, draws),
         "seconds": round(time.perf_counter() - started, 2),
-        "law": inference.problem.posterior.law,
+        "law": draws.problem.posterior.law,
         "attempts": attempts,
         "redraws": truth.redraws,
     }

@@ -33,7 +33,7 @@ from bayesplate.commands.prepare import PreparedBoard, prepare
 from bayesplate.errors import BayesplateError
 from bayesplate.estimates.labelling import label_likely_peaks
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.posing import PosedProblem, pose
+from bayesplate.posterior.posing import pose
 from bayesplate.results.modes import assigned_peaks
 
 N_MODES, MISSED, N_LABELLED = 16, 0.3, 2
@@ -57,11 +57,11 @@ def simulate_one(settings: Settings, index: int) -> Record:
             asked, truth, peaks, n_exchanged = _drawn(Path(folder), rng)
             record |= {"exchanged": n_exchanged}
             problem = pose(asked.board, asked.prior)
-            inference, draws, attempts = fitted(problem, settings, rng)
-            record |= {"pairs": _pairs(inference.problem, draws, peaks), "attempts": attempts}
-            record |= {"holds": _holds(draws, truth), "law": inference.problem.posterior.law}
-            sure = pose(_as_sure(inference.problem, draws), asked.prior)
-            record |= {"control": _holds(fitted(sure, settings, rng)[1], truth)}
+            draws, attempts = fitted(problem, settings, rng)
+            record |= {"pairs": _pairs(draws, peaks), "attempts": attempts}
+            record |= {"holds": _holds(draws, truth), "law": draws.problem.posterior.law}
+            sure = pose(_as_sure(draws), asked.prior)
+            record |= {"control": _holds(fitted(sure, settings, rng)[0], truth)}
         except BayesplateError as error:
             record |= {"error": f"{type(error).__name__}: {error}"}
     return record | {"seconds": round(time.perf_counter() - started, 2)}
@@ -108,10 +108,10 @@ def _drawn(
     return prepare(folder / "planted.toml"), truth, {hertz: peaks[hertz] for hertz in bare}, n_exchanged
 
 
-def _pairs(problem: PosedProblem, draws: Draws, truth: Mapping[float, Label | None]) -> list[list[float]]:
+def _pairs(draws: Draws, truth: Mapping[float, Label | None]) -> list[list[float]]:
     """Probability of each pair, that with no mode included, and 1 if it is true."""
     found = []
-    for peak in assigned_peaks(problem, draws)[0]:
+    for peak in assigned_peaks(draws)[0]:
         true = next(beams for hertz, beams in truth.items() if abs(hertz / peak.hz - 1.0) < 1e-9)
         name = "none" if true is None else f"({true[0]},{true[1]})"
         shares = {one.label: one.probability for one in peak.assignments} | {"none": peak.spurious_probability}
@@ -125,8 +125,9 @@ def _holds(draws: Draws, truth: Mapping[str, float]) -> dict[str, bool]:
     return {name: bool(low <= truth[name] <= high) for name, (low, high) in ends.items()}
 
 
-def _as_sure(problem: PosedProblem, draws: Draws) -> Board:
+def _as_sure(draws: Draws) -> Board:
     """The board where every peak has its most probable label for sure; those that are likeliest none are dropped."""
+    problem = draws.problem
     (setup,), (peaks,) = problem.board.setups, problem.posterior.peaks
     assert peaks is not None
     every = draws.mode_log_frequencies[0]
