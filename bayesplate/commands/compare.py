@@ -24,7 +24,6 @@ from bayesplate.posterior.assessment import carried_in_fit, mode_errors
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.likely_labels import with_likely_labels
-from bayesplate.posterior.methods import Method, point_methods, posterior_method
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.reweighting import law_weights
 from bayesplate.posterior.sampling import SamplerSettings
@@ -34,12 +33,14 @@ from bayesplate.results.archive import posterior_tree, to_arviz
 from bayesplate.results.comparison import (
     FORMAT,
     Comparison,
+    MethodRow,
     TheoryRow,
     better_theory,
     recompute_left_out_errors,
     theory_row,
 )
 from bayesplate.results.contract import NOT_IN_JSON, json_text
+from bayesplate.results.methods import point_methods, posterior_method
 from bayesplate.results.summary import versions
 
 COMPARISON_FILE = "compare.json"
@@ -188,7 +189,9 @@ def compare(
     return result
 
 
-def _posteriors(problem: PosedProblem, settings: SamplerSettings, progress: OnProgress) -> tuple[list[Method], Draws]:
+def _posteriors(
+    problem: PosedProblem, settings: SamplerSettings, progress: OnProgress
+) -> tuple[list[MethodRow], Draws]:
     """The posteriors of both laws, of the problem as the exact draws label its peaks.
 
     The wider, exact one is sampled; the linear one has its draws by weights, where these leave enough.

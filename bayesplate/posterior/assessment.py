@@ -9,16 +9,18 @@ from typing import get_args
 import numpy as np
 
 from bayesplate.arrays import Floats
-from bayesplate.board.board import Board
+from bayesplate.board.board import Board, Values
 from bayesplate.board.sessions import readings_by_mode
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.leave_one_out import CarryingMode, PredictionErrors, carrying_modes, prediction_errors
 from bayesplate.estimates.refit import deviance_misfit
 from bayesplate.frequencies.laws import LawName, cents
+from bayesplate.frequencies.model import full_log_frequencies
 from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.frequencies.spectrum import doubtful_labels, sign_conflicts, spectra
 from bayesplate.posterior.draws import Draws, posterior_mean_values
 from bayesplate.posterior.laplace import predictor, worst_cents
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.reweighting import linear_is_enough, linearisation, means_under
 from bayesplate.posterior.veerings import contradicted_labels
 
@@ -85,6 +87,11 @@ def mode_errors(draws: Draws) -> PredictionErrors:
     scales = reading_sd(problem.board.setups, noise)
     target, modes = log_measured(problem.board), readings_by_mode(problem.board)
     return prediction_errors(predict, target, misfit, starts, bounds, modes, scales)
+
+
+def full_frequencies(problem: PosedProblem, values: Values) -> Floats:
+    """Frequencies of the labelled modes by full solves, Hz: (n_modes,) array."""
+    return np.exp(np.concatenate([full_log_frequencies(model, values) for model in problem.posterior.models]))
 
 
 def carried_in_fit(board: Board, errors: PredictionErrors) -> tuple[CarryingMode, ...]:

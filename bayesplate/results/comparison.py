@@ -5,13 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
-from bayesplate.board.material import MODULI
 from bayesplate.estimates.leave_one_out import CarryingMode, PredictionErrors
 from bayesplate.estimates.paper import PaperSystem
 from bayesplate.frequencies.laws import cents
-from bayesplate.posterior.methods import Method
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.results.contract import Elastic, finite_or_none, rms
 from bayesplate.results.modes import drop_carrying_modes
@@ -139,7 +135,7 @@ class Comparison:
 
 
 def theory_row(
-    problem: PosedProblem, system: PaperSystem, methods: Sequence[Method], errors: PredictionErrors
+    problem: PosedProblem, system: PaperSystem, methods: Sequence[MethodRow], errors: PredictionErrors
 ) -> TheoryRow:
     """A board under one plate theory; the errors are those of the most likely constants under the exact law."""
     board = problem.board
@@ -162,7 +158,7 @@ def theory_row(
             )
             for setup, origin in zip(board.setups, system.origins, strict=True)
         ),
-        methods=tuple(_method_row(method, rows) for method in methods),
+        methods=tuple(methods),
         modes=tuple(
             ComparedMode(*row, float(fitted), finite_or_none(float(without)))
             for row, fitted, without in zip(rows, in_sample, left_out, strict=True)
@@ -195,27 +191,3 @@ def better_theory(thin: TheoryRow, sheared: TheoryRow) -> BetterTheory:
     sentence = f"Transverse shear {word}: {thin_error:.1f} -> {sheared_error:.1f} cents for modes left out of the fit"
     in_sample = (thin.error.in_sample_rms_cents, sheared.error.in_sample_rms_cents)
     return BetterTheory(better, f"{sentence}, {in_sample[0]:.1f} -> {in_sample[1]:.1f} for those in it.")
-
-
-def _method_row(method: Method, rows: Sequence[tuple[str, str, float]]) -> MethodRow:
-    errors_cents = cents(method.misses)
-    elastic = {}
-    for name in MODULI:
-        sd = method.sd[name] if method.sd else np.nan
-        low, high = method.interval[name] if method.interval else (np.nan, np.nan)
-        elastic[name] = ModulusEstimate(
-            finite_or_none(method.mean[name]), finite_or_none(sd), finite_or_none(low), finite_or_none(high), "Pa"
-        )
-    return MethodRow(
-        name=method.name,
-        elastic=Elastic(**elastic),
-        condition_number=method.condition_number,
-        n_subsets=method.n_subsets,
-        forward=tuple(
-            ForwardPrediction(
-                setup, label, finite_or_none(hertz * float(np.exp(log_ratio))), finite_or_none(float(error_cents))
-            )
-            for (setup, label, hertz), log_ratio, error_cents in zip(rows, method.misses, errors_cents, strict=True)
-        ),
-        forward_rms_cents=rms(errors_cents) if np.isfinite(errors_cents).all() else None,
-    )
