@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, board_density
 from bayesplate.board.material import MODULI, RIGIDITIES, moduli_of
 from bayesplate.board.prior import PriorCard
+from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 
 MOST_ORTHOTROPIC = 100.0
 """E_x over E_y that no plate reaches: 10 to 20 in spruce, up to 70 in balsa."""
@@ -21,6 +24,10 @@ HEAVIEST_FIBRES = 2300.0
 LIKE_METAL = 2.0
 """E_x over E_y, either way, that these do not reach, rolled or not."""
 
+_ODD_RATIO = 10.0
+"""Ratio by which the error falls without a reading that is odd."""
+_TOLERANCE = 1e-3
+"""Accepted error of ln D where a reading is tried."""
 _STIFFER_ACROSS = 1.5
 _USUAL_SHARES = (0.001, 0.999)
 
@@ -67,3 +74,31 @@ def unusual_sentences(board: Board, prior: PriorCard, rigidities: Floats) -> tup
             f"{either_way:.3g} times as stiff one way as the other: are the mass and the three lengths right?"
         )
     return tuple(sentences)
+
+
+def odd_reading(board: Board) -> str:
+    """Words on the one reading without which the others fit ten times as well; empty if there is none."""
+    n = len(board.reading_names)
+    if n < board.symmetry.n + 2:
+        return ""
+    errors = [_error_without(board, i) for i in range(n)]
+    least, next_least, *_ = sorted(errors)
+    if not _ODD_RATIO * least < next_least:
+        return ""
+    i = errors.index(least)
+    hertz = float(np.exp(log_measured(board)[i]))
+    return f"without {board.short_reading_names[i]} at {hertz:.5g} Hz the others fit to {100.0 * least:.2g} %; "
+
+
+def _error_without(board: Board, left_out: int) -> float:
+    """Rms error of the other readings, fitted without one, relative; infinite where that is no plate."""
+    first, setups = 0, []
+    for setup in board.setups:
+        readings = tuple(reading for i, reading in enumerate(setup.readings, start=first) if i != left_out)
+        setups += [replace(setup, readings=readings)] if readings else []
+        first += len(setup.readings)
+    try:
+        residuals = weighted_least_squares(replace(board, setups=tuple(setups)), accepted=_TOLERANCE).residuals
+    except (ValueError, KeyError):  # LinAlgError among them
+        return np.inf
+    return float(np.sqrt(np.mean(residuals**2)))

@@ -206,15 +206,21 @@ def solve(plate: Plate, weights: Weights, n_modes: int) -> Modes:
 
 
 def solve_up_to(plate: Plate, weights: Weights, highest: float, n_least: int = 1) -> Modes:
-    """All elastic modes of a plate up to an eigenvalue (s^-2), and at least so many; see `solve`."""
+    """All elastic modes of a plate up to an eigenvalue (s^-2), and at least so many; see `solve`.
+
+    No more than the products of beam functions can name: modes above are finer than the mesh.
+    """
+    n_most = {parity: len(products) for parity, products in plate.elastic_products.items()}
     counts = dict.fromkeys(plate.parities, _FIRST_MODES)
     solved = solve_classes(plate, weights, counts)
     eigenvalues = np.sort(np.concatenate([c.eigenvalues for c in solved.values()]))
     highest = max(highest, eigenvalues[min(n_least, eigenvalues.size) - 1])
-    while short := [p for p, c in solved.items() if c.eigenvalues[-1] < highest]:
+    while short := [p for p, c in solved.items() if c.eigenvalues[-1] < highest and counts[p] < n_most[p]]:
         # A class that returned fewer modes than it was solved for is solved for more all the same.
-        counts |= {p: max(_modes_needed(solved[p].eigenvalues, highest), counts[p] + _FEWEST_MORE_MODES) for p in short}
+        needed = {p: max(_modes_needed(solved[p].eigenvalues, highest), counts[p] + _FEWEST_MORE_MODES) for p in short}
+        counts |= {p: min(n, n_most[p]) for p, n in needed.items()}
         solved |= solve_classes(plate, weights, {p: counts[p] for p in short})
+    highest = min([highest, *(solved[p].eigenvalues[-1] for p, n in counts.items() if n == n_most[p])])
     n_modes = sum(int(np.sum(c.eigenvalues <= highest)) for c in solved.values())
     return collect_modes(plate, solved, n_modes)
 

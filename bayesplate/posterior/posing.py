@@ -21,7 +21,7 @@ from bayesplate.estimates.identifiability import (
     require_labels,
 )
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
-from bayesplate.estimates.unusual import unusual_sentences
+from bayesplate.estimates.unusual import odd_reading, unusual_sentences
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.first_labels import ProposedLabels, propose_labels
 from bayesplate.posterior.laplace import laplace_approximation, linearisation_errors
@@ -118,7 +118,10 @@ def _pose_labelled(proposed: ProposedLabels, prior: PriorCard, law: LawName | No
     estimate = weighted_least_squares(board, start=proposed.rigidities)
     verdict = identifiability(estimate.sensitivities, estimate.scales, board.symmetry)
     require_identifiable(board, verdict)
-    centre, covariance, models = laplace_approximation(board, estimate, robust, proposed.spread)
+    try:
+        centre, covariance, models = laplace_approximation(board, estimate, robust, proposed.spread)
+    except np.linalg.LinAlgError:
+        raise NotIdentifiableError(_no_plate_sentence(board, estimate)) from None
     values = Parameters(board).values_at(centre)
     sensitivities = np.concatenate([model.sensitivities(values) for model in models])
     # The order of the modes may be different at the centre of the posterior and at the estimate.
@@ -164,6 +167,18 @@ def _plausible_draws(board: Board, centre: Floats, covariance: Floats) -> Floats
     constants = slice(parameters.n_constants)
     draws[:, constants] += (widening - 1.0) * (draws - centre)[:, constants]
     return parameters.within_bounds(draws)
+
+
+def _no_plate_sentence(board: Board, estimate: Estimate) -> str:
+    """Words on readings whose best fit lies where plates end, with the reading that does not fit the others."""
+    constants = ", ".join(
+        f"{name} {1e-9 * float(value):.3g} GPa" for name, value in zip(MODULI, moduli_of(estimate.values), strict=True)
+    )
+    return (
+        f"{board.name}: its readings fit best where constants are those of no plate any more ({constants}); nothing "
+        f"was sampled: {odd_reading(board)}look for a reading that is a decimal place off or has another's label, and "
+        "for sides that are exchanged"
+    )
 
 
 def _require_reachable(posterior: Posterior, centre: Floats, covariance: Floats) -> None:

@@ -233,15 +233,22 @@ class _Fit:
 
     def log_predictive(self, left_out: tuple[int, ...], gaps: Floats) -> Floats:
         """ln predictive density, (n_sets,), of (n_sets, n_left) gaps between readings and their prediction."""
-        from scipy.stats import multivariate_t
+        from scipy.special import gammaln
 
         variance, spare = self.variance(left_out)
         weighted = np.delete(self.slopes / self.scales[:, None], left_out, axis=0)
-        prior_precision = np.diag((np.arange(self.x.size) >= self.predict.n_constants).astype(np.float64))
-        covariance = np.linalg.inv(weighted.T @ weighted + prior_precision)
+        prior = np.eye(self.x.size)[self.predict.n_constants :]
+        root = np.asarray(np.linalg.qr(np.concatenate([weighted, prior]), mode="r"))
         indices = list(left_out)
-        spread = np.diag(self.scales[indices] ** 2) + self.slopes[indices] @ covariance @ self.slopes[indices].T
-        return np.atleast_1d(multivariate_t(np.zeros(len(indices)), variance * spread, df=spare).logpdf(gaps))
+        predicted = np.linalg.solve(root.T, self.slopes[indices].T)
+        spread = np.diag(self.scales[indices] ** 2) + predicted.T @ predicted
+        # not scipy's multivariate_t, which refuses readings that the others leave wide open
+        factor, n = np.linalg.cholesky(variance * spread), len(indices)
+        squares = np.sum(np.linalg.solve(factor, gaps.T) ** 2, axis=0)
+        log_constant = gammaln(0.5 * (spare + n)) - gammaln(0.5 * spare) - 0.5 * n * np.log(np.pi * spare)
+        return np.asarray(
+            log_constant - np.log(np.diagonal(factor)).sum() - 0.5 * (spare + n) * np.log1p(squares / spare)
+        )
 
 
 def noise_remarks(board: Board, log_widening: float) -> tuple[str, ...]:

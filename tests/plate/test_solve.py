@@ -13,6 +13,7 @@ from limits import meets
 from scipy.linalg import eig, eigh
 
 from bayesplate.plate.line import line
+from bayesplate.plate.naming import name_modes
 from bayesplate.plate.plate import plate_of
 from bayesplate.plate.shear import SHEAR_FLEXIBLE, shear_flexible_plate
 from bayesplate.plate.solve import solve, solve_classes, solve_up_to
@@ -124,6 +125,17 @@ def test_all_modes_up_to_an_eigenvalue_are_found(highest):
 
     # A square plate has pairs of one frequency: of the third and its like rounding decides which is the higher.
     np.testing.assert_allclose(found.eigenvalues, expected, rtol=1e-7)
+
+
+def test_of_modes_finer_than_the_mesh_no_more_are_found_than_have_names():
+    plate = thin_plate(*SQUARE.ends, 10, 10)
+
+    found = solve_up_to(plate, weights_of(SQUARE), 1e14)
+
+    in_class = {parity: found.rows(parity) for parity in plate.parities}
+    assert all(len(rows) <= len(plate.elastic_products[parity]) for parity, rows in in_class.items())
+    assert any(len(rows) == len(plate.elastic_products[parity]) for parity, rows in in_class.items())
+    assert len(name_modes(found)) == len(found.eigenvalues)
 
 
 def mean_products(deflections):

@@ -14,8 +14,10 @@ from scipy import stats
 from bayesplate.board.board import Board
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
+from bayesplate.commands.problem import Problem
+from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.least_squares import log_measured
-from bayesplate.estimates.unusual import unusual_sentences
+from bayesplate.estimates.unusual import odd_reading, unusual_sentences
 from bayesplate.posterior import slips
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.slips import LARGE_NOISE, RARITY, Slip, SlipSearch, noise_remarks, reading_remarks
@@ -134,6 +136,58 @@ def test_what_an_effect_may_do_to_all_readings_is_no_slip_however_well_the_noise
     assert SlipSearch(problem.posterior, problem.centre).likeliest() is None
     monkeypatch.setattr(slips, "_READINGS_OF_PRIOR", 200.0)
     assert SlipSearch(problem.posterior, problem.centre).likeliest() is not None
+
+
+SEVEN_MODES = """
+format = 1
+name = "seven"
+[plate]
+length_x_mm = 400
+length_y_mm = 150
+thickness_mm = 3.0
+mass_g = 79.2
+[material]
+prior = "spruce"
+[setup]
+edges = { x0 = "free", x1 = "free", y0 = "free", y1 = "free" }
+[setup.frequencies_hz]
+"(1,1)" = 65.0
+"(2,0)" = 96.2
+"(2,1)" = 163.9
+"(0,2)" = 203.0
+"(1,2)" = 238.3
+"(3,0)" = 269.0
+"(3,1)" = 330.6
+"""
+
+
+def with_slip(read: str = "", slipped: str = "") -> Problem:
+    return Problem.from_card(Board.from_text(SEVEN_MODES.replace(read, slipped) if read else SEVEN_MODES, "seven"))
+
+
+@pytest.mark.parametrize(
+    ("read", "slipped", "named"),
+    [
+        ('"(1,1)" = 65.0', '"(1,1)" = 650', "(1,1) at 650 Hz"),
+        ('"(3,0)" = 269.0', '"(3,0)" = 26900', "(3,0) at 26900 Hz"),
+    ],
+)
+def test_a_slip_after_which_the_other_readings_leave_a_pair_wide_open_is_named(read, slipped, named):
+    """And one so high that no mesh has its modes."""
+    assert named in told(with_slip(read, slipped).posed)
+
+
+def test_readings_that_fit_best_where_plates_end_are_refused_with_the_odd_one():
+    slipped = with_slip('"(0,2)" = 203.0', '"(0,2)" = 20300')
+    with pytest.raises(NotIdentifiableError, match=r"without \(0,2\) at 20300 Hz the others fit to 0\.1") as refused:
+        pose(slipped.board, slipped.prior)
+    assert "fit best where constants are those of no plate" in str(refused.value)
+
+
+def test_no_reading_is_odd_where_none_or_two_are():
+    assert odd_reading(with_slip().board) == ""
+    two = SEVEN_MODES.replace("65.0", "6500").replace("203.0", "20300")
+    assert odd_reading(Board.from_text(two, "seven")) == ""
 
 
 def test_too_few_readings_show_no_slip():
