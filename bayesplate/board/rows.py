@@ -181,12 +181,14 @@ def _cell_text(cell: CellValue) -> str | None:
 
 
 def _cell_value(cell: CellValue) -> Any:
-    """A cell as a card has it: a number, several with semicolons between them as readings, otherwise a text."""
+    """A cell as a card has it: a number, readings with semicolons between them, true or false, otherwise a text."""
     if not isinstance(cell, str):
         return cell
     text = cell.strip()
     if not text:
         return None
+    if text.lower() in ("true", "false"):
+        return text.lower() == "true"
     try:
         readings = [float(reading) for reading in text.split(";")]
     except ValueError:

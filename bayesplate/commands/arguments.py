@@ -163,12 +163,18 @@ def read_prior(value: object) -> object:
     return value if isinstance(value, PriorCard) else read_path(value, "a name, a path or a PriorCard")
 
 
+LARGEST_INTEGER = 2**63 - 1
+"""Largest whole number that the files of a run hold."""
+
+
 def integer_reader(least: int) -> Reader:
     """A reader of whole numbers."""
 
     def read(value: object) -> int:
         if isinstance(value, bool | np.bool_) or not isinstance(value, Integral) or value < least:
             raise refusal_of(f"a whole number from {least} on", value)
+        if int(value) > LARGEST_INTEGER:
+            raise refusal_of("a whole number below 2^63", value)
         return int(value)
 
     return read

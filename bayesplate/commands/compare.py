@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args
 from bayesplate.commands.arguments import check_arguments
 from bayesplate.commands.check import expected_sd
 from bayesplate.commands.fitting import convergence_error
-from bayesplate.commands.options import CARD, CoefficientChoice, CompareOut, Effects, Force, OnProgress, Seed
+from bayesplate.commands.options import CARD, CoefficientChoice, CompareOut, Effects, Force, OnProgress, Seed, SetupFile
 from bayesplate.commands.prepare import CardSource
 from bayesplate.commands.printout import Printout, show_compare
 from bayesplate.commands.problem import Problem, as_problem
@@ -104,6 +104,7 @@ def compare(
     coefficients: CoefficientChoice = None,
     seed: Seed = 1,
     effects: Effects = None,
+    setup: SetupFile = None,
     out: CompareOut = None,
     force: Force = False,
     progress: OnProgress = None,
@@ -123,6 +124,8 @@ def compare(
     effects : sequence of str, optional
         Declared effects in place of the card's. Transverse shear is left out of the thin plate and added to the other;
         its moduli are the card's, or the effect's own prior.
+    setup : path, optional
+        A file with a table [setup] that takes the place of the card's, key by key: what `pick` writes.
     out : path, optional
         Folder for compare.json; nothing is written without it.
     force : bool
@@ -144,14 +147,14 @@ def compare(
         If the sampler fails its gate.
     """
     files = require_new_files(Path(out), [COMPARISON_FILE], force=force) if out is not None else ()
-    base_problem = as_problem(card, effects=effects)
+    base_problem = as_problem(card, effects=effects, setup=setup)
     other_effects = [name for name in base_problem.prepared.board.effects if name not in _SHEAR_EFFECTS]
     effect_sets = [other_effects, [*other_effects, *_SHEAR_EFFECTS]]
     prepared_boards = [base_problem.prepared.with_effects(names) for names in effect_sets]
     if coefficients == "published":
         board = prepared_boards[0].board
-        for setup in board.setups:
-            named_table(board.name, setup)
+        for own_setup in board.setups:
+            named_table(board.name, own_setup)
     problems = [
         pose(prepared.board, prepared.prior, robust=base_problem.robust).under("exact") for prepared in prepared_boards
     ]

@@ -176,10 +176,10 @@ class Run:
         for problem in first.values():
             SamplerSettings(seed=self.seed).walkers(problem.posed.parameters.n_dim)
         if self.folder is not None:
-            (place, problem), *other_problems = first.items()
-            saved = law_checkpoint(self.folder.checkpoint / place, problem, problem.posed)
-            if self._resume and not (self.folder.has_checkpoint if other_problems else saved.exists()):
-                wanted = "a saved run" if other_problems else f"a saved run under the {problem.posed.posterior.law} law"
+            saved = (law_checkpoint(self.folder.checkpoint / place, one, one.posed) for place, one in first.items())
+            if self._resume and not any(checkpoint.exists() for checkpoint in saved):
+                laws = " or ".join(dict.fromkeys(problem.posed.posterior.law for problem in first.values()))
+                wanted = f"a saved run of this command under the {laws} law"
                 raise CheckpointError(f"{self.path}: wanted {wanted}, got none to resume (--force runs it anew)")
             self.folder.open(resume=self._resume)
 

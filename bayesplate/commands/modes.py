@@ -136,17 +136,20 @@ def modes(
 def _constants(prepared: PreparedBoard) -> tuple[Values, Precision | None, list[str]]:
     """Constants of the modes, their precision, and the reason if they are not the board's own estimate."""
     board = prepared.board
+    read_setups = tuple(setup for setup in board.setups if setup.readings)
+    read_board = replace(board, setups=read_setups or board.setups)
     try:
-        require_labels(board)
-        estimate = weighted_least_squares(board)
+        require_labels(read_board)
+        estimate = weighted_least_squares(read_board)
         require_identifiable(board, identifiability(estimate.sensitivities, estimate.scales, board.symmetry))
     except NotIdentifiableError as error:
-        return prior_medians(board, prepared.prior), None, [str(error)] * any(setup.readings for setup in board.setups)
-    widenings = noise_widenings(board, estimate.residuals)
-    scales = estimate.scales * np.repeat(widenings, [len(setup.readings) for setup in board.setups])
-    noise = {setup.name: setup.noise.median * w for setup, w in zip(board.setups, widenings.tolist(), strict=True)}
+        return prior_medians(board, prepared.prior), None, [str(error)] * bool(read_setups)
+    widenings = noise_widenings(read_board, estimate.residuals)
+    scales = estimate.scales * np.repeat(widenings, [len(setup.readings) for setup in read_setups])
+    noise = {setup.name: setup.noise.median for setup in board.setups}
+    noise |= {setup.name: setup.noise.median * w for setup, w in zip(read_setups, widenings.tolist(), strict=True)}
     identification = identifiability(estimate.sensitivities, scales, board.symmetry)
-    return estimate.values, Precision(identification.of_rigidities, noise), []
+    return {**board.nominal(), **estimate.values}, Precision(identification.of_rigidities, noise), []
 
 
 def _sheets(

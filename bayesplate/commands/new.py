@@ -51,6 +51,8 @@ def _frequencies_from_text(context: click.Context, option: click.Parameter, text
         label, sign, hertz = text.rpartition("=")
         if not sign:
             raise click.UsageError(f'--frequency {text!r}: write a label and its frequency, "(1,1)=35".')
+        if label.strip() in frequencies:
+            raise click.UsageError(f"--frequency: {label.strip()} is given twice.")
         frequencies[label.strip()] = hertz.strip()
     return frequencies
 

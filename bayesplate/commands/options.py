@@ -12,6 +12,7 @@ import click
 from bayesplate.board.values import Key, Refusal
 from bayesplate.board.words import did_you_mean
 from bayesplate.commands.arguments import (
+    LARGEST_INTEGER,
     annotations_of,
     effects_reader,
     integer_reader,
@@ -150,7 +151,9 @@ CompareOut = Annotated[
     FilePath | None, _PATH_OR_NONE, path_option("--out", help="Folder for compare.json (default: not written).")
 ]
 Seed = Annotated[
-    int, Key(integer_reader(0)), Option("--seed", type=click.IntRange(0), show_default=True, help="Random seed.")
+    int,
+    Key(integer_reader(0)),
+    Option("--seed", type=click.IntRange(0, LARGEST_INTEGER), show_default=True, help="Random seed."),
 ]
 Effects = Annotated[
     Sequence[str] | None,

@@ -60,9 +60,12 @@ def _pictures_from_text(context: click.Context, option: click.Parameter, texts: 
     for text in texts:
         hertz, _, path = text.partition("=")
         try:
-            pictures[float(hertz)] = path
+            frequency = float(hertz)
         except ValueError:
             raise click.BadParameter(f"wanted HZ=FILE, got {text!r}: --sand 210=sand-210.png") from None
+        if frequency in pictures:
+            raise click.BadParameter(f"{hertz} Hz is given twice")
+        pictures[frequency] = path
     return pictures
 
 

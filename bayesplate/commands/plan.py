@@ -16,7 +16,18 @@ from bayesplate.campaign.shared import SharedParameter
 from bayesplate.commands.arguments import check_arguments
 from bayesplate.commands.campaign import Campaign, dispatch_card
 from bayesplate.commands.fitting import Stages
-from bayesplate.commands.options import CARD, Effects, Force, Goal, Minutes, OnProgress, Out, RivalEffects, Seed
+from bayesplate.commands.options import (
+    CARD,
+    Effects,
+    Force,
+    Goal,
+    Minutes,
+    OnProgress,
+    Out,
+    RivalEffects,
+    Seed,
+    SetupFile,
+)
 from bayesplate.commands.prepare import CardSource, PreparedBoard
 from bayesplate.commands.printout import Printout, show_plan
 from bayesplate.commands.problem import Problem
@@ -89,6 +100,7 @@ def plan(
     between: RivalEffects = None,
     out: Out = None,
     effects: Effects = None,
+    setup: SetupFile = None,
     seed: Seed = 1,
     force: Force = False,
     progress: OnProgress = None,
@@ -113,6 +125,8 @@ def plan(
         diagnosis of the same card that is there is not made again.
     effects : sequence of str, optional
         Declared effects in place of the card's.
+    setup : path, optional
+        A file with a table [setup] that takes the place of the card's, key by key: what `pick` writes.
     seed : int
         Everything random follows from it.
     force : bool
@@ -144,6 +158,7 @@ def plan(
             partial(_campaign_beliefs, campaign, goal, between, progress),
         ),
         effects=effects,
+        setup=setup,
         may_lack_frequencies=True,
     )
     files = () if folder is None else require_new_files(folder, _file_names(), force=force)
@@ -185,13 +200,15 @@ def _board_beliefs(
 ) -> Beliefs:
     """Beliefs of a board: from a search, from a finished diagnosis, or from the prior."""
     prepared, rng = problem.prepared, random_stream(seed, BELIEFS_STREAM)
+    read_setups = tuple(setup for setup in prepared.board.setups if setup.readings or setup.peaks)
+    prepared = replace(prepared, board=replace(prepared.board, setups=read_setups or prepared.board.setups))
     board, prior = prepared.board, prepared.prior
     if between is not None:
         _require_rivals(board, between)
     stages = Stages(progress, _POSE_TIME + _SEARCH_TIME + _PLAN_TIME)
     stages.begin("estimate", _POSE_TIME)
     needs_frequencies = between is not None or goal == EXPLANATIONS
-    if not any(setup.readings or setup.peaks for setup in board.setups):
+    if not read_setups:
         if needs_frequencies:
             raise InputError(_frequencies_fault("between" if between else "goal", "a board without any"))
         return prior_beliefs(board, prior, rng)

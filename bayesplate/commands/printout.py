@@ -143,8 +143,10 @@ def show_compare(comparison: Comparison) -> Printout:
 
 def show_campaign_diagnosis(diagnosis: CampaignDiagnosis) -> Printout:
     """The diagnosis of a campaign."""
-    remarks = tuple(sentence for sentence in (diagnosis.reason, diagnosis.recommendation) if sentence)
-    return Printout(diagnosis_tables(diagnosis), remarks, diagnosis.notes, campaign_claim_sentence(diagnosis))
+    reason = "" if diagnosis.conditions is None else f"the reason: {diagnosis.reason}"  # it closes with it otherwise
+    remarks = tuple(sentence for sentence in (reason, diagnosis.recommendation) if sentence)
+    closing = f"Verdict: {diagnosis.verdict}. {campaign_claim_sentence(diagnosis)}"
+    return Printout(diagnosis_tables(diagnosis), remarks, diagnosis.notes, closing)
 
 
 def show_diagnosis(diagnosis: Diagnosis) -> Printout:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bayesplate.arrays import Floats
 from bayesplate.diagnosis.result import Amplitude, EffectEntry, ExchangeEntry, Fate
 from bayesplate.diagnosis.search import LEAST_P_VALUE, Candidate, SearchResult
 from bayesplate.diagnosis.signatures import look_alikes
@@ -120,10 +121,7 @@ def _amplitude(result: SearchResult, index: int, candidate: Candidate) -> Amplit
     form_index = likely_form(result, index, 0)
     free = candidate.laws[form_index].form.free[0]
     share, z = size_posterior(result, index, 0, form_index, 0)
-    order = np.argsort(z)
-    cumulated = np.cumsum(share[order]) - 0.5 * share[order]
-    quantiles = np.interp([0.05, 0.5, 0.95], cumulated / share.sum(), z[order])
-    low, middle, high = (float(free.prior.value(q)) for q in quantiles)
+    low, middle, high = (float(free.prior.value(q)) for q in _size_quantiles(z, share, (0.05, 0.5, 0.95)))
     return Amplitude(
         parameter=free.key, form=candidate.laws[form_index].form.detail, q05=low, q50=middle, q95=high, unit=free.unit
     )
@@ -145,6 +143,17 @@ def _learnt_bits(result: SearchResult, index: int, candidate: Candidate) -> dict
         is_possible = after > 0.0
         bits[free.key] = float(np.sum(after[is_possible] * np.log2(after[is_possible] / before[is_possible])))
     return bits
+
+
+def _size_quantiles(z: Floats, share: Floats, levels: Sequence[float]) -> Floats:
+    """Quantiles of a size from the shares of its nodes, each spread half-way to its neighbours."""
+    order = np.argsort(z)
+    nodes, shares = z[order], share[order] / share.sum()
+    if nodes.size == 1:
+        return np.repeat(nodes, len(levels))
+    ends = nodes[[0, -1]] + 0.5 * (nodes[[0, -1]] - nodes[[1, -2]])
+    cumulated = np.cumsum(shares) - 0.5 * shares
+    return np.interp(levels, [0.0, *cumulated, 1.0], [ends[0], *nodes, ends[1]])
 
 
 def _fixed_amplitude(candidate: Candidate) -> Amplitude | None:

@@ -116,6 +116,8 @@ class Session:
             raise self.checkpoint.error(f"wanted a readable {CHAINS}, got a damaged one") from None
         for key in [*self.identity, *(key for key in attributes if key not in self.identity)]:
             if attributes.get(key) != self.identity.get(key):
+                if key == "fingerprint":
+                    raise self.checkpoint.error("the saved run is of another card, prior, model or version")
                 difference = f"wanted {self.identity.get(key)!r}, got {attributes.get(key)!r}"
                 raise self.checkpoint.error(f"the saved run differs in its {key}: {difference}")
         backends = []

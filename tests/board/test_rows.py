@@ -108,3 +108,9 @@ def test_boards_of_other_names_with_the_same_readings_are_known(tmp_path):
     one, copy, other = (readings_sha256(own.board(row)) for row in rows)
 
     assert one == copy != other
+
+
+def test_a_column_of_yes_or_no_says_true_or_false(tmp_path):
+    told = columns(tmp_path, 'name,isotropic,"(1,1)","(2,0)","(0,2)"')
+    boards = [told.board([name, word, "51.8", "140", "220"]) for name, word in (("a", "true"), ("b", " FALSE"))]
+    assert [board.isotropic for board in boards] == [True, False]

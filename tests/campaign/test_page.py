@@ -119,7 +119,9 @@ def test_what_the_terminal_shows(fitted_campaign, diagnosis):
     assert in_grams == pytest.approx([1e3 * one for one in (mass.mean, mass.sd, mass.q05, mass.q95)], rel=0.05)
     assert any("each board alone" in title for title in titles)
     assert any(title.startswith("Population") for title in titles)
-    assert show_campaign_diagnosis(diagnosis).closing == campaign_claim_sentence(diagnosis)
+    told = show_campaign_diagnosis(diagnosis)
+    assert told.closing == f"Verdict: named. {campaign_claim_sentence(diagnosis)}"
+    assert told.remarks[0] == f"the reason: {diagnosis.reason}"
 
 
 def test_figures_and_draws_of_a_result(fitted_campaign):

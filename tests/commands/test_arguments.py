@@ -29,6 +29,7 @@ BAD = [
      'effects 2: wanted each name once, got "fluid_loading" again'),
     (bayesplate.fit, {"seed": -1}, f"seed: wanted {WHOLE}, got -1"),
     (bayesplate.fit, {"seed": 1.0}, f"seed: wanted {WHOLE}, got 1.0"),
+    (bayesplate.fit, {"seed": 2**63}, "seed: wanted a whole number below 2^63, got 9223372036854775808"),
     # 1 / 50 is a false alarm's two per cent
     (bayesplate.diagnose, {"n_null": 48}, "n_null: wanted a whole number from 49 on, got 48"),
     (bayesplate.fit, {"out": ""}, "out: wanted a name or a path, got an empty text"),

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import ritz
 import runs
 from click.testing import CliRunner
 
-from bayesplate.board.board import board_density, vibrating_lengths
+from bayesplate.board.board import Board, board_density, vibrating_lengths
+from bayesplate.board.setup import Setup
 from bayesplate.cli import main
 from bayesplate.commands.modes import modes
 from bayesplate.commands.prepare import prepare
@@ -119,6 +122,19 @@ def test_a_board_not_measured_yet_is_computed_from_the_prior(tmp_path):
         assert low < mode.hz < high
         assert np.log(high / low) / 2 == pytest.approx(half_width, rel=0.1)
     assert "median of the prior" in result.summary.basis
+
+
+def test_a_setup_not_measured_yet_is_computed_from_those_that_were():
+    board = Board.from_toml("finnish-spruce-cantilever")
+    bench = replace(board.setups[0], name="bench")
+    planned = Setup.from_frequencies({}, edges="free", name="free")
+    report = modes(replace(board, setups=(bench, planned))).summary
+    alone = modes(board).summary
+
+    assert report.basis == alone.basis
+    assert [mode.hz for mode in report.setups[0].modes] == [mode.hz for mode in alone.setups[0].modes]
+    low, high = report.setups[1].modes[0].likely_hz
+    assert high / low < 1.1  # from the prior, a factor of two
 
 
 def test_bare_peaks_are_given_labels_and_told_how_to_write_them(tmp_path):

@@ -102,3 +102,11 @@ def test_options_ask_nothing():
     assert "Next: bayesplate modes bare.toml" in invoke("bare", "--length-x", "253").output
     assert edge_letters(card.setups[0].edges) == "CFFF"
     assert frequencies(card.setups[0])[Label(1, 0)].mean == 52
+
+
+def test_a_frequency_that_is_given_twice_is_refused(tmp_path):
+    path = tmp_path / "twice.toml"
+    told = CliRunner().invoke(main, ["new", str(path), "--frequency", "(1,1)=35", "--frequency", "(1,1)=36"])
+    assert told.exit_code == 2
+    assert "(1,1) is given twice" in told.stderr
+    assert not path.exists()

@@ -152,9 +152,9 @@ def test_neither_another_run_nor_a_damaged_checkpoint_is_continued_and_all_stays
 
     text, chains = own_card.read_text(encoding="utf-8"), stopped.folder / "checkpoint" / "linear" / CHAINS
     refused(6, "differs in its seed: wanted 2, got 1", "--resume", "--seed", "2")
-    refused(6, "wanted a saved run under the exact law, got none to resume", "--resume", "--exact")
+    refused(6, "wanted a saved run of this command under the exact law, got none to resume", "--resume", "--exact")
     own_card.write_text(text.replace('"(0,0)" = 57', '"(0,0)" = 58'), encoding="utf-8")
-    refused(6, "differs in its fingerprint", "--resume")
+    refused(6, "the saved run is of another card", "--resume")
     own_card.write_text(text.replace("= 600", "= -600"), encoding="utf-8")
     refused(3, "length_x_mm: wanted a positive number", "--force")
     own_card.write_text(text, encoding="utf-8")
@@ -190,3 +190,17 @@ def test_the_same_seed_gives_the_same_bytes_whatever_the_number_of_threads(tmp_p
         assert process.communicate(timeout=300) == ("", "")
 
     assert files_in(tmp_path / "out") == fiemme_files
+
+
+def test_a_campaign_does_not_take_the_place_of_an_interrupted_fit(tmp_path):
+    """Chains of another command in the folder are not those of its boards, and are kept."""
+    folder = tmp_path / "out"
+    exit_code, _ = stop_while_sampling(folder, signal.SIGINT)
+    before = files_in(folder)
+    text = f'format = 1\nname = "both"\nboards = ["{BOARD}", "finnish-spruce-cantilever"]\n'
+    (tmp_path / "both.toml").write_text(text)
+    refused = runs.fit(folder, str(tmp_path / "both.toml"), "--resume")
+
+    assert (exit_code, refused.exit_code) == (130, 6)
+    assert "wanted a saved run of this command" in refused.stderr
+    assert files_in(folder) == before

@@ -20,13 +20,15 @@ from made_searches import (
     ground_of,
 )
 from made_summaries import SUMMARY, mode
+from scipy.special import ndtr
+from scipy.stats import halfnorm
 
 from bayesplate.board.parameter import BOARD_OWNER, Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.commands.printout import show_diagnosis
 from bayesplate.diagnosis import sensitivity
 from bayesplate.diagnosis.claim import Claim, Condition
-from bayesplate.diagnosis.entries import effect_entry, exchange_entries, fate_of
+from bayesplate.diagnosis.entries import _size_quantiles, effect_entry, exchange_entries, fate_of
 from bayesplate.diagnosis.findings import Case, FittedModel, _nearest_sentence, diagnosis_of
 from bayesplate.diagnosis.folds import NestedErrors, log_score, nested_leave_one_out
 from bayesplate.diagnosis.hypotheses import RELABELLING, Swap, probabilities
@@ -470,3 +472,15 @@ def test_where_every_mode_alone_carries_something_there_is_no_left_out_error():
     assert told.null_control.nested_ratio is None
     assert "no mode is left to judge by, and nothing can be claimed" in " ".join(verdict_sentences(told))
     json_text(diagnosis_json(told))
+
+
+def test_the_interval_of_a_size_reaches_beyond_its_first_node():
+    """Half a normal law on eight nodes in the middle of their cells: its quantiles, to a quarter of a cell."""
+    z = (np.arange(8) + 0.5) * 0.5
+    order = np.random.default_rng(1).permutation(8)
+    share = 3.0 * np.diff(2.0 * ndtr(np.arange(9) * 0.5))
+    low, middle, high = _size_quantiles(z[order], share[order], (0.05, 0.5, 0.95))
+
+    assert low < z[0] < middle
+    assert [low, middle, high] == pytest.approx(halfnorm.ppf([0.05, 0.5, 0.95]), abs=0.125)
+    assert _size_quantiles(np.array([0.7]), np.array([1.0]), (0.05, 0.95)) == pytest.approx([0.7, 0.7])

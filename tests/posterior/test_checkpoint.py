@@ -161,7 +161,7 @@ def test_a_file_with_anything_in_it_is_refused(folder, content):
 
 
 def test_another_run_is_refused_and_the_difference_named(folder):
-    with pytest.raises(CheckpointError, match="differs in its fingerprint: wanted 'g', got 'f'"):
+    with pytest.raises(CheckpointError, match="the saved run is of another card, prior, model or version"):
         run(Checkpoint(folder, "g"))
     with pytest.raises(CheckpointError, match="differs in its seed: wanted 5, got 4"):
         run(Checkpoint(folder, "f"), seed=5)
