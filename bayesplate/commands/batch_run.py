@@ -72,7 +72,8 @@ class BatchRun:
             for index, board in sorted(enumerate(self.boards), key=lambda numbered: numbered[1].alike):
                 name = board.name
                 if names[name.casefold()] > 1:  # nobody could tell whose row or folder it is
-                    refusal = BoardRow(name, _REFUSED, f"wanted a name of its own, got {name} more than once")
+                    got = f"{name} more than once (a and A are one name)"
+                    refusal = BoardRow(name, _REFUSED, f"wanted a name of its own, got {got}")
                     record(index, _hash(_REFUSED, refusal.message), refusal)
                     continue
                 try:

@@ -12,7 +12,6 @@ import click
 from bayesplate.board.values import Key, Refusal
 from bayesplate.board.words import did_you_mean
 from bayesplate.commands.arguments import (
-    LARGEST_INTEGER,
     annotations_of,
     effects_reader,
     integer_reader,
@@ -153,7 +152,7 @@ CompareOut = Annotated[
 Seed = Annotated[
     int,
     Key(integer_reader(0)),
-    Option("--seed", type=click.IntRange(0, LARGEST_INTEGER), show_default=True, help="Random seed."),
+    Option("--seed", type=click.IntRange(0), show_default=True, help="Random seed."),
 ]
 Effects = Annotated[
     Sequence[str] | None,
@@ -167,7 +166,7 @@ Effects = Annotated[
 SetupFile = Annotated[
     FilePath | None,
     _PATH_OR_NONE,
-    path_option("--setup", help="File with a [setup] that completes the card: what pick writes."),
+    path_option("--setup", help="File with a [setup]: its keys, readings among them, take the place of the card's."),
 ]
 Law = Annotated[
     LawName | None,

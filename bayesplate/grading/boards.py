@@ -171,7 +171,8 @@ class BatchSummary:
 
     def failures_text(self, table: str) -> str:
         """The boards that were not fitted: the first ten with their reasons, and the table that has the others."""
-        lines = [f"{self.n_failed} of {self.n_boards} boards were not fitted, the others are written:"]
+        others = ", the others are written" if self.n_fitted else ""
+        lines = [f"{self.n_failed} of {self.n_boards} boards were not fitted{others}:"]
         lines += [f"{failure.name}: {failure.outcome}: {failure.message}" for failure in self.failed[:_MOST_FAILURES]]
         if self.n_failed > _MOST_FAILURES:
             lines.append(f"and {self.n_failed - _MOST_FAILURES} more, in {table}")

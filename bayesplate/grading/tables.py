@@ -53,10 +53,7 @@ def doubts_sentence(graded: Grading) -> str:
     if not n:
         return ""
     subject = "1 board is" if n == 1 else f"{n} boards are"
-    return (
-        f"{subject} in doubt, for the fit itself says that the constants are not to be trusted: neither paired nor "
-        "counted among those that meet limits"
-    )
+    return f"{subject} in doubt, as told beside each: neither paired nor counted among those that meet limits"
 
 
 def _excerpt_note(most: int, n: int) -> str:

@@ -18,7 +18,7 @@ from bayesplate.frequencies.prior_bands import BAND_QUANTILES
 from bayesplate.frequencies.residues import NODAL_LINE
 from bayesplate.planning.beliefs import Beliefs, KnownBoard
 from bayesplate.planning.gains import PlannedReadings
-from bayesplate.planning.laws import BareLaw
+from bayesplate.planning.laws import BareLaw, known_mass
 from bayesplate.planning.plan import FORMAT, BenchEntry, ExplanationEntry, ModeToFind, Plan
 from bayesplate.planning.proposals import Planner, Proposal
 from bayesplate.planning.stations import N_SEARCHED_MODES, Station
@@ -60,6 +60,7 @@ def make_benches(beliefs: Beliefs, steps: Sequence[Proposal]) -> tuple[Bench, ..
                     step.rows,
                     reading_bands(beliefs, step.readings),
                     basis,
+                    step.spot if step.entry.what == "mass" else None,
                 )
             )
     return tuple(benches)
@@ -84,8 +85,12 @@ def reading_bands(beliefs: Beliefs, readings: PlannedReadings) -> Floats:
     return ends
 
 
-def make_bench(known_board: KnownBoard, law: BareLaw, rows: Sequence[int], ends: Floats, basis: str) -> Bench:
+def make_bench(
+    known_board: KnownBoard, law: BareLaw, rows: Sequence[int], ends: Floats, basis: str, spot: int | None = None
+) -> Bench:
     """The bench for some modes of a board; `ends` are ln of their frequencies (Hz) at the probabilities of `BAND`.
+
+    With a known mass at a spot of the station, if one is given.
 
     In a session that goes on the sensor stays where it is.
     """
@@ -114,8 +119,13 @@ def make_bench(known_board: KnownBoard, law: BareLaw, rows: Sequence[int], ends:
         for mode, residue in zip(sheet_modes, placing.seen, strict=True)
     )
     edges = dict(station.setup.edges)
-    entry = BenchEntry(board.name, station.setup.name, edges, sensor_mm, hammer_mm, tuple(taps), modes)
-    return Bench(entry, replace(full_sheet, modes=sheet_modes, combined=(), likely=basis), placing)
+    added_mass = ""
+    if spot is not None:
+        x, y = station.places(board)[spot]
+        added_mass = f"{1e3 * known_mass(board):g} g at x = {1e3 * x:.0f}, y = {1e3 * y:.0f} mm"
+    entry = BenchEntry(board.name, station.setup.name, edges, sensor_mm, hammer_mm, tuple(taps), modes, added_mass)
+    likely = f"{basis}, with {added_mass}" if added_mass else basis
+    return Bench(entry, replace(full_sheet, modes=sheet_modes, combined=(), likely=likely), placing)
 
 
 def _sensor_place(

@@ -85,6 +85,7 @@ class BenchEntry:
     hammer_mm: tuple[float, float]
     taps_mm: tuple[tuple[float, float], ...]  # places to tap that distinguish the figures
     modes: tuple[ModeToFind, ...]
+    added_mass: str = ""  # the known mass that is stuck on, and where, in words; empty without one
 
 
 @dataclass(frozen=True, repr=False)

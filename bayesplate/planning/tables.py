@@ -51,8 +51,14 @@ def _proposals(plan: Plan) -> Table:
         for proposal in plan.proposals[:MOST_PROPOSALS]
     )
     return Table(
-        f"What to measure next on {plan.name}: intervals after, in % of now", ("proposal", *_columns(plan)), rows
+        f"What to measure next on {plan.name}: intervals after, in % of now{_over_boards(plan)}",
+        ("proposal", *_columns(plan)),
+        rows,
     )
+
+
+def _over_boards(plan: Plan) -> str:
+    return ", the mean over all boards" if plan.basis == "campaign" else ""
 
 
 def _sequences(plan: Plan) -> Table:
@@ -69,7 +75,8 @@ def _sequences(plan: Plan) -> Table:
 def _benches(plan: Plan) -> tuple[Table, ...]:
     return tuple(
         Table(
-            f"At the bench, setup {bench.setup}: "
+            f"At the bench, {f'board {bench.board}, ' if plan.basis == 'campaign' else ''}setup {bench.setup}"
+            f"{f', with {bench.added_mass}' if bench.added_mass else ''}: "
             f"sensor at {_place_words(bench.sensor_mm)}, hammer at {_place_words(bench.hammer_mm)}",
             ("mode", "Hz", "likely Hz", "seen"),
             tuple(

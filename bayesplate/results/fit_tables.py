@@ -113,7 +113,7 @@ def modes_table(summary: Summary) -> Table:
             (
                 mode_name(mode.label, mode.setup, several=several) + _LABEL_MARKS[mode.label_origin],
                 mode.measured_hz,
-                number(mode.predicted_hz.mean, 1),
+                number(mode.predicted_hz.mean, max(decimals(mode.predicted_hz.q95 - mode.predicted_hz.q05) - 1, 1)),
                 number(mode.residual_cents, 1, signed=True),
                 Value(ends=mode.residual_interval_cents, digits=1, signed=True),
                 *rounding,

@@ -38,6 +38,10 @@ class Prediction:
         return cls(float(hertz.mean()), float(low), float(high))
 
 
+SURE_LABEL = 0.99
+"""Confidence from which a label counts as stated without a doubt."""
+
+
 @dataclass(frozen=True)
 class ModeRow:
     """A labelled mode; its numbers are of the posterior, except `left_out_cents` and `leverage`."""
@@ -56,9 +60,13 @@ class ModeRow:
     left_out_cents: float | None
     leverage: float  # share of the reading in its own prediction, all free parameters included
     label_correlation: float  # of the mode's shape with the beam functions of its label
-    # "card": stated as sure; "doubtful": stated with a doubt; "proposed": the likeliest label of a peak without one.
-    # `Summary.peaks` has the probabilities of the latter two
+    # "card": stated as sure, or nearly; "doubtful": stated with a doubt; "proposed": the likeliest label of a peak
+    # without one. `Summary.peaks` has the probabilities of the latter two
     label_origin: LabelOrigin = "card"
+
+
+def _label_origin(confidence: float) -> LabelOrigin:
+    return "card" if confidence >= SURE_LABEL else "doubtful" if confidence else "proposed"
 
 
 def ratio_cents(measured: float, predicted: float) -> float:
@@ -91,7 +99,7 @@ def mode_rows(draws: Draws, assessment: Assessment) -> tuple[ModeRow, ...]:
             left_out_cents=finite_or_none(float(cents(assessment.left_out[i]))),
             leverage=float(assessment.leverages[i]),
             label_correlation=place.correlation,
-            label_origin="card" if reading.is_sure else "doubtful" if reading.confidence else "proposed",
+            label_origin=_label_origin(reading.confidence),
         )
         rows.append(row)
     return tuple(rows)

@@ -199,8 +199,14 @@ def test_the_sheet_shows_every_mode_that_is_to_be_found_and_the_sensor_alone_as_
     rows = range(station.n_old, len(station.setup.readings))
     law = bare_law(read, station, VALUES)
     ends = law.solved[0, list(rows), None] + np.array([-0.01, 0.0, 0.01])
-    bench = make_bench(KnownBoard(read, VALUES, (law,), np.eye(3)), law, rows, ends, "").entry
+    known_board = KnownBoard(read, VALUES, (law,), np.eye(3))
+    bench = make_bench(known_board, law, rows, ends, "").entry
+    loaded = make_bench(known_board, law, rows, ends, "", spot=1)
 
     assert len(beams) == 20
     assert {one.label for one in bench.modes} == {str(station.setup.labels[i]) for i in rows}
+    assert bench.added_mass == ""
+    (x, y), grams = station.places(read)[1], 1e3 * known_mass(read)
+    assert loaded.entry.added_mass == f"{grams:g} g at x = {1e3 * x:.0f}, y = {1e3 * y:.0f} mm"
+    assert loaded.sheet.likely.endswith(f"with {loaded.entry.added_mass}")
     assert bench.sensor_mm != (290, 100)

@@ -19,7 +19,7 @@ from bayesplate.commands.printout import show_fit
 from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.report.content import summary_sentences
 from bayesplate.results.contract import json_text
-from bayesplate.results.modes import mode_rows
+from bayesplate.results.modes import _label_origin, mode_rows
 
 HERTZ = {(0, 0): 57.0, (0, 1): Quantity.from_mean(100.0, 0.5)}
 SETUP = setup_of(ritz.ALL_CLAMPED, HERTZ, name="bench", resolution=1.0)
@@ -108,3 +108,13 @@ def test_where_every_mode_carries_something_alone_it_is_said_that_there_is_no_le
     assert "every mode alone carries a constant or a size." in summary_sentences(carrying)[1]
     assert "too few modes to leave one out" in show_fit(few).closing
     assert "too few modes to test it" in summary_sentences(few)[1]
+
+
+def test_a_label_is_in_doubt_below_a_confidence_of_99_per_cent():
+    """`pick` writes 0.999 for a label whose figure it has seen."""
+    assert [_label_origin(confidence) for confidence in (1.0, 0.99, 0.98, 0.0)] == [
+        "card",
+        "card",
+        "doubtful",
+        "proposed",
+    ]
