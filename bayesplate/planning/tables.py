@@ -28,9 +28,13 @@ def _explanations(plan: Plan) -> Table:
     return Table(f"What may be the case on {plan.name}", ("explanation", "probability"), rows if len(rows) > 1 else ())
 
 
+def shared_names(plan: Plan) -> tuple[str, ...]:
+    """The shared parameters that a plan without a goal shows in place of the moduli."""
+    return tuple(plan.proposals[0].gain.shared) if plan.proposals and plan.goal is None else ()
+
+
 def _columns(plan: Plan) -> tuple[str, ...]:
-    shared = plan.proposals[0].gain.shared if plan.proposals else {}
-    names = tuple(shared_words(name) for name in shared) if shared else MODULI
+    names = tuple(map(shared_words, shared_names(plan))) or MODULI
     doubt = ("doubt falls by",) if len(plan.explanations) > 1 else ()
     return (*doubt, *names, "min", "gain", "gain /min")
 
@@ -40,7 +44,8 @@ def _cells(gain: Gain, cost: float, plan: Plan) -> tuple[str, ...]:
     if len(plan.explanations) > 1:
         drop = gain.explanations
         doubt = (str(percent(None if drop is None or not plan.entropy else drop / plan.entropy)),)
-    ratios = gain.shared.values() if gain.shared else (getattr(gain, name) for name in MODULI)
+    shared = shared_names(plan)
+    ratios = (gain.shared[name] for name in shared) if shared else (getattr(gain, name) for name in MODULI)
     shrunk = tuple(f"{100.0 * value:.0f} %" for value in ratios)
     return (*doubt, *shrunk, f"{cost:g}", f"{gain.score:.2f}", f"{gain.score_per_minute:.3f}")
 

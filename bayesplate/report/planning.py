@@ -12,6 +12,7 @@ from bayesplate.board.material import MODULI
 from bayesplate.campaign.tables import shared_words
 from bayesplate.planning.bench import Bench
 from bayesplate.planning.plan import Plan, ProposalEntry
+from bayesplate.planning.tables import shared_names
 from bayesplate.report.chladni import chladni_sheet
 from bayesplate.report.style import (
     BLUE,
@@ -85,8 +86,8 @@ def _draw_doubt(panel: Axes, plan: Plan, proposals: Sequence[ProposalEntry]) -> 
 
 
 def _draw_intervals(panel: Axes, plan: Plan, proposals: Sequence[ProposalEntry]) -> None:
-    shared = list(proposals[0].gain.shared) if proposals else []
-    names = shared or list(MODULI)
+    shared = shared_names(plan)
+    names = shared or MODULI
     for i, name in enumerate(names):
         values = [
             100.0 * (proposal.gain.shared[name] if shared else getattr(proposal.gain, name)) for proposal in proposals

@@ -15,6 +15,7 @@ from bayesplate.campaign.scatter import expected_width
 from bayesplate.planning.bench import make_benches, reading_bands
 from bayesplate.planning.campaign import _linearise_board, _weigh_readings, campaign_beliefs
 from bayesplate.planning.proposals import Costs, Planner
+from bayesplate.planning.tables import plan_tables
 
 SHARED = "attached_mass.mass"
 
@@ -38,6 +39,10 @@ def test_what_narrows_the_shared_parameter_most_comes_first(planned):
     (weighing,) = [one for one in listed if "Weigh" in one.sentence]
     assert weighing is listed[0]  # the sensor itself: a reading of what is shared, and nothing beside it
     assert weighing.gain.E_x > 0.9
+    (table, *_) = (one for one in plan_tables(planned.summary) if "measure next" in one.title)
+    assert "the mean over all boards" in table.title
+    assert "attached mass" in table.columns
+    assert "E_x" not in table.columns
 
 
 @pytest.fixture(scope="module")
@@ -158,6 +163,10 @@ def test_the_sheets_are_those_of_the_steps_that_are_proposed_together(campaign, 
     found = bayesplate.plan(campaign, goal="E_y", out=tmp_path / "out")
     asked = found.summary.sequences[-1].steps
 
+    tables = plan_tables(found.summary)
+    assert all(name in tables[0].columns for name in ("E_x", "E_y", "G_xy"))  # of the goal, not of what is shared
+    assert all(f"At the bench, board {bench.board}, " in one.title
+               for bench, one in zip(found.summary.bench, tables[-2:], strict=True))  # fmt: skip
     assert len(asked) == 3
     assert len(found.benches) == len(found.summary.bench) == 2
     for bench, step in zip(found.summary.bench, asked, strict=False):
