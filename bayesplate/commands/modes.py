@@ -17,7 +17,7 @@ from bayesplate.commands.printout import Printout, show_modes
 from bayesplate.commands.problem import Problem, as_problem
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.identifiability import identifiability, require_identifiable, require_labels
-from bayesplate.estimates.least_squares import weighted_least_squares
+from bayesplate.estimates.least_squares import weighted_least_squares, with_read_setups
 from bayesplate.estimates.sheet import NUMBERS_OF_MODES, Precision, Sheet, sheet
 from bayesplate.files import make_folder, require_new_files
 from bayesplate.frequencies.prior_bands import prior_bands, prior_medians
@@ -135,19 +135,17 @@ def modes(
 
 def _constants(prepared: PreparedBoard) -> tuple[Values, Precision | None, list[str]]:
     """Constants of the modes, their precision, and the reason if they are not the board's own estimate."""
-    board = prepared.board
-    read_setups = tuple(setup for setup in board.setups if setup.readings)
-    read_board = replace(board, setups=read_setups or board.setups)
+    board, read_board = prepared.board, with_read_setups(prepared.board)
     try:
         require_labels(read_board)
         estimate = weighted_least_squares(read_board)
         require_identifiable(board, identifiability(estimate.sensitivities, estimate.scales, board.symmetry))
     except NotIdentifiableError as error:
-        return prior_medians(board, prepared.prior), None, [str(error)] * bool(read_setups)
+        return prior_medians(board, prepared.prior), None, [str(error)] * bool(read_board.setups)
     widenings = noise_widenings(read_board, estimate.residuals)
-    scales = estimate.scales * np.repeat(widenings, [len(setup.readings) for setup in read_setups])
+    scales = estimate.scales * np.repeat(widenings, [len(setup.readings) for setup in read_board.setups])
     noise = {setup.name: setup.noise.median for setup in board.setups}
-    noise |= {setup.name: setup.noise.median * w for setup, w in zip(read_setups, widenings.tolist(), strict=True)}
+    noise |= {name: noise[name] * w for name, w in zip([s.name for s in read_board.setups], widenings, strict=True)}
     identification = identifiability(estimate.sensitivities, scales, board.symmetry)
     return {**board.nominal(), **estimate.values}, Precision(identification.of_rigidities, noise), []
 

@@ -150,9 +150,7 @@ CompareOut = Annotated[
     FilePath | None, _PATH_OR_NONE, path_option("--out", help="Folder for compare.json (default: not written).")
 ]
 Seed = Annotated[
-    int,
-    Key(integer_reader(0)),
-    Option("--seed", type=click.IntRange(0), show_default=True, help="Random seed."),
+    int, Key(integer_reader(0)), Option("--seed", type=click.IntRange(0), show_default=True, help="Random seed.")
 ]
 Effects = Annotated[
     Sequence[str] | None,

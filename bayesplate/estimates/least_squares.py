@@ -7,7 +7,7 @@ least-squares estimate of the exact frequencies; the sensitivities come with eac
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -54,6 +54,21 @@ def reading_scales(board: Board) -> Floats:
 def log_measured(board: Board) -> Floats:
     """ln of the measured frequencies (Hz), setup after setup: (n_modes,) array."""
     return np.log(np.concatenate([setup.measured for setup in board.setups]))
+
+
+def with_read_setups(board: Board) -> Board:
+    """The board with only its setups that have readings."""
+    return replace(board, setups=tuple(setup for setup in board.setups if setup.readings))
+
+
+def without_reading(board: Board, left_out: int) -> Board:
+    """The board without one reading, counted as in `log_measured`."""
+    first, setups = 0, []
+    for setup in board.setups:
+        readings = tuple(reading for i, reading in enumerate(setup.readings, start=first) if i != left_out)
+        setups.append(replace(setup, readings=readings))
+        first += len(setup.readings)
+    return with_read_setups(replace(board, setups=tuple(setups)))
 
 
 def weighted_least_squares(

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, board_density
 from bayesplate.board.material import MODULI, RIGIDITIES, moduli_of
 from bayesplate.board.prior import PriorCard
-from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
+from bayesplate.estimates.least_squares import log_measured, weighted_least_squares, without_reading
 
 MOST_ORTHOTROPIC = 100.0
 """E_x over E_y that no plate reaches: 10 to 20 in spruce, up to 70 in balsa."""
@@ -92,13 +90,8 @@ def odd_reading(board: Board) -> str:
 
 def _error_without(board: Board, left_out: int) -> float:
     """Rms error of the other readings, fitted without one, relative; infinite where that is no plate."""
-    first, setups = 0, []
-    for setup in board.setups:
-        readings = tuple(reading for i, reading in enumerate(setup.readings, start=first) if i != left_out)
-        setups += [replace(setup, readings=readings)] if readings else []
-        first += len(setup.readings)
     try:
-        residuals = weighted_least_squares(replace(board, setups=tuple(setups)), accepted=_TOLERANCE).residuals
+        residuals = weighted_least_squares(without_reading(board, left_out), accepted=_TOLERANCE).residuals
     except (ValueError, KeyError):  # LinAlgError among them
         return np.inf
     return float(np.sqrt(np.mean(residuals**2)))

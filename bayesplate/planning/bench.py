@@ -97,9 +97,12 @@ def make_bench(
     board, station = known_board.board, law.station
     system = station.system(board)
     numbers = (*NUMBERS_OF_MODES, N_SEARCHED_MODES)
-    full_sheet = sheet(
-        board, system, station.values(system, known_board.values), "where they are expected", numbers=numbers
-    )
+    added_mass = ""
+    if spot is not None:
+        x, y = station.places(board)[spot]
+        added_mass = f"{1e3 * known_mass(board):g} g at x = {1e3 * x:.0f}, y = {1e3 * y:.0f} mm"
+    where = f"where they are expected{f', with {added_mass}' if added_mass else ''}"
+    full_sheet = sheet(board, system, station.values(system, known_board.values), where, numbers=numbers)
     by_name = {mode.name: mode for mode in full_sheet.modes}
     names = [str(station.setup.labels[i]) for i in rows]
     mode_ends = [(by_name[name], end) for name, end in zip(names, np.exp(ends), strict=True) if name in by_name]
@@ -119,13 +122,8 @@ def make_bench(
         for mode, residue in zip(sheet_modes, placing.seen, strict=True)
     )
     edges = dict(station.setup.edges)
-    added_mass = ""
-    if spot is not None:
-        x, y = station.places(board)[spot]
-        added_mass = f"{1e3 * known_mass(board):g} g at x = {1e3 * x:.0f}, y = {1e3 * y:.0f} mm"
     entry = BenchEntry(board.name, station.setup.name, edges, sensor_mm, hammer_mm, tuple(taps), modes, added_mass)
-    likely = f"{basis}, with {added_mass}" if added_mass else basis
-    return Bench(entry, replace(full_sheet, modes=sheet_modes, combined=(), likely=likely), placing)
+    return Bench(entry, replace(full_sheet, modes=sheet_modes, combined=(), likely=basis), placing)
 
 
 def _sensor_place(

@@ -11,7 +11,7 @@ from bayesplate.effects.words import join_words
 from bayesplate.planning.gains import CONSTANTS, EXPLANATIONS
 from bayesplate.planning.plan import ExplanationEntry, Gain, Plan, ProposalEntry
 from bayesplate.results.tables import Table
-from bayesplate.results.words import percent
+from bayesplate.results.words import hertz_range, percent
 
 MOST_PROPOSALS = 12
 """Most proposals in a table; plan.json has all."""
@@ -85,7 +85,7 @@ def _benches(plan: Plan) -> tuple[Table, ...]:
             f"sensor at {_place_words(bench.sensor_mm)}, hammer at {_place_words(bench.hammer_mm)}",
             ("mode", "Hz", "likely Hz", "seen"),
             tuple(
-                (mode.label, f"{mode.hz:.1f}", f"{mode.low_hz:.1f} to {mode.high_hz:.1f}", f"{100.0 * mode.seen:.0f} %")
+                (mode.label, f"{mode.hz:.1f}", hertz_range(mode.low_hz, mode.high_hz), f"{100.0 * mode.seen:.0f} %")
                 for mode in bench.modes
             ),
         )

@@ -22,7 +22,7 @@ from bayesplate.board.setup import Setup
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.identifiability import identifiability
 from bayesplate.estimates.labelling import LIKELY_LABEL, label_likely_peaks
-from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
+from bayesplate.estimates.least_squares import Estimate, weighted_least_squares, with_read_setups
 from bayesplate.estimates.unusual import MOST_ORTHOTROPIC
 from bayesplate.estimates.wide_search import Guess, are_far_apart, search_widely
 from bayesplate.frequencies.model import setup_model, with_other_modes
@@ -204,7 +204,7 @@ def _settle_labels(board: Board, guess: Guess, visited: list[tuple[Setup, ...]])
             return None
         path.append(labelled.setups)
         visited.append(labelled.setups)
-        estimate = weighted_least_squares(_with_readings(labelled), _STEPS, guess.rigidities)
+        estimate = weighted_least_squares(with_read_setups(labelled), _STEPS, guess.rigidities)
         if identifiability(estimate.sensitivities, estimate.scales, board.symmetry).undetermined_constants():
             return labelled, guess.rigidities
         guess = guess_of(board, estimate)
@@ -213,7 +213,7 @@ def _settle_labels(board: Board, guess: Guess, visited: list[tuple[Setup, ...]])
 def _first_guesses(board: Board, prior: PriorCard) -> list[Guess]:
     """The constants that the labelled modes determine, or else guesses from all of the prior that explain the peaks."""
     if sum(len(setup.readings) for setup in board.setups) >= board.symmetry.n:
-        estimate = weighted_least_squares(_with_readings(board), accepted=_TOLERANCE)
+        estimate = weighted_least_squares(with_read_setups(board), accepted=_TOLERANCE)
         if not identifiability(estimate.sensitivities, estimate.scales, board.symmetry).undetermined_constants():
             return [guess_of(board, estimate)]
     n_peaks = sum(len(setup.readings) + len(setup.peaks) for setup in board.setups)
@@ -233,11 +233,6 @@ def guess_of(board: Board, estimate: Estimate) -> Guess:
     return Guess(estimate.values, log_rigidities, widening * max(setup.noise.median for setup in board.setups))
 
 
-def _with_readings(board: Board) -> Board:
-    """The board with only its setups that have readings."""
-    return replace(board, setups=tuple(setup for setup in board.setups if setup.readings))
-
-
 def _assess_labellings(candidates: Sequence[tuple[Board, Floats]], prior: PriorCard) -> list[Labelling]:
     """Labellings from labelled boards, each at its own estimate; boards with too few labels for one are left out."""
     determined = (
@@ -250,7 +245,7 @@ def _assess_labellings(candidates: Sequence[tuple[Board, Floats]], prior: PriorC
 
 def _assess_labelling(board: Board, prior: PriorCard, start: Floats) -> Labelling:
     """The labelling of a labelled board, at its own estimate."""
-    estimate = weighted_least_squares(_with_readings(board), _STEPS, start)
+    estimate = weighted_least_squares(with_read_setups(board), _STEPS, start)
     bare_models = [setup_model(system_of(board, setup), estimate.values) for setup in board.setups]
     models = with_peak_modes(bare_models, estimate.values)
     posterior = Posterior(board, prior, models, "linear")

@@ -21,7 +21,7 @@ import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Board
-from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
+from bayesplate.estimates.least_squares import log_measured, weighted_least_squares, without_reading
 from bayesplate.estimates.refit import most_likely, normal_misfit, sensitivities
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
@@ -189,15 +189,9 @@ class SlipSearch:
 
     def _fit_from_own_start(self, left_out: int) -> _Fit | None:
         """Fit by least squares without a reading, from its own start; None if it is no plate."""
-        first, setups = 0, []
-        for setup in self.board.setups:
-            readings = tuple(reading for i, reading in enumerate(setup.readings, start=first) if i != left_out)
-            setups += [replace(setup, readings=readings)] if readings else []
-            first += len(setup.readings)
         try:
-            values = weighted_least_squares(
-                replace(self.board, setups=tuple(setups)), _STEPS, accepted=_TOLERANCE
-            ).values
+            others = without_reading(self.board, left_out)
+            values = weighted_least_squares(others, _STEPS, accepted=_TOLERANCE).values
             models = [setup_model(system_of(self.board, setup), values) for setup in self.board.setups]
         except (ValueError, KeyError):
             return None

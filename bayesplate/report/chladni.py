@@ -23,7 +23,7 @@ from bayesplate.report.style import (
     mathtext,
     place_panel,
 )
-from bayesplate.results.words import STIFFNESS_WORDS, STIFFNESS_WORDS_OF_ISOTROPIC
+from bayesplate.results.words import STIFFNESS_WORDS, STIFFNESS_WORDS_OF_ISOTROPIC, hertz_range, hertz_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -212,16 +212,12 @@ def _draw_mixture(panel: Axes, mixture: CombinedMode, limits: WidthLimits | None
 
 def _mode_caption(mode: SheetMode) -> tuple[str, str]:
     name = mode.name if mode.name.startswith("(") else "no clear name"
-    first_line = f"{name}   {_hertz_text(mode.hertz)} Hz"
+    first_line = f"{name}   {hertz_text(mode.hertz)} Hz"
     if mode.measured_hz is not None:
         return first_line, f"measured {mode.measured_hz:.5g} Hz"
     if mode.band_hz is not None:
-        return first_line, f"likely {_hertz_text(mode.band_hz[0])} to {_hertz_text(mode.band_hz[1])} Hz"
+        return first_line, f"likely {hertz_range(*mode.band_hz)} Hz"
     return first_line, "not measured"
-
-
-def _hertz_text(value: float) -> str:
-    return f"{value:.1f}" if value < 100 else f"{value:.0f}"
 
 
 def draw_caption(panel: Axes, first: str, *others: str) -> None:

@@ -11,6 +11,7 @@ from bayesplate.results.words import (
     MODULUS_WORDS,
     Value,
     decimals,
+    hertz_range,
     is_isotropic,
     mode_name,
     number,
@@ -32,7 +33,6 @@ METHODS_REMARK = (
     "is no error; linear, exact: posterior under that law, ± its standard deviation"
 )
 _DEFAULT_DIGITS = 3
-_WHOLE_HZ = 100.0
 _NO_MODE, _LEAST_ALTERNATIVE = "none", 0.005
 
 
@@ -201,5 +201,5 @@ def _rounded_shares(shares: EnergyShares, has_effects: bool) -> list[int]:
 
 def _reading_cell(mode: SheetRow) -> Cell:
     if mode.likely_hz is not None:
-        return " to ".join(f"{end:.1f}" if end < _WHOLE_HZ else f"{end:.0f}" for end in mode.likely_hz)
+        return hertz_range(*mode.likely_hz)
     return mode.measured_hz

@@ -93,6 +93,21 @@ def decimals(sd: float) -> int:
     return min(max(_last_place(sd), 0), _MOST_DECIMALS)
 
 
+_WHOLE_HZ = 100.0
+"""Frequency from which one is given without a decimal."""
+
+
+def hertz_text(frequency: float, width: float = float("inf")) -> str:
+    """A frequency in Hz, with the decimals that an interval of that width needs."""
+    places = max(0 if frequency >= _WHOLE_HZ else 1, decimals(width) - 1)
+    return f"{frequency:.{places}f}"
+
+
+def hertz_range(low: float, high: float) -> str:
+    """An interval of frequencies, "65.0 to 65.4"."""
+    return f"{hertz_text(low, high - low)} to {hertz_text(high, high - low)}"
+
+
 def _last_place(sd: float) -> int:
     """Decimal place of the second significant digit; negative left of the point: -1 for 120, 1 for 3.4, 3 for 0.028."""
     return 1 - int(f"{sd:.1e}".partition("e")[2]) if 0 < sd < float("inf") else 0

@@ -363,9 +363,8 @@ def test_faults_of_rows_name_the_table_and_the_row_as_it_is_counted_there(table,
     assert set(told) == {"thick", "light", "prior", "twice", "Twice"}
     assert told["light"].startswith("tops.csv row 4 -> light.toml [plate] density_kg_m3: wanted a density")
     assert told["prior"].startswith("tops.csv row 5 -> prior.toml [material] prior -> ")
-    assert (
-        told["twice"] == "tops.csv row 6 -> wanted a name of its own, got twice more than once (a and A are one name)"
-    )
+    twice = "wanted a name of its own, got twice more than once (a and A are one name)"
+    assert told["twice"] == f"tops.csv row 6 -> {twice}"
     assert told["Twice"].startswith("tops.csv row 8 -> ")
 
 

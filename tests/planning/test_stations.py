@@ -208,5 +208,5 @@ def test_the_sheet_shows_every_mode_that_is_to_be_found_and_the_sensor_alone_as_
     assert bench.added_mass == ""
     (x, y), grams = station.places(read)[1], 1e3 * known_mass(read)
     assert loaded.entry.added_mass == f"{grams:g} g at x = {1e3 * x:.0f}, y = {1e3 * y:.0f} mm"
-    assert loaded.sheet.likely.endswith(f"with {loaded.entry.added_mass}")
+    assert loaded.sheet.basis.endswith(f"with {loaded.entry.added_mass}")
     assert bench.sensor_mm != (290, 100)

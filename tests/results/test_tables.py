@@ -17,7 +17,7 @@ from bayesplate.commands.printout import show_diagnosis, show_fit
 from bayesplate.diagnosis.tables import candidates_table
 from bayesplate.results.layout import column_widths
 from bayesplate.results.tables import Table, escape, notebook_html, render, strip_control_characters
-from bayesplate.results.words import Value, percent
+from bayesplate.results.words import Value, hertz_range, percent
 
 FORMULAS = ("=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "  =1")
 STEERS = ("\x1b[2J\x1b]0;owned\x07", "a\rb", "\x9b31m")
@@ -177,3 +177,17 @@ def test_a_table_that_fits_is_a_grid_and_one_that_does_not_is_stacked():
 def test_numbers_end_at_the_right_and_sentences_begin_at_the_left():
     rows = (("a", "1.5", "a sentence of more characters than any number has"), ("b", "12", "short"))
     assert "│ b     │    12 │ short " in "\n".join(printed(Table("t", ("board", "value", "doubt"), rows), 80))
+
+
+@pytest.mark.parametrize(
+    ("ends", "text"),
+    [
+        ((23.9, 151.6), "23.9 to 152"),
+        ((110.2, 112.4), "110 to 112"),
+        ((163.62, 164.18), "163.6 to 164.2"),
+        ((64.957, 65.043), "64.96 to 65.04"),
+        ((65.0, 65.0), "65.0 to 65.0"),
+    ],
+)
+def test_an_interval_of_frequencies_has_the_digits_that_tell_its_ends_apart(ends, text):
+    assert hertz_range(*ends) == text
