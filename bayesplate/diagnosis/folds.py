@@ -21,6 +21,10 @@ NEEDED_BELOW = 0.1
 """Probability of no effect below which one is needed, whatever the null simulations say."""
 NEEDED_LOG_ODDS = float(np.log((1.0 - NEEDED_BELOW) / NEEDED_BELOW))
 """The same as ln odds against no effect."""
+NOT_NEEDED_ABOVE = 0.25
+"""Probability of no effect above which none is needed, whatever the null simulations say: odds of three to one."""
+NOT_NEEDED_LOG_ODDS = float(np.log((1.0 - NOT_NEEDED_ABOVE) / NOT_NEEDED_ABOVE))
+"""The same as ln odds against no effect."""
 ANY_LOG_ODDS = -np.inf
 """Least ln odds against no effect where every fold has to choose one."""
 FEWEST_MODES = 5

@@ -9,7 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.arrays import Floats
-from bayesplate.diagnosis.folds import ANY_LOG_ODDS, NEEDED_LOG_ODDS, NestedErrors, nested_leave_one_out
+from bayesplate.diagnosis.folds import (
+    ANY_LOG_ODDS,
+    NEEDED_LOG_ODDS,
+    NOT_NEEDED_LOG_ODDS,
+    NestedErrors,
+    nested_leave_one_out,
+)
 from bayesplate.diagnosis.hypotheses import log_evidences, odds_against_none
 from bayesplate.diagnosis.search import SearchGround, simulate_noise
 
@@ -42,14 +48,15 @@ class NullControl:
 
     @property
     def needed_from(self) -> float:
-        """ln odds against no effect above which an effect is needed: the smaller of the quantile that allows the share
-        of false alarms, and `NEEDED_LOG_ODDS`.
+        """ln odds against no effect above which an effect is needed: the quantile that allows the share of false
+        alarms, between `NOT_NEEDED_LOG_ODDS` and `NEEDED_LOG_ODDS`.
 
-        `NEEDED_LOG_ODDS` too where no effect can act, so that there are no odds.
+        `NEEDED_LOG_ODDS` where no effect can act, so that there are no odds.
         """
         if not np.isfinite(self.log_odds).all():
             return NEEDED_LOG_ODDS
-        return min(float(np.quantile(self.log_odds, 1.0 - FALSE_ALARMS)), NEEDED_LOG_ODDS)
+        quantile = float(np.quantile(self.log_odds, 1.0 - FALSE_ALARMS))
+        return min(max(quantile, NOT_NEEDED_LOG_ODDS), NEEDED_LOG_ODDS)
 
     @property
     def flagged_share(self) -> float:

@@ -150,11 +150,11 @@ def test_nothing_is_claimed_where_nothing_was_added_or_nothing_is_left_to_judge_
 
 
 def test_the_folds_of_the_board_add_an_effect_where_the_null_simulations_call_for_one(found):
-    weak = searched(0.1)
-    calm, loud = (replace(CONTROL, log_odds=np.full(100, level)) for level in (-50.0, 50.0))
-    assert nested_errors_of_board(weak, calm).choices.sum() == 9
-    assert nested_errors_of_board(weak, loud).choices.sum() == 0
-    assert 0 < nested_errors_of_board(weak, CONTROL).choices.sum() < 9
+    """A quiet control adds it from odds of three to one on, a loud one from nine to one, others where they end."""
+    weak = searched(0.16)
+    quiet, loud, between = (replace(CONTROL, log_odds=np.full(100, level)) for level in (-50.0, 50.0, np.log(5.0)))
+    added = [nested_errors_of_board(weak, control).choices.sum() for control in (quiet, between, loud)]
+    assert added == [9, 8, 6]
 
 
 def test_modes_that_alone_carry_something_count_in_no_condition(found):

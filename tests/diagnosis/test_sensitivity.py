@@ -97,10 +97,13 @@ def test_the_null_control_finds_little_where_there_is_nothing_and_sees_what_ther
     assert calm.log_odds_percentile(-np.inf) == 0.0
 
 
-def test_what_is_needed_begins_at_the_false_alarm_rate_or_at_certainty():
-    """Of a hundred null sets two lie above; a control full of alarms does not ask for more than a tenth's odds."""
-    even = NullControl(np.linspace(-3.0, 0.0, 101), None)
+def test_what_is_needed_begins_at_the_false_alarm_rate_within_its_bounds():
+    """Of a hundred null sets two lie above; a quiet control does not make odds below three to one enough, and one full
+    of alarms does not ask for more than nine to one.
+    """
+    even = NullControl(np.linspace(-1.0, 2.0, 101), None)
     assert np.sum(even.log_odds > even.needed_from) == 2
+    assert NullControl(np.linspace(-3.0, 0.0, 101), None).needed_from == pytest.approx(np.log(3.0))
     assert NullControl(np.full(100, 9.0), None).needed_from == pytest.approx(np.log(9.0))
 
 

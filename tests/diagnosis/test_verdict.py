@@ -166,10 +166,10 @@ def test_without_candidates_there_is_nothing_to_name(base):
         assert (verdict.word, verdict.best) == (word, None)
 
 
-def test_needed_is_what_the_null_simulations_do_not_reach():
-    """Odds against no effect of two to one: beyond 98 % of the null sets, or within them."""
-    found = found_with({(): 1 / 3, ("a",): 2 / 3})
-    for top, is_needed in [(0.0, True), (2.0, False)]:
+def test_needed_is_what_the_null_simulations_do_not_reach_and_is_three_times_as_probable_as_nothing():
+    """Odds against no effect of four to one, beyond 98 % of the null sets or within them; and odds of two to one."""
+    for p_none, top, is_needed in [(0.2, 0.0, True), (0.2, 2.0, False), (1 / 3, 0.0, False)]:
+        found = found_with({(): p_none, ("a",): 1.0 - p_none})
         verdict = decided(found, NullControl(np.linspace(-4.0, top, 101), None))
         assert (verdict.word == "named") is verdict.is_needed is is_needed
 

@@ -20,7 +20,7 @@ from bayesplate.campaign.search import PRIOR_SHARE_OF_TWO
 from bayesplate.campaign.search import SHARING_PRIOR as WAYS_BEFORE
 from bayesplate.commands.prepare import prepare
 from bayesplate.diagnosis.claim import IMPROBABLE_BELOW, STANDARD_ERRORS
-from bayesplate.diagnosis.folds import NEEDED_BELOW
+from bayesplate.diagnosis.folds import NEEDED_BELOW, NOT_NEEDED_ABOVE
 from bayesplate.diagnosis.hypotheses import PRIOR_OF_NONE, PRIOR_OF_ONE, PRIOR_OF_TWO
 from bayesplate.diagnosis.null_control import CHANCE_SHARE, FALSE_ALARMS, N_SETS
 from bayesplate.diagnosis.search import LEAST_P_VALUE
@@ -286,6 +286,7 @@ def verdict_limits(folder: Path) -> str:
     rows = [
         ("an effect is needed: probability of no effect below", f"{NEEDED_BELOW:g}"),
         ("or larger odds against no effect than all but so many boards without any", f"{100 * FALSE_ALARMS:g} of 100"),
+        ("but not with a probability of no effect above", f"{NOT_NEEDED_ABOVE:g}"),
         ("named: more probable than the next by a factor of", f"{CLEAR_FACTOR:g}"),
         ("group: within a factor of the best", f"{ALTERNATIVE_FACTOR:g}"),
         ("a pair counts if it beats its better member by a factor of", f"{CLEAR_FACTOR:g}"),
