@@ -58,10 +58,10 @@ class Board:
     title, source : str
     effects : tuple of str
         Declared effects.
-    implies : bool
+    has_implied_effects : bool
         Whether stated data of the board (a sensor's mass, the fluid, a bounce) declare effects beside these; an empty
         list of effects on the card declares none.
-    chosen : tuple
+    effect_forms : tuple
         Effects (`bayesplate.effects.Effect`) in another form than that of the card.
     shear_xz, shear_yz : Quantity or None, Pa
     warp : dict of Quantity, m

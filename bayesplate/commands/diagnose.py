@@ -36,9 +36,10 @@ from bayesplate.diagnosis.search import SearchResult
 from bayesplate.diagnosis.sizes import refit_board
 from bayesplate.diagnosis.stated import stated_claims
 from bayesplate.diagnosis.verdict import Explanation, Verdict, decide_verdict, explanation_words
-from bayesplate.diagnosis.words import relabelled_sentence
+from bayesplate.diagnosis.words import relabelled_sentence, worse_fit_sentence
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
 from bayesplate.estimates.leave_one_out import carrying_modes, indices_of, unite_carrying_modes
+from bayesplate.estimates.undeclared_air import air_sentence
 from bayesplate.files import write_text
 from bayesplate.planning.bench import plan_first_line
 from bayesplate.planning.explained import search_beliefs, surviving_explanations
@@ -200,7 +201,7 @@ def _diagnose_fit(problem: Problem, before: FitResult, run: Run, n_null: int) ->
     in_part = effects_named_in_part(search, verdict, folds)
     finalists = verdict.refitted_explanations[:_MOST_FINALISTS]
     stages.remaining_time = FIT_TIME * len(finalists) + (_CHOICE_TIME if verdict.index else 0.0)
-    refits, failures = _refit_finalists(problem, run, search, finalists)
+    refits, failures = _refit_finalists(problem, before, run, search, finalists)
     fits = {0: before, **refits}
     final_index = verdict.judged_index if (verdict.index or in_part) and verdict.judged_index in fits else 0
     after = fits[final_index]
@@ -213,7 +214,8 @@ def _diagnose_fit(problem: Problem, before: FitResult, run: Run, n_null: int) ->
     if verdict.index and folds is not None and folds.is_counted.any():
         stages.begin("the same search on simulated boards, made to choose", _CHOICE_TIME)
         control = force_choices(ground, control, float(folds.ratio[0]), folds.carrying_readings)
-    notes = [*after.inference.problem.doubts, *failures]  # a doubt that an effect explains is none any more
+    final = after.inference.problem  # a doubt that its effect explains is none any more
+    notes = [*final.doubts, *failures, *filter(None, [air_sentence(final.board, final.estimate)])]
     if final_index:
         effect_words = next(
             explanation_words(search, finalist) for finalist in finalists if finalist.index == final_index
@@ -248,15 +250,23 @@ def _diagnose_fit(problem: Problem, before: FitResult, run: Run, n_null: int) ->
 
 
 def _refit_finalists(
-    problem: Problem, run: Run, search: SearchResult, finalists: Sequence[Explanation]
+    problem: Problem, before: FitResult, run: Run, search: SearchResult, finalists: Sequence[Explanation]
 ) -> tuple[dict[int, FitResult], list[str]]:
-    """The fits with the finalists among the explanations, by index, and a sentence for each that failed."""
+    """The fits with the finalists among the explanations, by index, and a sentence for each that failed.
+
+    A fit fails too if its readings look wrong under it and it misses them by more than the fit before.
+    """
     fits, failures = {}, []
     for explanation in finalists:
         try:
             name = "-".join((*explanation.members, str(explanation.index)))
             stage = f"fit with {explanation_words(search, explanation)}"
-            fits[explanation.index] = run.fit(with_board(problem, refit_board(search, explanation.index)), name, stage)
+            fit = run.fit(with_board(problem, refit_board(search, explanation.index)), name, stage)
+            sentence = worse_fit_sentence(before.summary, fit.summary, explanation_words(search, explanation))
+            if fit.inference.problem.slip_remarks and sentence:
+                failures.append(sentence)
+            else:
+                fits[explanation.index] = fit
         except (NotIdentifiableError, NotConvergedError) as error:
             failures.append(f"the model could not be fitted again with {' and '.join(explanation.members)}: {error}")
     return fits, failures

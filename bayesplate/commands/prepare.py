@@ -122,4 +122,6 @@ def _unstated_effects(board: Board, prepared: Board) -> Iterator[Fault]:
             yield Fault(f"{board.name} {parameter.name}", "the prior of a declared effect", "another one", remedy)
     if board.effect_forms:
         forms = ", ".join(effect.name for effect in board.effect_forms)
-        yield Fault(f"{board.name} chosen", "effects in the form that a card gives them", f"other forms of {forms}")
+        yield Fault(
+            f"{board.name} effect_forms", "effects in the form that a card gives them", f"other forms of {forms}"
+        )

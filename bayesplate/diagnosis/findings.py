@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,7 +37,7 @@ from bayesplate.diagnosis.verdict import (
     p_value_words,
     rank_explanations,
 )
-from bayesplate.effects import EFFECTS
+from bayesplate.effects import EFFECTS, effect_faults
 from bayesplate.effects.words import join_words
 from bayesplate.estimates.leave_one_out import CarryingMode, indices_of
 from bayesplate.frequencies.laws import cents
@@ -306,7 +306,12 @@ def _nearest_sentence(case: Case, explanation: Explanation, summary: Summary) ->
     # A card declares just the effects that it lists, so that those declared already are in the list too.
     effects = (*case.result.ground.baseline.board.effects, *explanation.members)
     names = ", ".join(f'"{name}"' for name in effects)
-    return f"{sentence}. Declare {it}, effects = [{names}], and diagnose again to look for what else is lacking."
+    board = replace(case.result.ground.baseline.board, effects=effects)
+    lacking = "".join(f" ({fault.got}, which it takes)" for fault in effect_faults(board))
+    return (
+        f"{sentence}. If you can see {it} on the board, declare {it}, effects = [{names}]{lacking}, and diagnose again "
+        "to look for what else is lacking."
+    )
 
 
 def _finalist(case: Case, explanation: Explanation, summary: Summary) -> Finalist:

@@ -170,7 +170,7 @@ def _best_sentences(known: Sequence[KnownModel], errors: _ComparedError) -> list
     best = min(known, key=errors.of)
     best_error, standing_error = errors.texts(best, known[0])
     if best_error == standing_error:
-        return [f"None of {len(known) - 1} other combinations has a lower {errors.name} than the board as it stands."]
+        return [f"No combination has a lower {errors.name} than the board as it stands."]
     return [
         f"Of {len(known)} combinations the board {model_words(best)} has the lowest {errors.name}, {best_error} cents."
     ]

@@ -66,7 +66,7 @@ def errors_table(diagnosis: Diagnosis) -> Table:
         title = "Error before and after"
         columns = {"before": diagnosis.before, f"after: {diagnosis.refitted_words}": diagnosis.after}
     else:
-        title, columns = "Error", {"as it is": diagnosis.before}
+        title, columns = "Error of the fit", {"as it is": diagnosis.before}
     rows: list[Row] = [
         (merit.title, *(merit.formatted(merit.value_of(errors)) for errors in columns.values())) for merit in MERITS
     ]
@@ -144,7 +144,9 @@ def answers_table(diagnosis: Diagnosis) -> Table:
         probabilities.append((f"any of {n_rest} others" if n_rest > 1 else "one other", rest_share))
     percentages = _percentages([share for _, share in probabilities])
     rows = tuple((words, share) for (words, _), share in zip(probabilities, percentages, strict=True))
-    return Table("What may be the case", ("explanation", "probability"), rows)
+    is_unexplained = diagnosis.verdict == "unexplained"
+    title = "What was tried, and none of it explains the readings" if is_unexplained else "What may be the case"
+    return Table(title, ("explanation", "probability"), rows)
 
 
 def sizes_table(diagnosis: Diagnosis) -> Table | None:

@@ -15,6 +15,7 @@ from bayesplate.diagnosis.verdict import VerdictWord
 from bayesplate.effects.words import effect_name, effect_names, join_words
 from bayesplate.estimates.leave_one_out import carrying_sentence
 from bayesplate.labels import Label
+from bayesplate.results.summary import Summary
 from bayesplate.results.words import Value, cents_texts, number, percent
 
 TOO_FEW_READINGS = "the readings are too few to choose anew without each of them"
@@ -286,6 +287,17 @@ def warnings(diagnosis: Diagnosis) -> list[str]:
 def reason_and_notes(diagnosis: Diagnosis) -> list[str]:
     """The reason of the verdict, and notes of the run."""
     return [f"The reason: {diagnosis.reason}.", *diagnosis.notes]
+
+
+def worse_fit_sentence(before: Summary, after: Summary, words: str) -> str:
+    """A sentence on a fit with an effect that misses the readings by more than that without; empty if none does."""
+    old, new = before.error.in_sample_rms_cents, after.error.in_sample_rms_cents
+    if new <= old:
+        return ""
+    return (
+        f"the fit with {words} misses the readings by {new:.1f} cents, that without by {old:.1f}: under it their "
+        "labels look wrong, and it is left out"
+    )
 
 
 def relabelled_sentence(before: Board, after: Board, words: str) -> str:

@@ -52,7 +52,8 @@ class Warp(Effect):
     name: ClassVar[str] = "warp"
     scope: ClassVar[Scope] = "board"
     sentence: ClassVar[str] = (
-        "The board is not flat, so its lowest modes ring higher: lay a straightedge across it, and along it."
+        "The board is not flat, so its lowest modes ring higher: lay a straightedge across it and along it, and see "
+        "whether it rocks on a flat table. Supports at a few places raise the same modes."
     )
     references: ClassVar[tuple[str, ...]] = (
         "Donnell, L. H., Stability of thin-walled tubes under torsion, NACA report 479 (1933), for the shallow shell",

@@ -259,8 +259,8 @@ def noise_remarks(board: Board, log_widening: float) -> tuple[str, ...]:
     )
     return (
         f"the readings scatter about the fitted plate by {levels}: no plate of these sizes and edges fits them, so do "
-        "not trust the constants before a label, a size or an edge is corrected, or an effect is found (bayesplate "
-        "diagnose)",
+        "not trust the constants before a label, a size or an edge is corrected, or an effect explains them "
+        "(bayesplate diagnose looks for one)",
     )
 
 

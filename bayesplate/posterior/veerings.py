@@ -48,18 +48,23 @@ def with_veering_doubts(board: Board, models: Sequence[SetupModel], values: Valu
             for reading in setup.readings
         )
         setups.append(replace(setup, readings=tuple(readings)))
-    remarks = (_remark(setup, doubtful) for setup, doubtful in zip(board.setups, doubts, strict=True) if doubtful)
+    remarks = (
+        _remark(setup, doubtful, len(board.setups) > 1)
+        for setup, doubtful in zip(board.setups, doubts, strict=True)
+        if doubtful
+    )
     return replace(board, setups=tuple(setups)), tuple(remarks)
 
 
-def _remark(setup: Setup, doubts: Mapping[Beams, _LabelDoubt]) -> str:
+def _remark(setup: Setup, doubts: Mapping[Beams, _LabelDoubt], are_several: bool) -> str:
+    where = f"setup {setup.name}: " if are_several else ""
     phrases = [
         f"{_label(setup, beams)} {100.0 * doubt.confidence:.0f} % "
         f"(its shape mixes with that of {' and '.join(str(_label(setup, other)) for other in doubt.others)})"
         for beams, doubt in doubts.items()
     ]
     return (
-        f"setup {setup.name}: near this plate modes of one kind exchange their shapes (a veering), so that a "
+        f"{where}near this plate modes of one kind exchange their shapes (a veering), so that a "
         "figure may be the neighbour's; before the fit the label is taken as right with a probability of: "
         f"{', '.join(phrases)}; a reading of the neighbour too, or another look at both figures, settles it"
     )

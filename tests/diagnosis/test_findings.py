@@ -294,7 +294,10 @@ def test_what_comes_nearest_is_told_though_it_is_not_enough(members):
     assert (case.verdict.word, case.verdict.nearest) == ("unexplained", nearest)
     declared = replace(base, board=replace(base.board, effects=("thickness_profile",)))
     beside = replace(found, ground=replace(found.ground, baseline=declared))
-    advice = "Declare it, effects = [{}], and diagnose again to look for what else is lacking."
+    advice = (
+        "If you can see it on the board, declare it, effects = [{}], and diagnose again to look for what else is "
+        "lacking."
+    )
     for changed, told in [
         ({}, advice.format('"fluid_loading"')),
         ({"result": beside}, advice.format('"thickness_profile", "fluid_loading"')),
@@ -394,7 +397,7 @@ def test_two_effects_that_are_one_alternative_stay_together():
 def test_two_effects_come_nearest_where_one_comes_nearest(named):
     told = _nearest_sentence(named, Explanation((SHEAR, AIR), 1, 0.9), MOVED)
     assert told.startswith("Transverse shear and fluid loading come nearest: with them the error goes from")
-    assert 'Declare them, effects = ["transverse_shear", "fluid_loading"],' in told
+    assert 'see them on the board, declare them, effects = ["transverse_shear", "fluid_loading"],' in told
 
 
 UNEXPLAINED = {(): 1e-6, (SHEAR,): 0.97, (AIR,): 0.02, (GRAIN,): 0.01}

@@ -111,7 +111,7 @@ def of_errors(neither, first, second, both):
     )
 
 
-NONE_BETTER = "None of 3 other combinations has a lower left-out error than the board as it stands."
+NONE_BETTER = "No combination has a lower left-out error than the board as it stands."
 BEST = "Of 4 combinations the board with transverse shear and fluid loading has the lowest left-out error, {} cents."
 
 

@@ -264,7 +264,7 @@ def test_errors_before_and_after_or_as_they_are():
         ("log score", "-24.75", "-15.50"),
         ("readings inside their 90 % intervals", "50 %", "100 %"),
     )
-    assert (alone.title, alone.columns) == ("Error: a-board", ("", "as it is"))
+    assert (alone.title, alone.columns) == ("Error of the fit: a-board", ("", "as it is"))
     assert [row[1] for row in alone.texts] == [row[1] for row in both.texts]
     unknown = replace(DIAGNOSES["none needed"], before=replace(BEFORE, leave_one_out_rms_cents=None))
     assert errors_table(unknown).texts[1][1] == "–"
@@ -311,7 +311,7 @@ def test_the_terminal_shows_only_tables_that_there_are():
         "Shift of the constants by membrane tension, GPa", "Sizes of what was fitted again",
         "Candidates at their usual size",
     ]  # fmt: skip
-    assert [table.title for table in bare.tables[1:]] == ["What may be the case", "Error: a-board"]
+    assert [table.title for table in bare.tables[1:]] == ["What may be the case", "Error of the fit: a-board"]
     assert shown.remarks == (*known_sentences(NAMED), *NAMED.sentences, NEXT)
     assert bare.remarks == (NEXT,)
 
