@@ -10,7 +10,7 @@ from typing import Any
 
 from bayesplate.board.density import DensityKind
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.repeated import are_equal, comma_complaint, scatter_complaint
+from bayesplate.board.repeated import LARGEST_PROFILE_RATIO, are_equal, comma_complaint, scatter_complaint
 from bayesplate.board.units import SI, in_unit, median_and_factor
 from bayesplate.board.values import (
     Complaint,
@@ -104,7 +104,7 @@ class QuantityReader:
 
     def _read_table_of_readings(self, table: dict[str, Any]) -> Quantity:
         readers: dict[str, Callable[[Any], Any]] = {
-            "readings": self._read_list if any(key in table for key in self.places) else self._read_repeated,
+            "readings": self._read_profile if any(key in table for key in self.places) else self._read_repeated,
             "resolution": Number(0, self.number.high, self.number.unit),
             **dict.fromkeys(self.places, _read_coordinates),
             **({"place_sd_mm": _PLACE_SD} if self.places else {}),
@@ -134,10 +134,16 @@ class QuantityReader:
         return quantity if quantity.is_exact else replace(quantity, lower=self.lower)
 
     def _read_list(self, value: object) -> list[float]:
-        """A list of readings; at different places they may differ."""
+        """A list of readings."""
         items = read_list(value, "readings", MOST_READINGS)
         refuse(comma_complaint(items, self.furthest))
         return read_items(enumerate(items), self.number)
+
+    def _read_profile(self, value: object) -> list[float]:
+        """Readings at different places, whose ratio is `LARGEST_PROFILE_RATIO` at most."""
+        readings = self._read_list(value)
+        refuse(scatter_complaint(readings, LARGEST_PROFILE_RATIO))
+        return readings
 
     def _read_repeated(self, value: object) -> list[float]:
         """Repeated readings of one quantity, whose ratio is `furthest` at most."""

@@ -11,6 +11,8 @@ from bayesplate.board.words import show_value
 LARGEST_SIZE_RATIO = 2.0
 """Largest ratio of the largest to the smallest reading of one size or mass. A board tapers by less; readings further
 apart are a profile and need places."""
+LARGEST_PROFILE_RATIO = 5.0
+"""The same of readings at different places: a graduated top varies by less, a misplaced point by ten."""
 
 LARGEST_FREQUENCY_RATIO = 1.1
 """The same for one mode's frequency. Frequencies of a free board scatter by 0.3 %; clamping it again moves them by up

@@ -69,8 +69,11 @@ def read_arguments(
     values = {}
     try:
         values = dict(model.model_validate({name: arguments[name] for name in model.model_fields if name in arguments}))
-    except ValidationError as error:
-        for detail in error.errors(include_url=False):
+    except ValidationError as invalid:
+        for detail in invalid.errors(include_url=False):
+            error = detail["ctx"]["error"]
+            is_refusal = isinstance(error, Refusal)  # otherwise what numpy or Python say of a value
+            complaints = error.complaints if is_refusal else (Complaint("a plain value", show_value(detail["input"])),)
             faults += [
                 Fault(
                     _argument_place(*detail["loc"], *complaint.path),
@@ -78,7 +81,7 @@ def read_arguments(
                     complaint.got,
                     complaint.remedy,
                 )
-                for complaint in detail["ctx"]["error"].complaints
+                for complaint in complaints
             ]
     faults += [fault for rule in rules for fault in rule(arguments)]
     if faults:

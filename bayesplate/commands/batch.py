@@ -222,7 +222,8 @@ def batch(
             f"{folder.path}: wanted the {JOURNAL_FILE} of an earlier run, got none (--force runs it anew)"
         )
     request = FitRequest(seed, None if effects is None else tuple(effects), law, robust)
-    with worker_processes(workers or os.cpu_count() or 1) if dask is None else dask_cluster(dask) as executors:
+    n_processes = min(workers or os.cpu_count() or 1, len(boards))
+    with worker_processes(n_processes) if dask is None else dask_cluster(dask) as executors:
         folder.open(resume=resume)
         journal = Journal(folder.path / JOURNAL_FILE)
         try:

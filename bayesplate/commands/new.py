@@ -140,6 +140,8 @@ def new(
 
 def _new_card_path(path: str | os.PathLike[str]) -> Path:
     card = Path(path)
+    if not card.name:
+        raise InputError(Fault("name", "a file name", show_value(str(path)), "choose another name"))
     card = card if card.suffix == ".toml" else card.with_name(f"{card.name}.toml")
     if os.path.exists(card):
         raise InputError(Fault(printable(str(card)), "a new file", "one that exists", "choose another name"))

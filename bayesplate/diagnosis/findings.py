@@ -307,10 +307,10 @@ def _nearest_sentence(case: Case, explanation: Explanation, summary: Summary) ->
     effects = (*case.result.ground.baseline.board.effects, *explanation.members)
     names = ", ".join(f'"{name}"' for name in effects)
     board = replace(case.result.ground.baseline.board, effects=effects)
-    lacking = "".join(f" ({fault.got}, which it takes)" for fault in effect_faults(board))
+    lacking = "".join(f"; before that the card must say more: {fault.got}" for fault in effect_faults(board))
     return (
-        f"{sentence}. If you can see {it} on the board, declare {it}, effects = [{names}]{lacking}, and diagnose again "
-        "to look for what else is lacking."
+        f"{sentence}. If you can see {it} on the board, declare {it}, effects = [{names}], and diagnose again to look "
+        f"for what else is lacking{lacking}."
     )
 
 

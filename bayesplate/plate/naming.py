@@ -123,9 +123,10 @@ def find_named_modes(plate: Plate, weights: Weights, wanted_names: Iterable[Beam
     places: dict[Beams, ModePlace] = {}
     while counts:
         short = {p: n for p, n in counts.items() if p not in solved or solved[p].eigenvalues.size < n}
-        solved |= solve_classes(
-            plate, weights, {p: min(n + _MODES_AHEAD * (p in solved), n_most[p]) for p, n in short.items()}
-        )
+        asked = {p: min(n + _MODES_AHEAD * (p in solved), n_most[p]) for p, n in short.items()}
+        solved |= solve_classes(plate, weights, asked)
+        n_most |= {p: solved[p].eigenvalues.size for p, n in asked.items() if solved[p].eigenvalues.size < n}
+        counts = {p: min(n, n_most[p]) for p, n in counts.items()}
         places = {name: place for name, place in places.items() if place.parity not in counts}
         for parity, n in counts.items():
             places |= _places(solved[parity].at_ranks(range(n)), names)

@@ -176,6 +176,8 @@ FAULTS = [
      "(a decimal point: [448.8, 594.1]; or the whole numbers in ascending order)"),
     (THICKNESS, "[2.8, 28]",
      "[plate] thickness_mm: wanted readings of one thing, the largest at most 2 times the smallest, got 2.8 and 28…"),
+    (THICKNESS, "{ readings = [3.2, 3.1, 16], at_x_mm = [10, 100, 200], at_y_mm = [5, 50, 100] }",
+     "[plate] thickness_mm.readings: wanted readings of one thing, the largest at most 5 times the smallest, got 3.1…"),
     ("[98, 98, 99]", "[98, 109]",
      '…."(1,1)": wanted readings of one thing, the largest at most 1.1 times the smallest, got 98 and 109 (one of…)'),
     ("[98, 98, 99]", "{ readings = [98, 98, 196], resolution = 1 }",

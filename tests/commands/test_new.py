@@ -104,6 +104,11 @@ def test_options_ask_nothing():
     assert frequencies(card.setups[0])[Label(1, 0)].mean == 52
 
 
+def test_a_folder_is_no_name_of_a_card():
+    told = CliRunner().invoke(main, ["new", "./", "--length-x", "400"])
+    assert (told.exit_code, told.stderr) == (3, 'name: wanted a file name, got "./" (choose another name)\n')
+
+
 def test_a_frequency_that_is_given_twice_is_refused(tmp_path):
     path = tmp_path / "twice.toml"
     told = CliRunner().invoke(main, ["new", str(path), "--frequency", "(1,1)=35", "--frequency", "(1,1)=36"])

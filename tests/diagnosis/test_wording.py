@@ -192,6 +192,12 @@ def test_with_too_few_readings_the_error_that_both_models_have_is_told():
         )
 
 
+def test_probabilities_of_what_does_not_explain_the_readings_stand_under_that_title():
+    for verdict in DIAGNOSES:
+        title = answers_table(replace(NAMED, verdict=verdict)).title
+        assert ("none of it explains the readings" in title) == (verdict == "unexplained")
+
+
 def test_the_probabilities_sum_to_one_as_they_are_printed():
     table = answers_table(NAMED)
     assert (table.columns, table.texts) == (

@@ -184,6 +184,37 @@ def test_readings_that_fit_best_where_plates_end_are_refused_with_the_odd_one():
     assert "fit best where constants are those of no plate" in str(refused.value)
 
 
+SLIP_IN_WATER = """
+format = 1
+name = "wet"
+[plate]
+length_x_mm = 400
+length_y_mm = 180
+thickness_mm = 3.2
+density_kg_m3 = 430
+[setup]
+edges = { x0 = "free", x1 = "free", y0 = "free", y1 = "free" }
+[setup.fluid]
+density_kg_m3 = 997
+baffle = "none"
+[setup.frequencies_hz]
+"(1,1)" = 11.02
+"(2,0)" = 16.48
+"(0,2)" = 0.2927
+"(2,1)" = 30.76
+"(1,2)" = 39.64
+"(3,0)" = 48.73
+"(2,2)" = 65.63
+"""
+
+
+def test_a_slip_in_water_that_asks_for_more_modes_than_there_are_is_refused():
+    """Shapes without a mass of their own are no modes, so that a class may have fewer than are looked for."""
+    wet = Problem.from_card(Board.from_text(SLIP_IN_WATER, "wet"))
+    with pytest.raises(NotIdentifiableError, match="no plate comes near the readings"):
+        wet.posed  # noqa: B018
+
+
 def test_no_reading_is_odd_where_none_or_two_are():
     assert odd_reading(with_slip().board) == ""
     two = SEVEN_MODES.replace("65.0", "6500").replace("203.0", "20300")
