@@ -39,7 +39,6 @@ from bayesplate.diagnosis.verdict import Explanation, Verdict, decide_verdict, e
 from bayesplate.diagnosis.words import relabelled_sentence, worse_fit_sentence
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
 from bayesplate.estimates.leave_one_out import carrying_modes, indices_of, unite_carrying_modes
-from bayesplate.estimates.undeclared_air import air_sentence
 from bayesplate.files import write_text
 from bayesplate.planning.bench import plan_first_line
 from bayesplate.planning.explained import search_beliefs, surviving_explanations
@@ -97,7 +96,7 @@ class DiagnoseResult:
 
     def printout(self) -> Printout:
         """Tables and sentences for a person."""
-        return show_diagnosis(self.diagnosis)
+        return show_diagnosis(self.diagnosis, self.summary.identifiability)
 
     def __repr__(self) -> str:
         return repr(self.diagnosis).replace("<Diagnosis", "<DiagnoseResult", 1)
@@ -214,8 +213,7 @@ def _diagnose_fit(problem: Problem, before: FitResult, run: Run, n_null: int) ->
     if verdict.index and folds is not None and folds.is_counted.any():
         stages.begin("the same search on simulated boards, made to choose", _CHOICE_TIME)
         control = force_choices(ground, control, float(folds.ratio[0]), folds.carrying_readings)
-    final = after.inference.problem  # a doubt that its effect explains is none any more
-    notes = [*final.doubts, *failures, *filter(None, [air_sentence(final.board, final.estimate)])]
+    notes = [*after.inference.problem.doubts, *failures]  # a doubt that an effect explains is none any more
     if final_index:
         effect_words = next(
             explanation_words(search, finalist) for finalist in finalists if finalist.index == final_index

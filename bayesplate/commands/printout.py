@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from bayesplate.campaign.diagnosis import CampaignDiagnosis, campaign_claim_sentence
@@ -149,13 +150,14 @@ def show_campaign_diagnosis(diagnosis: CampaignDiagnosis) -> Printout:
     return Printout(diagnosis_tables(diagnosis), remarks, diagnosis.notes, closing)
 
 
-def show_diagnosis(diagnosis: Diagnosis) -> Printout:
-    """The diagnosis of a board."""
+def show_diagnosis(diagnosis: Diagnosis, identifiability: Sequence[str] = ()) -> Printout:
+    """The diagnosis of a board, and what the readings leave open of the model that it ends with."""
     sentences = (
         *known_sentences(diagnosis),
         carrying_words(diagnosis),
         *diagnosis.sentences,
         alike_sentence(diagnosis),
+        *identifiability,
         diagnosis.recommendation,
     )
     remarks = tuple(sentence for sentence in sentences if sentence)
