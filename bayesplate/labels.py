@@ -53,10 +53,10 @@ class Label(NamedTuple):
         InputError
             If the text is anything else: "10", "(1;0)", "(1.0,0)", "(-1,0)".
         """
-        match = _LABEL_PATTERN.fullmatch(text)
+        match = _LABEL_PATTERN.fullmatch(text) if isinstance(text, str) else None
         label = cls(int(match[1]), int(match[2])) if match else None
         if label is None or max(label) > HIGHEST_INDEX:
             wanted = f'two whole numbers from 0 to {HIGHEST_INDEX}, written like "(1,0)"'
-            excerpt = ascii(text if len(text) <= 40 else text[:40] + "...")[1:-1]
-            raise InputError(Fault("mode label", wanted, f'"{excerpt}"'))
+            got = ascii(text[:40] + "..." if isinstance(text, str) and len(text) > 40 else text)
+            raise InputError(Fault("mode label", wanted, f'"{got[1:-1]}"' if isinstance(text, str) else got))
         return label

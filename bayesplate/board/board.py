@@ -29,7 +29,7 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.board.shelf import CardFile
 from bayesplate.board.stated import are_instances, quantities_of, type_faults
-from bayesplate.board.unstatable import unstatable_faults
+from bayesplate.board.unstatable import attribute_faults, unstatable_faults
 from bayesplate.board.words import canonical_effect
 from bayesplate.board.writing import toml_text, write_card
 from bayesplate.errors import InputError
@@ -93,7 +93,8 @@ class Board:
     card: CardFile | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "effects", tuple(map(canonical_effect, self.effects)))
+        if isinstance(self.effects, Iterable):
+            object.__setattr__(self, "effects", tuple(map(canonical_effect, self.effects)))
 
     @property
     def symmetry(self) -> Symmetry:
@@ -353,16 +354,19 @@ class Board:
         )
 
     def table(self) -> dict[str, Any]:
-        """The table of its card; raises InputError if a quantity has a density that no card can state."""
+        """The table of its card; raises InputError if an attribute is of a type or a density that no card can state."""
+        wrong_types = attribute_faults(self)
+        if wrong_types:
+            raise InputError(wrong_types)
         stated_parameters = [
             parameter
             for parameter in self.parameters
             if parameter.owner == BOARD_OWNER and not parameter.is_of_effect and not parameter.is_assumed
         ]
         inputs = {parameter.name: parameter.prior for parameter in stated_parameters}
-        faults = [*unstatable_faults(self)]
-        if faults:
-            raise InputError(faults)
+        unstatable = [*unstatable_faults(self)]
+        if unstatable:
+            raise InputError(unstatable)
         poisson_xy = inputs.pop("poisson_xy", None)
         material = {name: getattr(self, name) for name in ("isotropic", "shear_xz", "shear_yz")}
         keys = BoardKeys.model_construct(

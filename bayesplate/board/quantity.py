@@ -56,6 +56,15 @@ class Quantity(ProbabilityDensity):
 
     def _faults(self) -> Iterator[Fault]:
         """Faults of values that make no quantity."""
+        no_numbers = [
+            Fault(name, "a number", repr(value))
+            for name, values in self._numbers().items()
+            for value in values
+            if not _is_number(value)
+        ]
+        if no_numbers:
+            yield from no_numbers
+            return
         if self.kind not in get_args(DensityKind):
             yield Fault("kind", ", ".join(get_args(DensityKind)), repr(self.kind))
         if not math.isfinite(self.mean):
@@ -72,6 +81,13 @@ class Quantity(ProbabilityDensity):
         for places in (self.at_x, self.at_y):
             if places and len(places) != len(self.readings):
                 yield Fault("places", f"one per reading ({len(self.readings)})", f"{len(places)}")
+
+    def _numbers(self) -> dict[str, tuple[object, ...]]:
+        """Everything in it that must be a number, by the name of its attribute."""
+        single_names = ("mean", "sd", "lower", "upper", "resolution", "place_sd")
+        return {name: (getattr(self, name),) for name in single_names} | {
+            "readings": self.readings, "at_x": self.at_x, "at_y": self.at_y
+        }  # fmt: skip
 
     @classmethod
     def exact(cls, value: float) -> Quantity:
@@ -144,9 +160,14 @@ class Quantity(ProbabilityDensity):
         place_sd : float
             See the class.
         """
-        stated_readings: object = readings
-        if isinstance(stated_readings, str) or not isinstance(stated_readings, Iterable):
-            raise InputError(Fault("readings", "a list or an array of numbers", repr(readings)))
+        stated_lists: dict[str, object] = {"readings": readings, "at_x": at_x, "at_y": at_y}
+        faults = [
+            Fault(name, "a list or an array of numbers", repr(stated))
+            for name, stated in stated_lists.items()
+            if isinstance(stated, str) or not isinstance(stated, Iterable) or np.ma.is_masked(stated)
+        ]
+        if faults:
+            raise InputError(faults)
         values = tuple(_number("readings", value) for value in readings)
         if not values:
             raise InputError(Fault("readings", "at least one", "none"))
@@ -186,7 +207,7 @@ class Quantity(ProbabilityDensity):
             values = np.asarray(stated)
         except ValueError:  # rows of different lengths
             values = np.asarray(None)
-        if values.dtype.kind not in "iuf":
+        if values.dtype.kind not in "iuf" or np.ma.is_masked(stated):
             raise InputError(Fault("quantity", "a number, an array of readings or a Quantity", repr(stated)))
         if not np.isfinite(values).all():
             raise InputError(Fault("quantity", "finite numbers", repr(stated)))
@@ -225,9 +246,14 @@ class Quantity(ProbabilityDensity):
         )
 
 
-def _number(place: str, value: object) -> float:
-    """A number as such; raises InputError for a text, a truth value and an array."""
+def _is_number(value: object) -> bool:
+    """Whether a value is a number: no text, no truth value, no array of several."""
     is_scalar = isinstance(value, np.ndarray) and not value.ndim and value.dtype.kind in "iuf"
-    if isinstance(value, bool) or not (is_scalar or isinstance(value, Real)):
+    return not isinstance(value, bool) and (is_scalar or isinstance(value, Real))
+
+
+def _number(place: str, value: object) -> float:
+    """A number as such; raises InputError for anything else."""
+    if not _is_number(value):
         raise InputError(Fault(place, "a number", repr(value)))
     return float(value)  # type: ignore[arg-type]

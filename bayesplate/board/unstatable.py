@@ -1,19 +1,40 @@
-"""Quantities of a board made in Python that no card can state."""
+"""What a board made in Python holds that no card can state: values of the wrong type, and other densities."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bayesplate.board.board_keys import WARPS
 from bayesplate.board.density import DensityKind
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import NOISE_WANTED, Setup
-from bayesplate.errors import Fault
+from bayesplate.errors import Fault, printable
 
 if TYPE_CHECKING:
     from bayesplate.board.board import Board
+
+
+def attribute_faults(board: Board) -> list[Fault]:
+    """A fault for every attribute of a board, of its setups and of their parts that is of another type than it says."""
+    from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+    config = ConfigDict(arbitrary_types_allowed=True, revalidate_instances="always")
+    boards: Any = list[type(board)]  # type: ignore[misc]
+    try:
+        TypeAdapter(boards, config=config).validate_python([board], strict=True)
+    except ValidationError as error:
+        return [
+            Fault(
+                "board" + "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in detail["loc"][1:]),
+                detail["msg"].removeprefix("Input should be "),
+                printable(repr(detail["input"]))[:60],
+            )
+            for detail in error.errors(include_url=False)
+            if not isinstance(detail["input"], str) or detail["type"] != "literal_error"  # a card refuses the word
+        ]
+    return []
 
 
 def unstatable_faults(board: Board) -> Iterator[Fault]:

@@ -259,7 +259,7 @@ def read_text(value: object) -> str:
         raise Refusal(Complaint("a text in quotes", show_value(value)))
     if len(value) > 4000:
         raise Refusal(Complaint("a text of at most 4000 characters", f"{len(value)} characters"))
-    if re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", value):
+    if re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]", value):
         raise Refusal(Complaint("a text without control characters", quote_text(value)))
     return value
 

@@ -65,6 +65,8 @@ def _toml_key(key: str) -> str:
 
 def write_card(path: Any, name: str, content: str, *, force: bool) -> None:
     """Write a card to NAME.toml, completely or not at all; raises InputError where it may not or cannot be."""
+    if not isinstance(path, str | os.PathLike):
+        raise InputError(Fault("path", f"{name}.toml, or a path to it", repr(path)))
     path = Path(path)
     shown_path = printable(str(path))
     if path.name != f"{name}.toml":

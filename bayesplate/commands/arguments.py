@@ -125,7 +125,7 @@ def refusal_of(wanted: str, value: object, remedy: str = "") -> Refusal:
 
 def value_text(value: object) -> str:
     """A value as Python writes it."""
-    return repr(value) if value is None or isinstance(value, bool) else show_value(value)
+    return repr(value) if value is None or isinstance(value, bool | tuple) else show_value(value)
 
 
 def optional_reader(read: Reader) -> Reader:
@@ -190,13 +190,14 @@ def read_bool(value: object) -> bool:
     return value
 
 
-def word_reader(*words: str) -> Reader:
-    """A reader of one word of several, or None."""
+def word_reader(*words: str | None) -> Reader:
+    """A reader of one word of several, of which the last may be None."""
+    *first, last = (quote_text(word) if word else "None" for word in words)
 
     def read(value: object) -> object:
-        if value is not None and value not in words:
-            hint = did_you_mean(value, words) if isinstance(value, str) else ""
-            raise refusal_of(f"{', '.join(map(quote_text, words))} or None", value, hint)
+        if not isinstance(value, str | None) or value not in words:
+            hint = did_you_mean(value, [word for word in words if word]) if isinstance(value, str) else ""
+            raise refusal_of(f"{', '.join(first)} or {last}", value, hint)
         return value
 
     return read

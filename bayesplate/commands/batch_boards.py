@@ -64,7 +64,7 @@ def list_boards(
 def _folder_boards(folder: Path) -> tuple[list[BatchBoard], tuple[str, ...]]:
     """The board cards of a folder; priors, campaigns, coefficient tables and what `pick` writes are left aside."""
     try:
-        files = sorted(name for name in os.listdir(folder) if name.endswith(".toml"))
+        files = sorted(name for name in os.listdir(folder) if name.lower().endswith(".toml"))
     except OSError as error:
         raise InputError(Fault(printable(str(folder)), "a readable folder", error.strerror or str(error))) from None
     boards, other_cards = [], []
@@ -74,7 +74,7 @@ def _folder_boards(folder: Path) -> tuple[list[BatchBoard], tuple[str, ...]]:
         if is_other_card or content.keys() == {"setup"}:
             other_cards.append(printable(file))
         else:
-            name = printable(file.removesuffix(".toml"))
+            name = printable(file[: -len(".toml")])
             boards.append(BatchBoard(name, partial(_read_folder_card, folder, file), alike=_matrix_key(content)))
     if not boards:
         raise InputError(Fault(printable(str(folder)), "a folder with board cards (NAME.toml)", "none in it"))

@@ -58,7 +58,7 @@ class FitRequest:
 _REQUEST_READERS = {
     "seed": integer_reader(0),
     "effects": effects_reader("effects"),
-    "law": word_reader(*get_args(LawName)),
+    "law": word_reader(*get_args(LawName), None),
     "robust": read_bool,
 }
 

@@ -108,9 +108,12 @@ def _costs_from_text(context: click.Context, option: click.Parameter, costs: tup
     for text in costs:
         name, _, minutes = text.partition("=")
         try:
-            minutes_by_class[name.strip()] = float(minutes)
+            stated_minutes = float(minutes)
         except ValueError:
             raise click.BadParameter(f"{text!r}: wanted CLASS=MINUTES, as reading=2", context, option) from None
+        if name.strip() in minutes_by_class:
+            raise click.BadParameter(f"{name.strip()} is given twice", context, option)
+        minutes_by_class[name.strip()] = stated_minutes
     return minutes_by_class or None
 
 
@@ -168,7 +171,7 @@ SetupFile = Annotated[
 ]
 Law = Annotated[
     LawName | None,
-    Key(word_reader(*get_args(LawName))),
+    Key(word_reader(*get_args(LawName), None)),
     OptionGroup(
         _law_from_flags,
         linear=Option("--linear", is_flag=True, help="Force the linear frequency law."),
@@ -186,7 +189,7 @@ Resume = Annotated[bool, _BOOL, Option("--resume", is_flag=True, help="Continue 
 OnProgress = Annotated[Callable[[Progress], None] | None, Key(read_function)]
 CoefficientChoice = Annotated[
     CoefficientSource | None,
-    Key(word_reader(*get_args(CoefficientSource))),
+    Key(word_reader(*get_args(CoefficientSource), None)),
     Option(
         "--coefficients",
         type=click.Choice(get_args(CoefficientSource)),
@@ -195,7 +198,7 @@ CoefficientChoice = Annotated[
 ]
 Goal = Annotated[
     str | None,
-    Key(word_reader(*GOALS)),
+    Key(word_reader(*GOALS, None)),
     Option("--for", metavar="WHAT", help="E_x, E_y, G_xy, constants or explanations."),
 ]
 Minutes = Annotated[

@@ -39,10 +39,10 @@ from bayesplate.errors import Fault, InputError, NotIdentifiableError, printable
 from bayesplate.files import make_folder, require_new_files, write_text
 from bayesplate.recordings.contract import LabelChance, PickedRow, PickReport
 from bayesplate.recordings.picking import HIGHEST, LOWEST, PickedModes, pick_modes
-from bayesplate.recordings.reading import read_recordings
+from bayesplate.recordings.reading import READERS, read_recordings
 from bayesplate.recordings.sand import read_picture
 from bayesplate.recordings.signals import Recording
-from bayesplate.recordings.sweeps import impulse_response, read_sweep, sweep_band
+from bayesplate.recordings.sweeps import impulse_response, read_sweep, require_sweep, sweep_band
 from bayesplate.recordings.taking import TakenSpectra, take_impulses, take_spectra
 from bayesplate.results.contract import json_text
 from bayesplate.results.folder import FIGURES_FOLDER
@@ -206,13 +206,14 @@ def _impulse_responses(
             [Fault(name, wanted, "another kind of file", "leave --sweep out for hits") for name in wrong_files]
         )
     sweep_signals: list[Floats]
-    if not os.path.exists(sweep):
+    if not os.path.exists(sweep) and Path(sweep).suffix.lower() not in READERS:
         exponential_sweep = read_sweep(sweep)
         sweep_signals = [exponential_sweep.signal(recording.rate) for recording in recordings]
     else:
         ((sweep_recording, *_),) = read_recordings([sweep], was_played=True)
         if not isinstance(sweep_recording, Recording):
             raise InputError(Fault(printable(sweep), "a recording of the sweep", "a frequency response"))
+        require_sweep(sweep_recording)
         mismatched = [
             recording for recording in recordings if abs(recording.rate / sweep_recording.rate - 1.0) > _RATE_TOLERANCE
         ]

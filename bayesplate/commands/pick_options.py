@@ -210,7 +210,7 @@ Channels = Annotated[str, Key(_read_channels), Option("--channels", show_default
 MotionWord = Annotated[Motion, Key(word_reader(*MOTIONS)), Option("--motion", show_default=True, help=_MOTION_HELP)]
 Polarity = Annotated[
     str | None,
-    Key(word_reader("same", "opposite")),
+    Key(word_reader("same", "opposite", None)),
     Option("--polarity", help="same or opposite, of force and response (default: found by the labels)."),
 ]
 SweepOption = Annotated[

@@ -10,7 +10,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
-from types import ModuleType
+from types import FrameType, ModuleType
 from typing import Any, TypeVar
 
 from bayesplate.errors import Fault, InputError
@@ -46,7 +46,7 @@ def compute_calls(free: list[Executor], calls: Iterable[tuple[CallKey, Call]]) -
         while not free:
             yield from finished_calls()
         executor = free.pop()
-        with _hide_script():
+        with _hide_script(), _hold_interruptions():
             try:
                 future = executor.submit(function, *arguments)
             except BrokenExecutor:  # it died since its last call
@@ -99,6 +99,32 @@ def _hide_script() -> Iterator[None]:
         yield
     finally:
         sys.modules["__main__"] = script
+
+
+@contextmanager
+def _hold_interruptions() -> Iterator[None]:
+    """Let a process start whole and never be interrupted: it inherits the mask, and what comes meanwhile comes after.
+
+    Other threads do not have the mask, so that the handler waits too.
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    if not (
+        hasattr(signal, "pthread_sigmask")
+        and callable(handler)
+        and threading.current_thread() is threading.main_thread()
+    ):
+        yield
+        return
+    held: list[tuple[int, FrameType | None]] = []
+    signal.signal(signal.SIGINT, lambda number, frame: held.append((number, frame)))
+    earlier_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, earlier_mask)
+        signal.signal(signal.SIGINT, handler)
+    if held:
+        handler(*held[0])
 
 
 @contextmanager

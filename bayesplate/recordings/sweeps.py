@@ -37,6 +37,9 @@ _LOOK_SPAN, _LOUD_SHARE, _CLEAR_RATIO = 1.0, 1e-3, 30.0
 loudest one, and over the median at the same frequency."""
 _LATE_TIME, _MOST_LATE = 0.06, 0.16
 """s by which a frequency may differ in time from the others, and the share of frequencies that may differ by more."""
+_RISING_SHARE, _LEAST_RANGE, _MOST_FLUCTUATION = 0.9, 2.0, 20.0
+"""Least share of the time in which the frequency of what was played rises, the least ratio of its last frequency to its
+first, and the largest sum of the rises and falls of its level, dB, less the difference between its ends."""
 _MEDIAN_SQUARE = 0.455
 """Median of the square of a normal variable over its mean."""
 _POWER_FLOOR = 1e-4
@@ -83,6 +86,26 @@ def sweep_band(played: Floats, rate: float) -> tuple[float, float]:
         np.searchsorted(power, power[-1] * np.array([_OUTSIDE_SHARE, 1.0 - _OUTSIDE_SHARE])) * rate / played.size
     )
     return float(first), float(last)
+
+
+def require_sweep(played: Recording) -> None:
+    """Refuse a recording that cannot have been played: no sweep, or what a board or a room made of one."""
+    from scipy.signal import stft
+
+    n = round(_ONSET_SPAN * played.rate)
+    hertz, _, lines = stft(played.response, played.rate, nperseg=n, noverlap=0, boundary=None, padded=False)
+    power = np.abs(lines) ** 2
+    total = power.sum(axis=0)
+    is_loud = total > _POWER_FLOOR * total.max()
+    peaks, level = hertz[power[:, is_loud].argmax(axis=0)], 10.0 * np.log10(total[is_loud])
+    got = ""
+    if peaks.size < 3 or np.mean(np.diff(peaks) >= 0.0) < _RISING_SHARE or peaks[-1] < _LEAST_RANGE * peaks[0]:
+        got = "its frequency does not rise from beginning to end"
+    elif (fluctuation := np.abs(np.diff(level[1:-1])).sum() - abs(level[-2] - level[1])) > _MOST_FLUCTUATION:
+        got = f"its level goes up and down by {fluctuation:.0f} dB: it was recorded, not played"
+    if got:
+        remedy = "--sweep with the file that was played, or its frequencies and seconds"
+        raise InputError(Fault(played.name, "a sweep, as it was played", got, remedy))
 
 
 def impulse_response(recording: Recording, played: Floats, highest: float) -> tuple[Recording, Hit]:

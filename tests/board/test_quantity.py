@@ -168,6 +168,7 @@ def test_another_unit_changes_all_but_the_places_and_keeps_the_density():
     np.testing.assert_allclose(bounded.scaled(1e-3).log_prior(z), bounded.log_prior(z), rtol=1e-12)
 
 
+MASKED = np.ma.masked_greater([1.0, 2.0], 1.5)
 NO_QUANTITIES = [
     (lambda: Quantity(math.nan), "mean: wanted a finite number, got nan"),
     (lambda: Quantity(-1.0, 1.0), "mean: wanted a positive number for a log-normal quantity, got -1"),
@@ -182,6 +183,11 @@ NO_QUANTITIES = [
     (lambda: Quantity.from_readings([1.0, 2.0], resolution=-1), "resolution: wanted a finite number, zero or pos"),
     (lambda: Quantity.from_readings([1.0, math.inf]), "readings: wanted finite numbers"),
     (lambda: Quantity.from_readings("12"), "readings: wanted a list or an array of numbers, got '12'"),
+    (lambda: Quantity("a"), "mean: wanted a number, got 'a'"),
+    (lambda: Quantity(1.0, readings=(None,)), "readings: wanted a number, got None"),
+    (lambda: Quantity.from_readings([1.0, 2.0], at_x=3), "at_x: wanted a list or an array of numbers, got 3"),
+    (lambda: Quantity.from_readings(MASKED), "readings: wanted a list or an array of numbers, got masked_array"),
+    (lambda: Quantity.of(MASKED), "quantity: wanted a number, an array of readings or a Quantity, got masked_array"),
     (lambda: Quantity.exact([1.0]), r"value: wanted a number, got \[1.0\]"),
     (lambda: Quantity.of([[1.0], [1.0, 2.0]]), "quantity: wanted a number, an array of readings or a Quantity"),
     (lambda: Quantity.exact(1.0).scaled(0), "factor: wanted a positive number, got 0"),

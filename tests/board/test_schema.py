@@ -361,6 +361,8 @@ def test_nothing_else_is_a_label():
     for text in NO_LABELS:
         with pytest.raises(InputError, match=re.escape(f'mode label: wanted {GRAMMAR}, got "')):
             Label.parse(text)
+    with pytest.raises(InputError, match="got 5"):
+        Label.parse(5)
 
 
 EITHER = "wanted all of E_x, E_y, G_xy or all of D_x, D_y, D_s"

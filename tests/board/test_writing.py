@@ -300,6 +300,24 @@ def test_what_no_card_can_state_is_refused():
         assert_said(str(refused.value).splitlines(), [said])
 
 
+def test_attributes_of_wrong_types_are_refused_together():
+    first = whole().setups[0]
+    board = replace(whole(), title=3, warp=None, setups=(replace(first, readings=[1], ends_x="free"), first.noise))
+
+    with pytest.raises(InputError) as refused:
+        board.to_toml()
+
+    assert_said(
+        str(refused.value).splitlines(),
+        ["board.setups[0].ends_x: wanted a valid tuple, got 'free'",
+         "board.setups[0].readings: wanted a valid tuple, got [1]",
+         "board.setups[1]: wanted an instance of Setup, got…", "board.title: wanted a valid string, got 3",
+         "board.warp: wanted a valid dictionary, got None"],
+    )  # fmt: skip
+    with pytest.raises(InputError, match=r"path: wanted whole\.toml, or a path to it, got 3"):
+        whole().to_toml(3)
+
+
 PLACES = [
     ("whole.toml", False, r"wanted a new file, got one that exists \(force=True replaces it\)"),
     ("other.toml", True, "wanted whole.toml, the name of the card, got other.toml"),

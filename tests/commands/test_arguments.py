@@ -66,7 +66,7 @@ BAD = [
      "thickness: wanted a n"),
     (bayesplate.new, {"sizes": [1], "edges": None}, "edges: wanted a text, got None",
      "sizes: wanted a dict of numbers, got [1]"),
-    (bayesplate.fit, {"law": np.array(["linear", "x"])}, "law: wanted a plain value, got"),
+    (bayesplate.fit, {"law": np.array(["linear", "x"])}, 'law: wanted "linear", "exact" or None, got ndarray'),
     (bayesplate.batch, {"workers": 0, "table": "xls"}, "workers: wanted", "table: wanted"),
     (bayesplate.batch, {"grading": 3}, "a GradingRequest or None"),
     *((bayesplate.batch, {"grading": request}, said) for request, said in (

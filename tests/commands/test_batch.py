@@ -95,6 +95,7 @@ def test_a_link_out_of_the_folder_is_no_card_of_it(tmp_path):
     (folder / "b.toml").symlink_to(tmp_path / "b.toml")
     (folder / "c.toml").symlink_to(folder / "inner" / "c.toml")
     (folder / "d.toml").symlink_to(folder / "d.toml")  # to itself
+    (folder / "E.TOML").write_text(card_text("E"))
     read = {}
     for board in list_boards(folder, None)[0]:
         try:
@@ -102,7 +103,7 @@ def test_a_link_out_of_the_folder_is_no_card_of_it(tmp_path):
         except InputError as error:
             read[board.name] = str(error)
 
-    assert (read["a"], read["c"]) == ("a", "c")
+    assert (read["a"], read["c"], read["E"]) == ("a", "c", "E")
     assert read["b"] == (
         "b.toml: wanted a card in the folder of the batch, got a link that leads out of it (copy the card)"
     )
@@ -271,6 +272,29 @@ def test_a_worker_that_dies_takes_no_other_board_with_it_and_none_runs_the_scrip
     (said,) = done.stdout.splitlines()
     died, failed = "WorkerDied('the worker ended without an answer: killed", "ValueError("
     assert [said.startswith(f"1 {died}"), f" 3 {failed}" in said] == [True, True]
+
+
+INTERRUPTED = """
+import os, signal, threading
+from bayesplate.commands.workers import compute_calls, worker_processes
+signal.signal(signal.SIGINT, signal.default_int_handler)
+try:
+    with worker_processes(1) as free:
+        threading.Timer(0.2, os.killpg, (0, signal.SIGINT)).start()
+        list(compute_calls(free, iter([(0, (abs, (-1,)))])))
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="needs a group of processes")
+def test_an_interruption_while_workers_start_ends_all_without_a_word(tmp_path):
+    """The terminal sends it to all of them, also to one that is still importing."""
+    program = [sys.executable, "-c", INTERRUPTED]
+    source = {"cwd": tmp_path, "env": {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}}
+    done = subprocess.run(program, capture_output=True, text=True, check=False, start_new_session=True, **source)
+
+    assert (done.stdout, done.stderr, done.returncode) == ("interrupted\n", "", 0)
 
 
 TABLE = """name,thickness_mm,mass_g,mass_g sd,"(0,0)","(0,1)","(1,0)","(1,1)","clamped (0,2)"

@@ -17,6 +17,7 @@ import bayesplate
 from bayesplate.cli import main
 from bayesplate.commands.prepare import prepare
 from bayesplate.errors import InputError
+from bayesplate.recordings.sweeps import Sweep
 
 TRUTH = {"E_x": E_X, "E_y": E_Y, "G_xy": G_XY}
 HIGHEST = 430.0
@@ -103,6 +104,33 @@ def test_places_and_masses_that_its_card_cannot_have_are_refused_before_anything
             bayesplate.pick(["a.wav", "b.wav"], card=tmp_path / "planted.toml", **given)
         for told, fault in zip(caught.value.faults, faults, strict=True):
             assert str(told).startswith(fault)
+
+
+def test_a_sweep_is_given_by_its_file_as_by_its_numbers_and_no_other_file_stands_for_it(tmp_path):
+    rate, sweep = 4000.0, Sweep(20.0, 900.0, 4.0)
+    times = np.arange(round(2.0 * rate)) / rate
+    poles = 2.0 * np.pi * (-board().hertz * board().damping + 1j * board().damped)
+    impulse = board().residues((0.02, 0.02), SENSOR) @ np.imag(np.exp(poles[:, None] * times))
+    response = np.convolve(sweep.signal(rate), impulse)
+    response = response + 1e-3 * np.abs(response).max() * np.random.default_rng(1).standard_normal(response.size)
+    heard = write_wav(tmp_path / "heard.wav", rate, response)
+    played = write_wav(tmp_path / "played.wav", rate, sweep.signal(rate))
+
+    by_file, by_numbers = (
+        bayesplate.pick([heard], sweep=which, motion="displacement", highest=HIGHEST).summary.likely
+        for which in (str(played), "20,900,4")
+    )
+
+    assert len(by_numbers) >= 5
+    np.testing.assert_allclose([peak.hz for peak in by_file], [peak.hz for peak in by_numbers], rtol=1e-4)
+    for which, fault in (
+        (heard, "heard.wav: wanted a sweep, as it was played, got its level goes up and down by"),
+        (tmp_path / "nowhere.wav", "nowhere.wav: wanted a recording, got no such file"),
+        ("nowhere", "sweep: wanted F1,F2,SECONDS or a file"),
+    ):
+        with pytest.raises(InputError) as caught:
+            bayesplate.pick([heard], sweep=str(which), motion="displacement", highest=HIGHEST)
+        assert str(caught.value).startswith(fault)
 
 
 def test_a_fragment_of_another_name_is_one_more_setup_and_one_of_the_same_replaces_all_readings(tmp_path):

@@ -21,7 +21,7 @@ from scipy.io import wavfile
 
 from bayesplate.recordings.reading import read_recordings
 from bayesplate.recordings.signals import Recording
-from bayesplate.recordings.sweeps import Sweep, impulse_response, read_sweep, sweep_band
+from bayesplate.recordings.sweeps import Sweep, impulse_response, read_sweep, require_sweep, sweep_band
 from bayesplate.recordings.taking import take_spectra
 
 RATE = 6000
@@ -229,6 +229,20 @@ def test_a_sweep_that_was_not_played_is_refused():
 
     said = "s.wav: wanted the response to this sweep, got no impulse when it is turned back"
     assert [said in refusal(impulse_response, *case, 700.0) for case in cases] == [True] * 4
+
+
+def test_only_what_was_played_is_taken_for_the_sweep():
+    """Faded, silence around it, and turned down by 6 dB an octave; not what a board made of it, nor a tap or hiss."""
+    played, rng = SWEPT.signal(3000.0), np.random.default_rng(1)
+    fade = np.minimum(1.0, np.arange(played.size) / 600.0)
+    quiet = 1e-3 * rng.standard_normal(4000)
+    for sweep in (played, played * fade * fade[::-1], np.concatenate([quiet, played, quiet]), np.cumsum(played)):
+        require_sweep(Recording("s.wav", 3000.0, sweep))
+
+    for other in (swept(played).response, swept(played, 0.0).response):
+        assert "its level goes up and down by " in refusal(require_sweep, Recording("s.wav", 3000.0, other))
+    for other in (swept(np.eye(1, 9000, 900)[0]).response, rng.standard_normal(9000), played[::-1], played[:1500]):
+        assert "its frequency does not rise" in refusal(require_sweep, Recording("s.wav", 3000.0, other))
 
 
 def test_a_sweep_that_hardly_raises_high_modes_is_known_in_noise():
