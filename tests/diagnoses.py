@@ -152,8 +152,8 @@ def diagnosis(
     elastic = {name: spread(one.after) for name, one in SHIFT.items()}
     sizes = {"clamped": {name: {"tension": spread(120.0, "N/m")} for name in refitted}}
     finalist = Finalist(
-        effects=refitted, probability=0.97, in_sample_rms_cents=4.25, leave_one_out_rms_cents=9.5, elastic=elastic,
-        sizes=sizes,
+        effects=refitted, forms={}, probability=0.97, in_sample_rms_cents=4.25, leave_one_out_rms_cents=9.5,
+        elastic=elastic, sizes=sizes,
     )  # fmt: skip
     return Diagnosis(
         name="a-board",

@@ -28,6 +28,7 @@ from bayesplate.diagnosis.result import (
 )
 from bayesplate.diagnosis.search import LEAST_P_VALUE, SearchResult
 from bayesplate.diagnosis.sensitivity import PRIOR_WIDTH_FACTORS, draw_constants, vary_priors
+from bayesplate.diagnosis.sizes import likely_forms
 from bayesplate.diagnosis.stated import StatedClaim
 from bayesplate.diagnosis.verdict import (
     Explanation,
@@ -317,6 +318,7 @@ def _nearest_sentence(case: Case, explanation: Explanation, summary: Summary) ->
 def _finalist(case: Case, explanation: Explanation, summary: Summary) -> Finalist:
     return Finalist(
         effects=explanation.members,
+        forms={form.effect: form.detail for form in likely_forms(case.result, explanation.index) if form.detail},
         probability=explanation.support,
         in_sample_rms_cents=summary.error.in_sample_rms_cents,
         leave_one_out_rms_cents=left_out_rms_cents(summary, case.carrying_modes),

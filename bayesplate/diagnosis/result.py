@@ -76,6 +76,7 @@ class Finalist:
     """An explanation that was fitted again: its errors, its constants (Pa) and its sizes, by the sampler."""
 
     effects: tuple[str, ...]
+    forms: Mapping[str, str]  # of effects that were tried in several: the most probable place, direction or sign
     probability: float
     in_sample_rms_cents: float
     leave_one_out_rms_cents: float | None

@@ -9,7 +9,7 @@ from bayesplate.board.board import Board
 from bayesplate.board.parameter import display_unit
 from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.draws import draw_terms, standard_sizes_of
-from bayesplate.diagnosis.forms import with_forms, with_labels_exchanged
+from bayesplate.diagnosis.forms import Form, with_forms, with_labels_exchanged
 from bayesplate.diagnosis.search import SearchResult
 
 LIMIT_PROBABILITY = 0.005
@@ -32,13 +32,18 @@ def likely_form(result: SearchResult, index: int, member: int) -> int:
     return int(np.argmax(np.bincount(table.form[cells], weights=result.cells(index), minlength=len(laws))))
 
 
+def likely_forms(result: SearchResult, index: int) -> list[Form]:
+    """The most probable form of each effect of a hypothesis."""
+    members = enumerate(result.ground.members(index))
+    return [candidate.laws[likely_form(result, index, member)].form for member, candidate in members]
+
+
 def refit_board(result: SearchResult, index: int) -> Board:
     """The board under a hypothesis: with its effects declared in their most probable forms, or two labels exchanged."""
     hypothesis, board = result.ground.hypotheses[index], result.ground.baseline.board
     if hypothesis.swap is not None:
         return with_labels_exchanged(board, hypothesis.swap.first, hypothesis.swap.second)
-    members = enumerate(result.ground.members(index))
-    return with_forms(board, [candidate.laws[likely_form(result, index, member)].form for member, candidate in members])
+    return with_forms(board, likely_forms(result, index))
 
 
 def size_at_limit(result: SearchResult, index: int) -> str:

@@ -217,7 +217,7 @@ def _size_words(amplitude: Amplitude | None) -> str | None:
     texts = (rounded_texts(factor * value, factor * spread)[0] for value in quantiles)
     low, middle, high = (text.replace("\N{NARROW NO-BREAK SPACE}", "") for text in texts)  # a line may end there
     range_ = " (fixed)" if amplitude.q05 == amplitude.q95 else f" ({low} to {high})"
-    return f"{amplitude.parameter} {middle} {unit}".rstrip() + range_
+    return f"{amplitude.parameter} {middle} {unit}".rstrip() + f"{range_} {amplitude.form}".rstrip()
 
 
 def before_after_table(diagnosis: Diagnosis) -> Table:
@@ -251,7 +251,8 @@ def _every_size(finalist: Finalist) -> Iterator[tuple[str, str, str, Spread, flo
     for owner, effects in finalist.sizes.items():
         for effect, parameters in effects.items():
             for parameter, spread in parameters.items():
-                yield owner, effect_name(effect), parameter, spread, *display_unit(spread.unit)
+                words = f"{effect_name(effect)} {finalist.forms.get(effect, '')}".rstrip()
+                yield owner, words, parameter, spread, *display_unit(spread.unit)
 
 
 def write_diagnosis_tables(folder: Path, diagnosis: Diagnosis, title: str) -> tuple[Path, ...]:

@@ -23,7 +23,7 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.hypotheses import RELABELLING, Hypothesis, Swap
 from bayesplate.diagnosis.null_control import NullControl
 from bayesplate.diagnosis.search import SearchResult
-from bayesplate.diagnosis.sizes import size_at_limit, size_posterior
+from bayesplate.diagnosis.sizes import likely_forms, size_at_limit, size_posterior
 from bayesplate.diagnosis.terms import noise_grid
 from bayesplate.diagnosis.verdict import rank_explanations
 
@@ -157,6 +157,7 @@ def test_a_form_that_is_not_the_likelier_one_may_be_at_its_limit(base, share):
     found = found_by(weights / weights.sum())
     assert size_posterior(found, 1, 0, 1, 0)[0].sum() == pytest.approx(share)
     assert bool(size_at_limit(found, 1)) is (share > 0.5)
+    assert likely_forms(found, 1) == [(other if share > 0.5 else one).laws[0].form]
 
 
 def test_without_candidates_there_is_nothing_to_name(base):

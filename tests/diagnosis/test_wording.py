@@ -92,7 +92,7 @@ def test_the_json_has_the_names_and_the_order_of_the_contract():
     assert list(content["answers"][0]) == ["effects", "probability"]
     (finalist,) = content["finalists"]
     assert list(finalist) == [
-        "effects", "probability", "in_sample_rms_cents", "leave_one_out_rms_cents", "elastic", "sizes",
+        "effects", "forms", "probability", "in_sample_rms_cents", "leave_one_out_rms_cents", "elastic", "sizes",
     ]  # fmt: skip
     assert list(finalist["sizes"]["clamped"]["membrane_tension"]["tension"]) == spread
 
@@ -245,6 +245,13 @@ def test_sizes_have_the_units_of_people(unit, sizes, shown):
         assert dict(zip(table.columns, table.texts[0], strict=True))["size (90 %)"] == shown
 
 
+def test_the_size_of_an_effect_that_was_tried_at_several_places_has_the_likeliest():
+    size = Amplitude(parameter="mass", form="at 209, 28 mm", q05=1e-4, q50=8e-4, q95=1.8e-3, unit="kg")
+    table = candidates_table(replace(NAMED, candidates=(replace(TENSION, amplitude=size),)), narrow=True)
+    shown = dict(zip(table.columns, table.texts[0], strict=True))
+    assert shown["size (90 %)"] == "mass 0.80 g (0.10 to 1.80) at 209, 28 mm"
+
+
 def test_the_sizes_of_what_was_fitted_again():
     """The same effect alone and beside another has two sizes, which nobody could tell apart without the explanation."""
     assert sizes_table(NAMED).texts == (("membrane tension, clamped", "tension", "120 ± 12 N/m", "102 to 138 N/m"),)
@@ -257,6 +264,8 @@ def test_the_sizes_of_what_was_fitted_again():
         ("membrane tension and fluid loading", "membrane tension, clamped"),
         ("membrane tension", "membrane tension, clamped"),
     ]
+    placed = replace(alone, forms={"membrane_tension": "along x"})
+    assert sizes_table(replace(NAMED, finalists=(placed,))).texts[0][0] == "membrane tension along x, clamped"
 
 
 def test_errors_before_and_after_or_as_they_are():
