@@ -15,6 +15,25 @@
 densities and the frequencies that other samplers ask for; `fit`, `check`, `diagnose` and `plan` take a `Campaign` or
 its card too. Nothing is written unless `out=` names a folder.
 
+Where things are
+----------------
+board           what lies on the bench, and its card
+plate           how it rings: energies, and their eigenvalues (`plate.solve`)
+effects         what an ideal plate lacks, one file an effect
+frequencies     from constants to the frequencies of a setup (`frequencies.model`), and the errors of readings
+estimates       least squares, the paper's methods, warnings
+posterior       the likelihood and the priors (`posterior.target`), the draws of emcee (`posterior.sampling`)
+results         the summary of the draws, tables, files
+grading         many boards side by side
+diagnosis       from a residual to an effect: evidence, the verdict (`diagnosis.verdict`), the claim (`diagnosis.claim`)
+campaign        what several boards share
+planning        what to measure next
+recordings      hits, taps and sweeps to frequencies
+report          figures and pages
+commands        one file for each of the functions above
+
+A room imports only rooms before it (recordings only the plate), and its docstring is a map of its files.
+
 Glossary of symbols
 -------------------
 x, y            along and across the grain

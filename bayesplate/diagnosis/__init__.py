@@ -6,7 +6,7 @@ Shifts. The fit without a further effect (`baseline`), and what each effect woul
 Evidence. Normal `terms` at each level of noise sum to the evidence of `hypotheses`, and the `search` computes their
 probabilities. `draws` and `peaks` belong to each hypothesis; `joint` solves pairs of effects together. `sensitivity`
 varies the assumptions, `folds` leave one mode out, `null_control` repeats the search on simulated readings. `known`
-computes effects of known size without a search.
+computes effects of known size without a search, and `known_words` tells them.
 
 Decisions. The `sizes`, the `verdict`, the `claim` that an error is reduced, the same claim for `stated` effects, and
 wrong `readings`.

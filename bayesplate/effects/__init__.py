@@ -1,7 +1,8 @@
 """Effects that an ideal plate lacks: one protocol (`base.py`), one file per effect, and the library of them here.
 
 The list of effects is that of the words a card may use (`bayesplate.board.words.EFFECT_NAMES`); the file of an effect
-bears its name.
+bears its name. `clamps`, `gradients`, `attached_items` and `drives` are what two effects have in common, `part` is what
+of the board vibrates, `field_components` are those of an uncertain field, and `words` name effects in sentences.
 """
 
 from __future__ import annotations
