@@ -81,7 +81,7 @@ def show_check(report: CheckReport) -> Printout:
 
 def _next_after_check(n_doubts: int) -> str:
     """What to do once a card has no fault: what is in doubt comes first, for a fit would take it as it stands."""
-    fit = "bayesplate fit, with the same card"
+    fit = "bayesplate fit, with the same card and options"
     return f"Next: settle what is in doubt above; then {fit}" if n_doubts else f"Next: {fit}"
 
 

@@ -67,9 +67,9 @@ def test_check_shows_what_its_report_holds():
     assert len(check_tables(replace(REPORT, signatures=()))) == 2
     shown = show_check(REPORT)
     assert (shown.remarks, shown.warnings) == (("weak", "what cannot be seen"), ("noted",))
-    assert shown.closing == "exact law; nothing was sampled. Next: bayesplate fit, with the same card"
+    assert shown.closing == "exact law; nothing was sampled. Next: bayesplate fit, with the same card and options"
     doubted = show_check(replace(REPORT, n_doubts=1)).closing
-    assert doubted.endswith("Next: settle what is in doubt above; then bayesplate fit, with the same card")
+    assert doubted.endswith("Next: settle what is in doubt above; then bayesplate fit, with the same card and options")
 
 
 def test_of_a_campaign_one_board_in_doubt_is_enough():
