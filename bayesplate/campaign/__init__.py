@@ -1,12 +1,15 @@
 """Parameters that several boards share: given these the boards are independent, so that each is solved once and alone.
 
-One board. `shared` parameters set columns of each board; `conditional` is its density given them. `likelihood` is its
-likelihood of them, all of its own integrated out, by its `evidence`; a `normal_likelihood` is the same as a normal one,
-and `scatter` lets them differ between boards.
+One board. A `shared` parameter sets columns of each board; `conditional` is the density of one board given all of them.
+Its `likelihood` of them, all of its own integrated out, comes from its draws and their `evidence`; `normal_likelihood`
+is the normal approximation, and `scatter` lets the shared numbers differ from board to board. `boards` has each board
+alone, and under what the others teach.
 
-All boards. Their likelihoods `combined`; `boards` are each alone and under what the others teach; `learning` is the
-posterior of what they share, `population` the distribution of their constants.
+All boards. `combined` is the product of the boards' likelihoods, `learning` the posterior of what they share, and
+`population` the distribution of their constants.
 
-A shared cause. `common` residuals, the `search` for effects that all boards share, the `claim`, by boards left out.
-`summary`, `diagnosis` and `tables` hold the results.
+A shared cause. `common` pools the residuals of each mode over the boards, `search` looks for effects that all of them
+share, and `claim` judges these by boards left out.
+
+Results. `summary`, `diagnosis` and `tables`.
 """

@@ -1,8 +1,9 @@
-"""Effects that an ideal plate lacks: one protocol (`base.py`), one file per effect, and the library of them here.
+"""Effects that an ideal plate lacks: one protocol (`base.py`), one file for each effect, and the library of them here.
 
 The list of effects is that of the words a card may use (`bayesplate.board.words.EFFECT_NAMES`); the file of an effect
-bears its name. `clamps`, `gradients`, `attached_items` and `drives` are what two effects have in common, `part` is what
-of the board vibrates, `field_components` are those of an uncertain field, and `words` name effects in sentences.
+bears its name. `clamps`, `gradients` and `attached_items` are what several effects have in common, `drives` what an
+exciter is made of, `part` which part of the board vibrates, `field_components` the few directions of an uncertain
+thickness or width that matter, and `words` the names of effects in sentences. How to add one: CONTRIBUTING.md.
 """
 
 from __future__ import annotations

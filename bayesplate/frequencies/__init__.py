@@ -1,11 +1,12 @@
 """From constants and sizes to the frequencies of a setup, and to the errors of its readings.
 
-Frequencies. A `system` is a setup with its effects; `fabric` joins properties that several of them vary, and the
-weights of its `terms` follow from constants and sizes. The `model` of a setup holds its plate and two `laws`, the
-linear one (the paper's `columns` a, b, c) and the exact one; a `predictor` is ln f of all modes of a board with its
-tangent. `prior_bands` are the frequencies that a prior foretells.
+Frequencies. A `system` is a setup with its effects: its plate, and the weights of its `terms`, which follow from
+constants and sizes; where several effects vary one property, `fabric` multiplies their fields. A `model` solves the
+plate once, finds the labelled modes, and has two `laws` for omega^2: the linear one, by the energies of these modes,
+and the exact one, by eigenvalues of a reduced plate. `columns` are the paper's a, b, c. A `predictor` is ln f of all
+modes with its slopes, `prior_bands` the range of each frequency before anything is measured.
 
-Readings. `reading_errors` are noise, own error and rounding in one. `labels` are refused where no mode has them, a
-`spectrum` says where they contradict the modes, `peaks` without a label have a likelihood by `assignment`, and
-`residues` tell signs.
+Readings. The likelihood of a labelled reading, with its noise, own error and rounding, is in `reading_errors`; that of
+`peaks` without a label is summed over every `assignment` to modes. `labels` finds those that no mode can have,
+`spectrum` those that contradict the computed modes; `residues` say how strongly a mode responds, and with which sign.
 """

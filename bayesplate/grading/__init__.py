@@ -1,5 +1,5 @@
-"""Many fitted boards: rows, makers' figures, limits of a specification, pairs of boards that match.
+"""Many fitted boards side by side: makers' figures, limits of a specification, pairs that match.
 
-`boards` are the rows, `figures` those of makers, `matching` finds pairs and limits; `storage` is the journal and the
-table of a batch, and `tables` are for people.
+`boards` are the rows, `figures` what makers compute from constants, `matching` finds boards within limits and pairs;
+`storage` keeps the journal and the table of a batch, and `tables` are what people read.
 """

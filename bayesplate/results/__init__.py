@@ -1,8 +1,11 @@
-"""What a fit found, as types: the summary is a projection of the draws, and every table one of the summary.
+"""What a command found, as types, tables and files; the summary of a fit is computed from its draws and nothing else.
 
-`contract` has the parts of all results; `summary` is that of a fit, made by `summarise`, with its `modes`, its `budget`
-of uncertainty and its `references`. `methods` and their `comparison` are for several methods side by side, `checking`
-is for what no draw was needed for, `sheets` are for the modes of a board. The draws are an `archive` of ArviZ. `tables`
-are rendered by medium, on the terminal by `layout`; `fit_tables` and `command_tables` are what commands print, in
-`words`. A `folder` holds the files of a run.
+Types. `summary` is that of a fit, made by `summarise`, with its `modes`, the `budget` of its uncertainty and its
+`references`; `comparison` is that of several `methods`, `checking` that of a check, `sheets` the lowest modes.
+`contract` has the parts that all of them use. An `archive` holds the draws, for ArviZ.
+
+Tables. `tables` renders one for terminal, page, CSV or LaTeX, and `layout` fits it to a terminal; `fit_tables` and
+`command_tables` are those that commands print, in the `words` of all results.
+
+Files. A `folder` holds those of a run.
 """
