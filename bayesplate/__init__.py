@@ -19,20 +19,21 @@ Where things are
 ----------------
 board           what lies on the bench, and its card
 plate           how it rings: energies, and their eigenvalues (`plate.solve`)
-effects         what an ideal plate lacks, one file an effect
-frequencies     from constants to the frequencies of a setup (`frequencies.model`), and the errors of readings
-estimates       least squares, the paper's methods, warnings
+effects         what an ideal plate lacks, one file for each effect; CONTRIBUTING.md adds one
+frequencies     from constants to frequencies (`frequencies.model`), errors of readings (`frequencies.reading_errors`)
+estimates       least squares, the paper's methods (`estimates.percentile`), warnings
 posterior       the likelihood and the priors (`posterior.target`), the draws of emcee (`posterior.sampling`)
 results         the summary of the draws, tables, files
 grading         many boards side by side
-diagnosis       from a residual to an effect: evidence, the verdict (`diagnosis.verdict`), the claim (`diagnosis.claim`)
+diagnosis       from a residual to an effect: the verdict (`diagnosis.verdict`), the claim (`diagnosis.claim`)
 campaign        what several boards share
 planning        what to measure next
 recordings      hits, taps and sweeps to frequencies
 report          figures and pages
-commands        one file for each of the functions above
+commands        one file for each of the functions above, and what they share
 
-A room imports only rooms before it (recordings only the plate), and its docstring is a map of its files.
+A room imports only rooms before it (recordings only the plate), and its docstring is a map of its files. `cli`,
+`asking` and `terminal` are the command line; the other files beside the rooms serve all of them.
 
 Glossary of symbols
 -------------------
@@ -43,7 +44,7 @@ E_x, E_y        Young's moduli along and across the grain, Pa
 G_xy            in-plane shear modulus, Pa
 nu_xy, nu_yx    Poisson ratios, E_x nu_yx = E_y nu_xy
 D_x, D_y, D_s   rigidities, N m: D_x = E_x h^3 / (12 (1 - nu_xy nu_yx)), D_y likewise, D_s = G_xy h^3 / 3
-(m,n)           label of a mode: interior nodal lines crossed along x and along y, plus the laboratory's first label
+(m,n)           label of a mode: interior nodal lines crossed along x and along y, counted from the setup's first label
 a, b, c         the paper's modal coefficients: omega^2 = lambda (a D_x + b D_y + c D_s)
 lambda          1 / (rho h L_x^2 L_y^2)
 psi             omega^2 / lambda of a measured frequency, N m

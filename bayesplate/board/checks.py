@@ -245,7 +245,7 @@ def _assumption_remarks(board: Board) -> Iterator[Remark]:
     thickness = board.inputs["thickness"]
     yield (
         thickness.is_exact,
-        f"the thickness is taken as exact, and the moduli go with its third power; a caliper reads to {CALIPER:g} mm: "
+        f"the thickness is taken as exact, and 1 % of it is 3 % of the moduli; a caliper reads to {CALIPER:g} mm: "
         f"write thickness_mm = {{ mean = {1e3 * thickness.mean:g}, sd = {CALIPER:g} }}, or its readings",
     )
     plate: Mapping[str, Any] = {} if board.card is None else board.card.table["plate"]

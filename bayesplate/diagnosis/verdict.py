@@ -122,7 +122,9 @@ def decide_verdict(
     if stands_out(best, explanations):
         rivalry = find_rivals(result, best, variant_searches(result) if variants is None else variants)
         if not rivalry:
-            reason = f"{explanation_words(result, best)} has no rival within a factor 3, whatever is assumed"
+            reason = (
+                f"{explanation_words(result, best)} has no rival within a factor 3 under any assumption that was tried"
+            )
             return Verdict("named", best.members, best.index, best, reason, True, (best,))
         words, rivals = rivalry
         reason = f"{words} {alternatives_words(result, rivals)} may be as probable"

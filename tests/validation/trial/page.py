@@ -78,6 +78,7 @@ def in_short(summary: Mapping[str, Any]) -> str:
         known = limits[name]["share"]
         return "a share not known yet" if known is None else f"{100 * known:.1f} %"
 
+    n_missed = sum(not limit["met"] for limit in limits.values())
     right = "top-1, {}, 5 cents, 2x"
     sentences = (
         f"Of {sum(limit['n'] for limit in nothing)} simulated boards that lack nothing, an effect was named on "
@@ -88,7 +89,7 @@ def in_short(summary: Mapping[str, Any]) -> str:
         "Intervals of 90 % for the constants, averaged over the effects, hold the truth on "
         f"{share('constants after tracing, cantilever-6, 2x: 90 % intervals')}, those of the ideal plate on "
         f"{share('constants without tracing, cantilever-6, 2x: visibly worse')}{_held_outside(summary)}.",
-        f"{sum(not limit['met'] for limit in limits.values())} of {len(limits)} acceptance limits are missed.",
+        f"Of the {len(limits)} limits set for the trial {n_missed} are missed.",
     )
     return textwrap.fill(" ".join(sentences), 139, break_on_hyphens=False)
 
