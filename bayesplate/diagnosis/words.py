@@ -48,7 +48,8 @@ VERDICTS: dict[VerdictWord, VerdictMeaning] = {
     "unexplained": VerdictMeaning(
         "Something is missing that was not found",
         "The readings disagree with the model by more than their noise, and no effect that was tried explains "
-        "it. Check the labels, the sizes and the mass first; then look at the largest errors.",
+        "it. Check the labels, the sizes, the mass and the place of whatever is fixed to the board first; then look at "
+        "the largest errors.",
     ),
     "undetectable": VerdictMeaning(
         "These readings could not show it",
