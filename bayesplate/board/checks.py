@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import itertools
+import math
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
@@ -72,6 +73,7 @@ def board_remarks(board: Board, effects: Collection[str]) -> tuple[str, ...]:
             _thickness_remark(board, setup, effects),
             *_uncertainty_remarks(setup),
             _resolution_remark(setup),
+            *_close_pair_remarks(setup),
             *_repeated_peak_remarks(setup),
         ]
     return tuple(dict.fromkeys(sentence for is_said, sentence in rows if is_said))
@@ -181,11 +183,9 @@ def _label_checks(setup: Setup, section: str) -> Iterator[Check]:
     for label in setup.labels:
         holds = label.m >= first.m and label.n >= first.n
         yield f'{section} frequencies_hz."{label}"', holds, f"labels not below first_label, {first}", str(label), remedy
-    ascending = sorted((reading.frequency.mean, reading.label) for reading in setup.readings)
-    for (low, below), (high, above) in itertools.pairwise(ascending):
-        wanted = f"a rounding finer than the spacing of {below} and {above}, {high - low:g} Hz"
-        got, remedy = f"{setup.resolution:g} Hz", "these labels cannot be told apart"
-        yield f"{section} resolution_hz", high - low >= setup.resolution, wanted, got, remedy
+    lowest_hz = min((reading.frequency.mean for reading in setup.readings), default=math.inf)
+    wanted, got = f"a rounding below a quarter of the lowest frequency, {lowest_hz:g} Hz", f"{setup.resolution:g} Hz"
+    yield f"{section} resolution_hz", setup.resolution < lowest_hz / 4.0, wanted, got, "the step of the last digit"
 
 
 def _attached_place_checks(board: Board, setup: Setup, section: str) -> Iterator[Check]:
@@ -305,6 +305,17 @@ def _resolution_remark(setup: Setup) -> Remark:
         f"setup '{setup.name}': resolution_hz = {step:g} says that frequencies are rounded to multiples of "
         f"{step:g} Hz, and {examples} are none: state the step of the last digit that was read, or leave it out"
     )
+
+
+def _close_pair_remarks(setup: Setup) -> Iterator[Remark]:
+    """Two readings less than a rounding apart: one peak that was read twice, or two modes that their figures tell."""
+    ascending = sorted((reading.frequency.mean, reading.label) for reading in setup.readings)
+    for (low, below), (high, above) in itertools.pairwise(ascending):
+        yield (
+            high - low < setup.resolution,
+            f"setup '{setup.name}': {below} and {above} are less than the rounding of {setup.resolution:g} Hz apart: "
+            "their figures alone tell which is which, and that they are two",
+        )
 
 
 def _repeated_peak_remarks(setup: Setup) -> Iterator[Remark]:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.special import log_ndtr, ndtr, ndtri
 
 from bayesplate.arrays import Floats
+from bayesplate.errors import Fault, InputError
 
 DensityKind = Literal["normal", "log-normal", "log-uniform"]
 _OPEN_UNIT_INTERVAL = math.nextafter(0.0, 1.0), math.nextafter(1.0, 0.0)
@@ -213,8 +214,16 @@ class ProbabilityDensity:
         Returns
         -------
         array of the same shape, in the quantity's unit
+
+        Raises
+        ------
+        InputError
+            If a probability is below 0 or above 1.
         """
-        return self.value(self.standard_quantile(probability))
+        probabilities = np.asarray(probability, dtype=float)
+        if not ((probabilities >= 0.0) & (probabilities <= 1.0)).all():
+            raise InputError(Fault("probability", "numbers from 0 to 1", repr(probability)))
+        return self.value(self.standard_quantile(probabilities))
 
     def sample(self, rng: np.random.Generator, n: int) -> Floats:
         """Draws of the quantity: (n,) array in its unit."""

@@ -26,7 +26,7 @@ _SECTION_OF_KEY = {key: section for section in ("plate", "material") for key in 
 _MASS_KEYS = ("mass_g", "density_kg_m3")
 _UNLABELLED_KEYS = ("unlabelled_hz", "peaks")
 _LABEL_KEYS = ("signs", "label_confidence")
-_MODE_NAME = re.compile(r"(?:(?P<setup>[A-Za-z0-9._-]+) )?\((?P<m>\d{1,3}), ?(?P<n>\d{1,3})\)")
+_MODE_NAME = re.compile(r"(?:(?P<setup>[A-Za-z0-9._-]+) )?\( *(?P<m>\d{1,3}) *, *(?P<n>\d{1,3}) *\)")
 _SD_SUFFIX = " sd"
 _MOST_COLUMNS = 500
 

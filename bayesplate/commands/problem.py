@@ -278,7 +278,8 @@ def pose_all(problems: Sequence[Problem]) -> None:
         except NotIdentifiableError as error:
             if len(problems) == 1:
                 raise
-            failures.append(f"{problem.board.name}: {error}")
+            name = f"{problem.board.name}: "
+            failures.append(name + str(error).removeprefix(name))
     if failures:
         raise NotIdentifiableError("\n".join(failures))
 

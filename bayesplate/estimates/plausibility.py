@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from bayesplate.arrays import Floats
-from bayesplate.board.board import Board, board_density
+from bayesplate.board.board import Board, board_density, vibrating_lengths
 from bayesplate.board.material import RIGIDITIES
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.reading import NO_OFFSET, Reading
@@ -162,6 +162,8 @@ def _predict_readings(
 ) -> PriorPredictive | None:
     corrected, columns = mistake.corrected(values), []
     for setup, coefficients in zip(board.setups, products, strict=True):
+        if not all((length > 0.0).all() for length in vibrating_lengths(corrected, setup)):
+            return None
         weights = term_weights(corrected, setup).stiffness
         for reading in setup.readings:
             i, j = mistake.beams(reading, setup.first_label)

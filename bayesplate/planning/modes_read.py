@@ -143,6 +143,8 @@ def _expected_modes(explanation: ExplanationTerms, known_board: KnownBoard, law:
 
 _SIZE_QUANTILES = (0.03, 0.97)
 """Quantiles of a size over the terms at which the modes are solved besides its mean."""
+_NO_SIDE = 1e-9
+"""Standard deviations of a size below which it has no side."""
 _MOST_SHIFT = 0.4
 """A shift of ln f beyond which a mode has lost its name."""
 
@@ -164,10 +166,11 @@ def add_effects(
     for form in explanation.forms:
         mean = explanation.mean[form.rows]
         sizes, covariance = mean[:, form.columns], explanation.covariance[form.rows][:, form.columns, form.columns]
-        centre, narrow = sizes.mean(axis=0), np.sqrt(covariance.mean(axis=0))
+        bounds = np.array([parameter.prior.standard_bounds for parameter in form.parameters]).reshape(-1, 2).T
+        # normal terms may have their mean beyond a bound
+        centre, narrow = np.clip(sizes.mean(axis=0), *bounds), np.sqrt(covariance.mean(axis=0))
         low, high = np.quantile(sizes, _SIZE_QUANTILES, axis=0)
         ends = np.stack([np.minimum(low, centre - narrow), np.maximum(high, centre + narrow)])
-        bounds = np.array([parameter.prior.standard_bounds for parameter in form.parameters]).reshape(-1, 2).T
         reach = np.clip(ends, *bounds) - centre
         # regression of the constants on the sizes
         design = np.column_stack([np.ones(len(mean)), sizes - centre])
@@ -181,14 +184,28 @@ def add_effects(
         shift[form.rows] += solved[0]
         for j, column in enumerate(form.columns):
             sides, pair = reach[:, j], solved[1 + 2 * j : 3 + 2 * j] - solved[0]
-            # a straight line where a mode is followed to one side only
-            straight = pair[::-1] * (sides / sides[::-1])[:, None]
-            pair[:, :n] = np.where(np.isnan(pair), straight, pair)[:, :n]
-            linear, square = np.linalg.solve(np.column_stack([sides, sides**2]), pair)
+            linear, square = parabola_through(sides, pair, n)
             place = np.clip(sizes[:, j] - centre[j], *sides)[:, None]
             slope = linear + 2.0 * square * place
             shift[form.rows] += linear * place + square * place**2 - slope * sizes[:, j, None]
             slopes[form.rows, :, column] += slope
+
+
+def parabola_through(sides: Floats, pair: Floats, n_followed: int) -> tuple[Floats, Floats]:
+    """Linear and square coefficient of each column of a (2, n) pair of values at two sides of zero, where it is zero.
+
+    A straight line where a size is at its bound, so that it has one side only, and in the first `n_followed` columns
+    where a mode is followed to one side only; zero where a size has no side.
+    """
+    at_bound = np.abs(sides) < _NO_SIDE
+    if at_bound.all():
+        return np.zeros(pair.shape[1]), np.zeros(pair.shape[1])
+    sides = np.where(at_bound, -sides[::-1], sides)
+    pair = np.where(at_bound[:, None], -pair[::-1], pair)
+    straight = pair[::-1] * (sides / sides[::-1])[:, None]
+    pair[:, :n_followed] = np.where(np.isnan(pair), straight, pair)[:, :n_followed]
+    linear, square = np.linalg.solve(np.column_stack([sides, sides**2]), pair)
+    return linear, square
 
 
 def _form_shift(known_board: KnownBoard, law: BareLaw, form: FormTerms, sizes: Floats, constants: Floats) -> Floats:

@@ -178,6 +178,8 @@ class SlipSearch:
 
     def _fit_without(self, left_out: tuple[int, ...]) -> _Fit | None:
         """The plate fitted without some readings; None if the others do not determine all constants."""
+        if self.target.size - len(left_out) < self._starts[0].predict.n_constants:
+            return None
         start = min(self._starts, key=lambda fit: fit.variance(left_out)[0])
         fit = self._refit(start, left_out)
         return fit if fit.determines_constants(left_out) else None

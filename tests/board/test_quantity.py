@@ -150,6 +150,9 @@ def test_quantiles_far_out_in_a_tail_are_alike_on_both_sides():
         assert found == pytest.approx(-below.quantile(probability[::-1]), rel=1e-12)
         assert found[[0, -1]] == pytest.approx([bound, bound + 5.0], rel=1e-6)
         assert np.all(np.diff(found) > 0)
+    for outside in (-0.1, 1.1, np.nan):
+        with pytest.raises(InputError, match="probability: wanted numbers from 0 to 1"):
+            above.quantile([0.5, outside])
 
 
 def test_another_unit_changes_all_but_the_places_and_keeps_the_density():

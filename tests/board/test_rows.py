@@ -38,7 +38,7 @@ def columns(tmp_path: Path, header: str, card: str = CARD) -> TableColumns:
 
 HEADERS = [
     ('name,thickness_mm sd,"(1,1)"', CARD, 'column 2: wanted a column "thickness_mm" beside it, got "thickness_mm sd"'),
-    ('name,"(1,1)","(1, 1)"', CARD, 'column 3: wanted each column once, got "(1, 1)", which is "(1,1)" again'),
+    ('name,"(1,1)","( 1 , 1 )"', CARD, 'column 3: wanted each column once, got "( 1 , 1 )", which is "(1,1)" again'),
     ('name,"free (1,1)"', CARD, '(the template has no setup of a name: write the label alone, "(1,1)")'),
     ('name,"(1,1)"', TWICE, '(the setups of the template are "one", "two": write the name of one)'),
     ('name,"(1,1)"', READ, "(the template): wanted no reading that has no column in the table, got (3,0), (1,2), "

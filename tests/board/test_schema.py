@@ -135,8 +135,8 @@ FAULTS = [
      '[setup] frequencies_hz."(1,0)": wanted labels not below first_label, (2,0), got (1,0) (first_label = [1, 0]?)',
      '[setup] frequencies_hz."(1,1)": wanted labels not below first_label, (2,0), got (1,1) (first_label = [1, 0]?)'),
     ("resolution_hz = 1\n", "resolution_hz = 0\n", "[setup] resolution_hz: wanted a positive number, got 0"),
-    ("resolution_hz = 1\n", "resolution_hz = 50\n", "[setup] resolution_hz: wanted a rounding finer than the spacing"
-     " of (1,0) and (1,1), 46.3333 Hz, got 50 Hz (these labels cannot be told apart)"),
+    ("resolution_hz = 1\n", "resolution_hz = 13\n", "[setup] resolution_hz: wanted a rounding below a quarter of the "
+     "lowest frequency, 52 Hz, got 13 Hz (the step of the last digit)"),
     ("factor = 2 }", "factor = 1 }", "[setup] noise_percent.factor: wanted a factor above 1, got 1 (1.65 is…)"),
     ("{ median = 0.5, factor = 2 }", "0.5",
      "[setup] noise_percent: wanted { median = 0.5, factor = 2 }, in percent, got 0.5"),
@@ -477,6 +477,9 @@ REMARKS = [
     (MODE, "{ mean = 310, sd = 61 }", (), []),
     ("resolution_hz = 1\n", "resolution_hz = 10\n", (), ["rounded to multiples of 10 Hz, and 52 of (1,0)", "are none"]),
     ("resolution_hz = 1\n", "resolution_hz = 0.73\n", (), []),
+    ("resolution_hz = 1\n", "resolution_hz = 12.99\n", (), []),
+    (MODE, "{ mean = 99.3, sd = 2 }", (), ["(1,1) and (2,0) are less than the rounding of 1 Hz apart"]),
+    (MODE, "{ mean = 99.4, sd = 2 }", (), []),
     (BARE, "[448.8, 52]\n", (), ["the peak without a label at 52 Hz is where (1,0) is"]),
 ]
 

@@ -14,6 +14,8 @@ from runs import files_in
 import bayesplate
 from bayesplate.board.board import Board
 from bayesplate.board.material import moduli
+from bayesplate.commands.problem import pose_all
+from bayesplate.errors import NotIdentifiableError
 
 BOARD = "fiemme-spruce-clamped"
 UNCERTAIN = "spruce-free-2R"
@@ -284,6 +286,21 @@ def test_a_board_whose_effects_a_card_cannot_state_is_refused(problem):
     assert bayesplate.Problem.from_card(declared, effects=declared.effects).names == problem.names
     with pytest.raises(bayesplate.InputError, match="wanted the prior of a declared effect, got another one"):
         bayesplate.Problem.from_card(changed)
+
+
+def test_of_several_boards_each_that_fails_is_named_once(problem):
+    class Open:
+        board = problem.board
+
+        @property
+        def posed(self):
+            raise NotIdentifiableError(self.said)
+
+    bare, named = Open(), Open()
+    bare.said, named.said = "leaves E_y open", f"{problem.board.name}: leaves E_y open"
+    with pytest.raises(NotIdentifiableError) as refused:
+        pose_all([bare, named])
+    assert str(refused.value).splitlines() == [f"{problem.board.name}: leaves E_y open"] * 2
 
 
 def test_a_faulty_board_is_refused_as_its_card_would_be(tmp_path, clamped):

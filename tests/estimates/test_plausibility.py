@@ -20,6 +20,7 @@ from bayesplate.board.parameter import BOARD_OWNER
 from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Reading
+from bayesplate.board.setup import Setup
 from bayesplate.board.shelf import card_names
 from bayesplate.commands.problem import Problem
 from bayesplate.errors import InputError, NotIdentifiableError
@@ -152,6 +153,18 @@ def test_materials_from_foam_to_carbon_fibre_are_asked_nothing(E_x, E_y, G_xy, r
     speed, _ = speed_and_ratio(board)
     assert SLOWEST_SOUND < speed < FASTEST_SOUND
     assert speed == pytest.approx(np.sqrt(E_x * 1e9 / rho), rel=0.1)  # Rayleigh quotients, 1 - nu^2
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_mistake_that_leaves_nothing_of_a_clamped_board_is_none():
+    """A tenth of its length is what the clamp covers."""
+    board = Board.from_numbers(
+        "clamped", length_x=0.2, length_y=0.1, thickness=2e-3, density=450.0,
+        setups=Setup.from_frequencies({"(0,0)": 500.0, "(0,1)": 900.0, "(1,0)": 2900.0}, edges={"x0": "clamped", "x1": "free", "y0": "free", "y1": "free"},
+                                      clamped={"x0": 0.02}),
+    )  # fmt: skip
+    with pytest.raises((InputError, NotIdentifiableError), match="frequencies_hz"):
+        require_plausible(board, load_prior("spruce"), np.random.default_rng(0))
 
 
 def test_the_prior_predictive_is_that_of_the_prior():

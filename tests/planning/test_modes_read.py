@@ -37,6 +37,19 @@ def with_effect(monkeypatch, mean, solved):
     return one, known, np.zeros((n_terms, 2)), np.zeros((n_terms, 2, n_u))
 
 
+def test_the_parabola_goes_through_both_sides_and_is_a_line_where_there_is_one():
+    sides = np.array([-0.5, 2.0])
+    pair = np.stack([0.3 * sides + 0.1 * sides**2, -1.0 * sides], axis=1)
+    linear, square = home.parabola_through(sides, pair.copy(), 2)
+    np.testing.assert_allclose([linear, square], [[0.3, -1.0], [0.1, 0.0]], atol=1e-12)
+
+    at_bound = home.parabola_through(np.array([0.0, 2.0]), np.array([[0.0, 0.0], [0.4, -2.0]]), 2)
+    np.testing.assert_allclose(at_bound, [[0.2, -1.0], [0.0, 0.0]], atol=1e-12)
+    lost = home.parabola_through(sides, np.array([[np.nan, np.nan], [0.4, -2.0]]), 1)
+    np.testing.assert_allclose(lost, [[0.2, np.nan], [0.0, np.nan]], atol=1e-12)
+    np.testing.assert_array_equal(home.parabola_through(np.zeros(2), pair, 2), np.zeros((2, 2)))
+
+
 def test_each_term_is_linear_about_its_own_place_on_the_parabola(monkeypatch):
     """The constant stands by the sizes there; two solutions along each size and one in the middle are all it takes."""
     sizes, asked = np.random.default_rng(3).normal(0.3, 0.5, (N_TERMS, 2)), []

@@ -14,6 +14,7 @@ from scipy import stats
 from bayesplate.board.board import Board
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import Setup
 from bayesplate.commands.problem import Problem
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.least_squares import log_measured
@@ -125,6 +126,17 @@ def test_a_reading_is_told_from_the_stated_rarity_on(monkeypatch):
     assert slip.log_odds > np.log(RARITY)
     monkeypatch.setattr(slips, "RARITY", 1.01 * np.exp(slip.log_odds))
     assert SlipSearch(problem.posterior, problem.centre).likeliest() is None
+
+
+def test_of_four_readings_two_close_ones_are_not_exchanged_for_the_others_determine_nothing():
+    """Two readings for three constants: no fit, and none is tried."""
+    board = Board.from_numbers(
+        "square", length_x=0.3, length_y=0.3, thickness=3e-3, density=650.0,
+        setups=Setup.from_frequencies({"(1,1)": 83.2, "(2,1)": 189.5, "(1,2)": 189.6, "(0,3)": 251.0}, edges="free"),
+    )  # fmt: skip
+    problem = pose(Problem.from_card(board).board, load_prior("weakly-informative"))
+
+    assert SlipSearch(problem.posterior, problem.centre)._exchanges([(1, 2)]) == []
 
 
 def test_what_an_effect_may_do_to_all_readings_is_no_slip_however_well_the_noise_is_known(monkeypatch):
