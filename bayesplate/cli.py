@@ -215,6 +215,8 @@ def new(run: Callable[..., Any], **options: Any) -> CommandOutput:
     path, stated = options.get("path"), {name: value for name, value in options.items() if value and name != "path"}
     printing = click.get_current_context().params
     may_ask = not stated and not printing["as_json"] and not printing["quiet"]
+    if not may_ask and not stated and path is None:
+        raise click.UsageError("--json and --quiet ask no question: give PATH, or what the card is to say.")
     card_arguments = ask_card_arguments(path) if may_ask else {"path": path or "my-board", **stated}
     card = run(**card_arguments)
     quoted = quote(str(card))

@@ -196,6 +196,8 @@ REFUSED = [
     ("fit one two", 2, "unexpected extra argument (two)"),
     ("plan bare.toml --cost reading", 2, "wanted CLASS=MINUTES"),
     ("plan bare.toml --cost reading=1 --cost reading=2", 2, "reading is given twice"),
+    ("new --json", 2, "--json and --quiet ask no question: give PATH"),
+    ("new --quiet", 2, "--json and --quiet ask no question: give PATH"),
     ("new mine --frequency 35", 2, "write a label and its frequency"),
     ("compare spruce-free-2R --coefficients printed", 2, "'printed' is not one of"),
     *((f"pick hit.wav --sensor-mass {mass}", 2, f"{MASS} '{mass}'") for mass in ("0,6", "0,6,0,1", "nan", "-1", "a")),

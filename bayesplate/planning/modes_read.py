@@ -224,7 +224,9 @@ def _form_shift(known_board: KnownBoard, law: BareLaw, form: FormTerms, sizes: F
         {**values, **symmetry.rigidities(np.exp(logs), values["poisson_xy"])}
         for logs in (log_constants + constants, log_constants)
     )
-    shift = SolvedStation.of(law.station, form.board, moved_values, mesh_values).log_hertz_and_mass_shifts - law.solved
+    with np.errstate(invalid="ignore", divide="ignore"):  # far out a form need not be a plate
+        solved = SolvedStation.of(law.station, form.board, moved_values, mesh_values)
+        shift = solved.log_hertz_and_mass_shifts - law.solved
     shift[0] -= law.slopes[0, :, : log_constants.size] @ constants
-    shift[:, np.abs(shift[0]) > _MOST_SHIFT] = np.nan
+    shift[:, ~(np.abs(shift[0]) <= _MOST_SHIFT)] = np.nan
     return np.asarray(shift.ravel())

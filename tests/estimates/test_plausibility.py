@@ -158,11 +158,10 @@ def test_materials_from_foam_to_carbon_fibre_are_asked_nothing(E_x, E_y, G_xy, r
 @pytest.mark.filterwarnings("error")
 def test_a_mistake_that_leaves_nothing_of_a_clamped_board_is_none():
     """A tenth of its length is what the clamp covers."""
-    board = Board.from_numbers(
-        "clamped", length_x=0.2, length_y=0.1, thickness=2e-3, density=450.0,
-        setups=Setup.from_frequencies({"(0,0)": 500.0, "(0,1)": 900.0, "(1,0)": 2900.0}, edges={"x0": "clamped", "x1": "free", "y0": "free", "y1": "free"},
-                                      clamped={"x0": 0.02}),
-    )  # fmt: skip
+    edges = {"x0": "clamped", "x1": "free", "y0": "free", "y1": "free"}
+    hertz = {"(0,0)": 500.0, "(0,1)": 900.0, "(1,0)": 2900.0}
+    setup = Setup.from_frequencies(hertz, edges=edges, clamped={"x0": 0.02})
+    board = Board.from_numbers("clamped", length_x=0.2, length_y=0.1, thickness=2e-3, density=450.0, setups=setup)
     with pytest.raises((InputError, NotIdentifiableError), match="frequencies_hz"):
         require_plausible(board, load_prior("spruce"), np.random.default_rng(0))
 
