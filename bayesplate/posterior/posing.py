@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -12,6 +13,7 @@ from bayesplate.board.board import Board
 from bayesplate.board.material import MODULI, RIGIDITIES, moduli_of
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.sessions import with_discrepancies
+from bayesplate.effects.words import join_words
 from bayesplate.errors import InputError, NotIdentifiableError
 from bayesplate.estimates.coefficients import coefficient_faults
 from bayesplate.estimates.identifiability import (
@@ -23,6 +25,7 @@ from bayesplate.estimates.identifiability import (
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.unusual import odd_reading, unusual_sentences
 from bayesplate.frequencies.laws import LawName
+from bayesplate.frequencies.prior_bands import prior_medians
 from bayesplate.posterior.first_labels import ProposedLabels, propose_labels
 from bayesplate.posterior.laplace import laplace_approximation, linearisation_errors
 from bayesplate.posterior.parameters import Parameters
@@ -117,7 +120,11 @@ def _pose_labelled(proposed: ProposedLabels, prior: PriorCard, law: LawName | No
     require_labels(board)
     estimate = weighted_least_squares(board, start=proposed.rigidities)
     verdict = identifiability(estimate.sensitivities, estimate.scales, board.symmetry)
-    require_identifiable(board, verdict)
+    try:
+        require_identifiable(board, verdict)
+    except NotIdentifiableError:
+        _ask_about_labels(board, prior, verdict.undetermined_constants())
+        raise
     try:
         centre, covariance, models = laplace_approximation(board, estimate, robust, proposed.spread)
     except np.linalg.LinAlgError:
@@ -201,6 +208,25 @@ def _require_reachable(posterior: Posterior, centre: Floats, covariance: Floats)
         f"{posterior.board.name}: the prior {posterior.prior.name} excludes the data: 0 of {_N_TRIED} draws around the "
         f"least-squares estimate have a density under it{ranges}; nothing was sampled: "
         "check the prior, the labels and the units"
+    )
+
+
+def _ask_about_labels(board: Board, prior: PriorCard, open_constants: Sequence[str]) -> None:
+    """NotIdentifiableError with a question where readings leave constants open at their own estimate alone.
+
+    On a usual plate of the prior they would tell them: the estimate has next to nothing of one, so that the readings
+    contradict each other.
+    """
+    medians = prior_medians(board, prior)
+    usual_plate = np.array([float(medians[name]) for name in RIGIDITIES])
+    first = weighted_least_squares(board, 1, usual_plate)
+    if identifiability(first.sensitivities, first.scales, board.symmetry).undetermined_constants():
+        return
+    names = join_words(list(open_constants))
+    raise NotIdentifiableError(
+        f"{board.name}: these modes tell {names} of a usual board, and these readings do not: they fit best where "
+        f"{'one of them' if len(open_constants) > 1 else names} is next to nothing. Does each label belong to its "
+        "frequency?"
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -225,6 +226,23 @@ def test_a_slip_in_water_that_asks_for_more_modes_than_there_are_is_refused():
     wet = Problem.from_card(Board.from_text(SLIP_IN_WATER, "wet"))
     with pytest.raises(NotIdentifiableError, match="no plate comes near the readings"):
         wet.posed  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("hertz", "sides", "said"),
+    [
+        ({"(2,0)": 241.0, "(0,2)": 312.0, "(2,1)": 240.0, "(1,2)": 311.0}, (0.253, 0.114),
+         "they fit best where D_s is next to nothing. Does each label belong to its frequency?"),
+        ({"(2,0)": 15.5, "(3,0)": 43.0, "(1,1)": 55.0, "(4,0)": 84.0, "(2,1)": 110.0}, (1.0, 0.05),
+         "add a mode that bends across the grain"),
+    ],
+)  # fmt: skip
+def test_modes_that_would_tell_a_constant_of_a_usual_board_ask_about_labels(hertz, sides, said):
+    """A twisting mode below the one that it twists; a strip that shows nothing across is the control."""
+    setup = Setup.from_frequencies(hertz, edges="free")
+    board = Board.from_numbers("one", length_x=sides[0], length_y=sides[1], thickness=3e-3, mass=0.041, setups=setup)
+    with pytest.raises(NotIdentifiableError, match=re.escape(said)):
+        pose(Problem.from_card(board).board, load_prior("weakly-informative"))
 
 
 def test_no_reading_is_odd_where_none_or_two_are():
