@@ -27,7 +27,7 @@ from bayesplate.board.setup_keys import (
     SupportKeys,
 )
 from bayesplate.board.stated import are_instances, is_place, quantities_of, quantity_of, type_faults
-from bayesplate.board.words import EDGES
+from bayesplate.board.words import EDGE_WORDS, EDGES, show_value
 from bayesplate.errors import Fault, InputError
 from bayesplate.labels import Label
 
@@ -197,10 +197,13 @@ class Setup:
         )))  # fmt: skip
         if faults:
             raise InputError(faults)
+        words = dict.fromkeys(EDGES, edges) if isinstance(edges, str) else {edge: edges.get(edge, "") for edge in EDGES}
         if not isinstance(edges, str) and set(edges) != set(EDGES):
             stated_edges = ", ".join(map(str, edges)) or "none"
             faults.append(Fault(f"{name} edges", "a word for each of x0, x1, y0, y1", stated_edges))
-        words = dict.fromkeys(EDGES, edges) if isinstance(edges, str) else {edge: edges.get(edge, "") for edge in EDGES}
+        elif unknown_words := [word for word in dict.fromkeys(words.values()) if word not in EDGE_WORDS]:
+            wanted = '"clamped", "supported" or "free", for all edges or for each of x0, x1, y0, y1'
+            faults.append(Fault(f"{name} edges", wanted, ", ".join(map(show_value, unknown_words))))
         signs_by_label = {}
         for label, sign in (signs or {}).items():
             try:
