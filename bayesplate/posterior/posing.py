@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -36,6 +35,8 @@ from bayesplate.posterior.veerings import with_veering_doubts
 _N_CHECKS = 256
 _N_NAMED = 64
 """Number of these draws at which modes are named."""
+_NEXT_TO_NOTHING = 0.01
+"""Share of the median of its prior below which a rigidity is hardly there."""
 _N_TRIED = 1000
 _SPREAD = 3.0
 """Spread, in standard errors, of the draws on which a prior is tested, as of the sampler's starts."""
@@ -123,7 +124,7 @@ def _pose_labelled(proposed: ProposedLabels, prior: PriorCard, law: LawName | No
     try:
         require_identifiable(board, verdict)
     except NotIdentifiableError:
-        _ask_about_labels(board, prior, verdict.undetermined_constants())
+        _ask_about_labels(board, prior, estimate)
         raise
     try:
         centre, covariance, models = laplace_approximation(board, estimate, robust, proposed.spread)
@@ -211,23 +212,26 @@ def _require_reachable(posterior: Posterior, centre: Floats, covariance: Floats)
     )
 
 
-def _ask_about_labels(board: Board, prior: PriorCard, open_constants: Sequence[str]) -> None:
-    """NotIdentifiableError with a question where readings leave constants open at their own estimate alone.
+def _ask_about_labels(board: Board, prior: PriorCard, estimate: Estimate) -> None:
+    """NotIdentifiableError with a question where the estimate has next to nothing of a constant, and leaves it open.
 
-    On a usual plate of the prior they would tell them: the estimate has next to nothing of one, so that the readings
-    contradict each other.
+    On a usual plate of the prior the modes would tell it: the readings contradict each other.
     """
     medians = prior_medians(board, prior)
     usual_plate = np.array([float(medians[name]) for name in RIGIDITIES])
+    missing = [
+        name
+        for name, share in zip(RIGIDITIES, estimate.rigidities / usual_plate, strict=True)
+        if share < _NEXT_TO_NOTHING
+    ]
     first = weighted_least_squares(board, 1, usual_plate)
-    if identifiability(first.sensitivities, first.scales, board.symmetry).undetermined_constants():
-        return
-    names = join_words(list(open_constants))
-    raise NotIdentifiableError(
-        f"{board.name}: these modes tell {names} of a usual board, and these readings do not: they fit best where "
-        f"{'one of them' if len(open_constants) > 1 else names} is next to nothing. Does each label belong to its "
-        "frequency?"
-    )
+    told = identifiability(first.sensitivities, first.scales, board.symmetry)
+    if missing and not told.undetermined_constants():
+        names = join_words(missing)
+        raise NotIdentifiableError(
+            f"{board.name}: these modes tell {names} of a usual board, and these readings do not: they fit best where "
+            f"{names} is next to nothing. Does each label belong to its frequency?"
+        )
 
 
 def require_possible_noise(posterior: Posterior, centre: Floats) -> None:
