@@ -60,7 +60,7 @@ class Quantity(ProbabilityDensity):
             Fault(name, "a number", repr(value))
             for name, values in self._numbers().items()
             for value in values
-            if not _is_number(value)
+            if not is_number(value)
         ]
         if no_numbers:
             yield from no_numbers
@@ -246,7 +246,7 @@ class Quantity(ProbabilityDensity):
         )
 
 
-def _is_number(value: object) -> bool:
+def is_number(value: object) -> bool:
     """Whether a value is a number: no text, no truth value, no array of several."""
     is_scalar = isinstance(value, np.ndarray) and not value.ndim and value.dtype.kind in "iuf"
     return not isinstance(value, bool) and (is_scalar or isinstance(value, Real))
@@ -254,6 +254,6 @@ def _is_number(value: object) -> bool:
 
 def _number(place: str, value: object) -> float:
     """A number as such; raises InputError for anything else."""
-    if not _is_number(value):
+    if not is_number(value):
         raise InputError(Fault(place, "a number", repr(value)))
     return float(value)  # type: ignore[arg-type]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from bayesplate.board.attached import AttachedItem, DeclaredFluid
 from bayesplate.board.coefficients import CoefficientCard
 from bayesplate.board.parameter import Owner, Parameter, parameter_name
 from bayesplate.board.prior import PriorCard
-from bayesplate.board.quantity import Quantity
+from bayesplate.board.quantity import Quantity, is_number
 from bayesplate.board.reading import FREQUENCY, NO_OFFSET, Peak, Reading, label_text
 from bayesplate.board.setup_keys import (
     DEFAULT_MISSED,
@@ -38,10 +37,6 @@ CLAMPED_NOISE = Quantity.from_median(0.008, np.exp(0.5))
 _FIELDS_AS_STATED = ("name", "clamped", "first_label", "resolution", "missed", "spurious", "attached")
 """Fields that a setup and its table have in common."""
 NOISE_WANTED = "a relative noise and how far it may be off: Quantity.from_median(0.005, 2)"
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def assumed_noise(edges: Sequence[str], prior: PriorCard | None = None) -> Quantity:
@@ -184,7 +179,7 @@ class Setup:
             ("frequencies", frequencies, isinstance(frequencies, Mapping), "a dict of frequencies by label"),
             ("edges", edges, isinstance(edges, str | Mapping), "a word, or a dict of words by edge"),
             ("noise", noise, noise is None or (isinstance(noise, Quantity) and not noise.is_exact), NOISE_WANTED),
-            ("resolution", resolution, _is_number(resolution), "a number, in Hz"),
+            ("resolution", resolution, is_number(resolution), "a number, in Hz"),
             ("first_label", first_label, is_place(first_label), "a pair of whole numbers"),
             ("clamped", clamped, isinstance(clamped, Mapping | None), "a dict of lengths by edge"),
             ("signs", signs, isinstance(signs, Mapping | None), "a dict of signs by label"),

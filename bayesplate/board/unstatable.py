@@ -20,6 +20,7 @@ def attribute_faults(board: Board) -> list[Fault]:
     """A fault for every attribute of a board, of its setups and of their parts that is of another type than it says."""
     from pydantic import ConfigDict, TypeAdapter, ValidationError
 
+    # in a list, for a dataclass takes no configuration from an adapter; its type, for the board imports this file
     config = ConfigDict(arbitrary_types_allowed=True, revalidate_instances="always")
     boards: Any = list[type(board)]  # type: ignore[misc]
     try:

@@ -122,6 +122,8 @@ def test_a_sweep_is_given_by_its_file_as_by_its_numbers_and_no_other_file_stands
     )
 
     assert len(by_numbers) >= 5
+    for peak in by_numbers:
+        assert np.abs(board().damped / peak.hz - 1.0).min() < max(1e-3, 4.0 * peak.sd_hz / peak.hz)
     np.testing.assert_allclose([peak.hz for peak in by_file], [peak.hz for peak in by_numbers], rtol=1e-4)
     for which, fault in (
         (heard, "heard.wav: wanted a sweep, as it was played, got its level goes up and down by"),

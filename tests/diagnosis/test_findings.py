@@ -26,7 +26,7 @@ from scipy.stats import halfnorm
 from bayesplate.board.parameter import BOARD_OWNER, Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.commands.printout import show_diagnosis
-from bayesplate.diagnosis import sensitivity
+from bayesplate.diagnosis import findings, sensitivity
 from bayesplate.diagnosis.claim import Claim, Condition
 from bayesplate.diagnosis.entries import _size_quantiles, effect_entry, exchange_entries, fate_of
 from bayesplate.diagnosis.findings import Case, FittedModel, _nearest_sentence, diagnosis_of
@@ -267,6 +267,15 @@ def test_a_named_effect_that_was_refitted(named):
     assert (finalist.effects, list(finalist.sizes["board"])) == ((SHEAR,), [SHEAR])
     assert told.after.log_score > told.before.log_score
     assert told.probability_of_none + sum(one.probability for one in told.answers) == pytest.approx(1.0)
+
+
+def test_a_finalist_has_the_forms_of_its_effects_that_were_tried_in_several(named, monkeypatch):
+    forms = [SimpleNamespace(effect=SHEAR, detail="at 20, 30 mm"), SimpleNamespace(effect="warp", detail="")]
+    monkeypatch.setattr(findings, "likely_forms", lambda result, index: forms)
+    answer = rank_explanations(named.result)[0]
+    told = diagnosis_of(replace(named, finalists=[(answer, replace(named.after, index=answer.index, summary=MOVED))]))
+
+    assert told.finalists[0].forms == {SHEAR: "at 20, 30 mm"}
 
 
 def test_a_claim_is_told_with_its_conditions_and_the_notes_of_the_run(named):
