@@ -169,7 +169,7 @@ def pick(
     if sweep is None:
         measured = take_spectra(signals_by_file, highest)
     else:
-        impulses, (sweep_lowest, sweep_highest) = _impulse_responses(signals_by_file, sweep, highest)
+        impulses, (sweep_lowest, sweep_highest) = _impulse_responses(signals_by_file, os.fspath(sweep), rate, highest)
         lowest, highest = max(lowest, sweep_lowest), min(highest, sweep_highest)
         measured = take_impulses(impulses, highest)
     picked = pick_modes(measured.spectra, lowest, highest)
@@ -188,7 +188,7 @@ def _require_one_setup(prepared: PreparedBoard) -> PreparedBoard:
 
 
 def _impulse_responses(
-    signals_by_file: Sequence[Sequence[Signal]], sweep: str, highest: float
+    signals_by_file: Sequence[Sequence[Signal]], sweep: str, rate: float | None, highest: float
 ) -> tuple[list[tuple[Recording, Hit]], tuple[float, float]]:
     """Impulse responses in place of recordings of a sweep, each as if the board had been hit once; and its band, Hz."""
     recordings = [
@@ -210,7 +210,7 @@ def _impulse_responses(
         exponential_sweep = read_sweep(sweep)
         sweep_signals = [exponential_sweep.signal(recording.rate) for recording in recordings]
     else:
-        ((sweep_recording, *_),) = read_recordings([sweep], was_played=True)
+        ((sweep_recording, *_),) = read_recordings([sweep], rate, was_played=True)
         if not isinstance(sweep_recording, Recording):
             raise InputError(Fault(printable(sweep), "a recording of the sweep", "a frequency response"))
         require_sweep(sweep_recording)
@@ -283,7 +283,7 @@ def _summary(
     return PickReport(
         format=1,
         files=names,
-        n_hits=len(picked.spectra.names),
+        n_hits=picked.spectra.n_records,
         n_places=len(picked.spectra.place_pairs),
         seconds=picked.spectra.duration,
         lowest_hz=picked.lowest,

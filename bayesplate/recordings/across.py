@@ -82,16 +82,23 @@ def average_modes(
     kept_spectra = spectra.of_records(np.concatenate([sets[k] for k in kept_sets]))
     modes = _average_groups(kept_spectra, groups, [sets[k].size for k in kept_sets])
     remarks = [f"{names[k]} left out: {reasons[k]} (is it of the same board?)" for k in strange_sets]
-    remarks.append(_difference_remark([names[k] for k in kept_sets], groups, spectra.files.size))
+    are_hits = not all(_is_whole_file(spectra, sets[k]) for k in kept_sets)
+    n_left_out = spectra.n_records - sum(records.size for records in sets)
+    searched = f"each of the {len(sets)} clearest" if n_left_out else "each"
+    noun = "hits" if are_hits else "recordings"
+    remarks.append(_difference_remark([names[k] for k in kept_sets], groups, noun, searched))
     spurious = [min(peak.verdict.spurious for peak in group.values()) for group in groups]
     return AveragedModes(modes, spurious, kept_spectra, tuple(remarks))
 
 
 def _set_name(spectra: Spectra, records: Indices) -> str:
     """Name of a set of records: the file if the set is all of it, else the hit."""
-    name = spectra.names[records[0]]
-    is_whole = records.size == np.sum(spectra.files == spectra.files[records[0]])
-    return name.rpartition(" hit ")[0] or name if is_whole else name
+    name, hit = spectra.file_names[records[0]], spectra.hits[records[0]]
+    return name if _is_whole_file(spectra, records) else f"{name} hit {hit}"
+
+
+def _is_whole_file(spectra: Spectra, records: Indices) -> bool:
+    return records.size == np.sum(spectra.files == spectra.files[records[0]])
 
 
 def _best_reference(hertz: Sequence[Floats]) -> tuple[int, list[float], list[int]]:
@@ -121,6 +128,9 @@ def _match_peaks(
     groups: list[MatchedPeaks] = [{reference: peak} for peak in peaks_by_set[reference]]
     for k, peaks in enumerate(peaks_by_set):
         if k == reference or not peaks:
+            continue
+        if not groups:
+            groups = [{k: peak} for peak in peaks]
             continue
         logs = np.log([peak.pole[0] for peak in peaks]) - offsets[k]
         group_logs = np.array(
@@ -211,8 +221,8 @@ def _weighted_mean(estimates: Sequence[Floats], common: Floats) -> Floats:
     return np.stack([*sums, 1.0 / total])
 
 
-def _difference_remark(names: Sequence[str], groups: Sequence[MatchedPeaks], n_records: int) -> str:
-    """The remark on recordings that differ."""
+def _difference_remark(names: Sequence[str], groups: Sequence[MatchedPeaks], noun: str, searched: str) -> str:
+    """The remark on hits or recordings that differ."""
     differences = []
     for k, name in enumerate(names):
         shifts = [
@@ -228,9 +238,6 @@ def _difference_remark(names: Sequence[str], groups: Sequence[MatchedPeaks], n_r
     rest = "the other" if len(names) == 2 else "the others"
     little = "in damping, or by less than 0.1 % in frequency"
     clause = f"in frequency ({', '.join(largest)} than {rest})" if largest else little
-    are_hits = any(" hit " in name for name in names)
-    searched = f"each of the {len(names)} clearest" if are_hits and len(names) < n_records else "each"
-    noun = "hits" if are_hits else "recordings"
     question = (
         "; are they of one board, held and loaded alike?"
         if max(differences, default=(0.0, ""))[0] > _ONE_BOARD_SHIFT

@@ -124,7 +124,8 @@ def _bands(spectra: Spectra, lowest: float, highest: float, width: float) -> Ite
     margin = max(_MARGIN, 0.5 * _LEAST_LINES * spacing)
     for low, high in pairwise(np.linspace(lowest, highest, n + 1).tolist()):
         kept_lines = (hertz >= max(low - margin, 0.3 * lowest, 3.0 * spacing)) & (hertz <= high + margin)
-        if kept_lines.any():  # else a frequency response that ends below
+        # a frequency response may begin above the band, or end in it or below
+        if np.any((hertz >= low) & (hertz < high)):
             yield _Band(Window(hertz[kept_lines], values[kept_lines], np.zeros((0, 2))), low, high)
 
 

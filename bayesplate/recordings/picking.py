@@ -58,8 +58,9 @@ def pick_modes(spectra: Spectra, lowest: float = LOWEST, highest: float = HIGHES
     """
     n_lines = int(((spectra.frequency >= lowest) & (spectra.frequency <= highest)).sum())
     if n_lines < _FEWEST_LINES:
-        place, wanted = f"{spectra.names[0]} between {lowest:g} and {highest:g} Hz", f"{_FEWEST_LINES} lines or more"
-        raise InputError(Fault(place, wanted, str(n_lines), "--lowest and --highest look elsewhere"))
+        place = f"{spectra.file_names[0]} between {lowest:g} and {highest:g} Hz"
+        remedy = "--lowest and --highest look elsewhere"
+        raise InputError(Fault(place, f"{_FEWEST_LINES} lines or more", str(n_lines), remedy))
     sets = agreeing_records(spectra, lowest, highest)
     searched = [_search_records(spectra.of_records(records), lowest, highest) for records in sets]
     paths = tuple(path for _, set_paths in searched for path in set_paths)

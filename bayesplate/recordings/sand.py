@@ -10,16 +10,21 @@ from __future__ import annotations
 import os
 from itertools import product
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.errors import Fault, InputError
 
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
 GRID = (96, 48)
 """Points along x and across it at which picture and shapes are compared."""
 LARGEST_PICTURE = 50_000_000
 MOST_PIXELS = 60_000_000
+_FEWEST_PIXELS, _LEAST_CONTRAST = 24, 0.02
 _STILL_AMPLITUDE = 0.12
 """Amplitude over the largest below which sand lies still."""
 _BLUR, _LIGHT_SCALE = 1.3, 9.0
@@ -35,7 +40,7 @@ _FOREIGN_PROBABILITY = 0.01
 
 def read_picture(path: str | os.PathLike[str]) -> Floats:
     """A PNG or JPEG as shades of grey, 0 to 1: (n_rows, n_columns) array."""
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image, ImageOps, UnidentifiedImageError
 
     path = Path(path)
     file_name, wanted = path.name, "a PNG or JPEG picture"
@@ -51,17 +56,38 @@ def read_picture(path: str | os.PathLike[str]) -> Floats:
                     Fault(file_name, f"at most {MOST_PIXELS:,} pixels", f"{picture.width} x {picture.height}")
                 )
             picture.draft("L", (4 * GRID[0], 4 * GRID[0]))
-            grey = picture.convert("L")
+            upright = ImageOps.exif_transpose(picture)
+            sides = upright.size
+            grey = _as_grey(upright)
             grey.thumbnail((8 * GRID[0], 8 * GRID[0]))
             values = np.asarray(grey, dtype=float) / 255.0
     except FileNotFoundError:
         raise InputError(Fault(file_name, "a picture", "no such file")) from None
-    except (UnidentifiedImageError, OSError, Image.DecompressionBombError) as error:
-        raise InputError(Fault(file_name, wanted, str(error)[:100])) from None
-    if min(values.shape) < 24 or np.ptp(values) < 0.02:
-        got = f"{values.shape[1]} x {values.shape[0]} of one shade"
-        raise InputError(Fault(file_name, "a picture with lines on it", got))
+    except (UnidentifiedImageError, OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        if isinstance(error, InputError):
+            raise
+        is_other = isinstance(error, UnidentifiedImageError)
+        got = "another kind of file" if is_other else getattr(error, "strerror", None) or str(error)[:100]
+        raise InputError(Fault(file_name, wanted, got)) from None
+    if min(values.shape) < _FEWEST_PIXELS:
+        got = f"{sides[0]} x {sides[1]}"
+        raise InputError(Fault(file_name, "a picture of the whole board", got, "is it cropped to the board?"))
+    if np.ptp(values) < _LEAST_CONTRAST:
+        raise InputError(Fault(file_name, "a picture with lines on it", "one shade"))
     return values
+
+
+def _as_grey(picture: Image) -> Image:
+    """A picture in shades of grey of 8 bits; what is transparent is white."""
+    if picture.mode.startswith("I"):  # 16 bits, which the library would cut off at 255
+        return picture.convert("I").point(lambda shade: shade / 257.0).convert("L")
+    if picture.mode in ("LA", "PA", "RGBA") or "transparency" in picture.info:
+        from PIL.Image import new
+
+        white = new("RGBA", picture.size, "white")
+        white.alpha_composite(picture.convert("RGBA"))
+        picture = white
+    return picture.convert("L")
 
 
 def straighten_picture(picture: Floats) -> Floats:

@@ -28,8 +28,9 @@ class Spectra:
     frequency: Floats  # (n_lines,), Hz
     values: Complex  # (n_lines, n_records): of the free decays, without a taper
     force: Complex | None  # (n_lines, n_records): of each hit from the same origin of time; 1 for frequency responses
-    names: tuple[str, ...]
+    file_names: tuple[str, ...]  # of each record
     files: Indices  # (n_records,): number of the file of each record
+    hits: Indices  # (n_records,): number of the hit in its file, from 1 on; 0 for frequency responses
     places: Indices  # (n_records,): number of the pair of places of each record
     place_pairs: tuple[PlacePair, ...]  # the pairs of places
     motion: Motion
@@ -38,6 +39,10 @@ class Spectra:
     @property
     def spacing(self) -> float:
         return float(self.frequency[1] - self.frequency[0])
+
+    @property
+    def n_records(self) -> int:
+        return self.files.size
 
     @property
     def noise(self) -> Floats:
@@ -53,8 +58,9 @@ class Spectra:
             self,
             values=self.values[:, records],
             force=None if self.force is None else self.force[:, records],
-            names=tuple(self.names[r] for r in records),
+            file_names=tuple(self.file_names[r] for r in records),
             files=self.files[records],
+            hits=self.hits[records],
             places=np.searchsorted(kept_places, self.places[records]),
             place_pairs=tuple(self.place_pairs[k] for k in kept_places),
         )
@@ -86,8 +92,9 @@ def decay_spectra(hits_by_recording: Sequence[tuple[Recording, Sequence[Hit]]], 
         frequency=frequency,
         values=np.stack(columns, axis=1),
         force=np.stack(forces, axis=1) if forces else None,
-        names=tuple(f"{recording.name} hit {number}" for recording, number, _ in numbered_hits),
+        file_names=tuple(recording.name for recording, _, _ in numbered_hits),
         files=np.repeat(np.arange(len(hits_by_recording)), [len(hits) for _, hits in hits_by_recording]),
+        hits=np.array([number for _, number, _ in numbered_hits], dtype=np.intp),
         places=places,
         place_pairs=between,
         motion=first.motion,
@@ -107,8 +114,9 @@ def response_spectra(responses: Sequence[FrequencyResponse], highest: float, pad
         frequency=first.frequency[kept_lines],
         values=values,
         force=np.ones_like(values),
-        names=tuple(response.name for response in responses),
+        file_names=tuple(response.name for response in responses),
         files=np.arange(len(responses)),
+        hits=np.zeros(len(responses), dtype=np.intp),
         places=places,
         place_pairs=between,
         motion=first.motion,

@@ -86,25 +86,26 @@ def _read_header(path: Path, file_name: str) -> tuple[list[str], int]:
         raise InputError(
             [Fault(place, f"columns among {', '.join(_COLUMN_MEANINGS)}", f'"{name[:40]}"') for name in unknown]
         )
-    if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise InputError([Fault(place, "each column once", f'"{name}" again') for name in twice])
+    meanings = [_COLUMN_MEANINGS[name] for name in names]
+    if twice := [name for k, name in enumerate(names) if meanings[k] in meanings[:k]]:
+        raise InputError([Fault(place, "each quantity once", f'"{name}" again') for name in twice])
     return names, number
 
 
 def _read_columns(path: Path, file_name: str, names: list[str], skipped: int) -> dict[str, Floats]:
     """The columns of numbers below a header, by the quantities that they hold."""
     try:
-        with path.open(encoding="utf-8-sig") as lines, warnings.catch_warnings():
+        # of another encoding a comment may be, a number is not
+        with path.open(encoding="utf-8-sig", errors="replace") as lines, warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # a table without numbers is refused below
             values = np.loadtxt(islice(lines, skipped, None), delimiter=",", ndmin=2, comments="#")
-    except ValueError:  # no numbers, or no UTF-8
+    except ValueError:
         raise InputError(_line_fault(path, file_name, len(names), skipped)) from None
     if not values.size:
         raise InputError(Fault(file_name, "samples below the header", "none", "record it again"))
     if values.shape[1] != len(names):
         raise InputError(Fault(file_name, f"{len(names)} columns, as the header names", str(values.shape[1])))
-    # of two columns of one quantity the first counts
-    return {_COLUMN_MEANINGS[name]: np.ascontiguousarray(values[:, k]) for k, name in reversed([*enumerate(names)])}
+    return {_COLUMN_MEANINGS[name]: np.ascontiguousarray(values[:, k]) for k, name in enumerate(names)}
 
 
 def _line_fault(path: Path, file_name: str, n: int, skipped: int) -> Fault:
@@ -125,7 +126,7 @@ def _line_fault(path: Path, file_name: str, n: int, skipped: int) -> Fault:
 def _frequency_response(columns: dict[str, Floats], file_name: str, motion: Motion) -> FrequencyResponse:
     if not {"re", "im"} <= columns.keys():
         raise InputError(Fault(file_name, "the columns f_hz, re and im", ", ".join(columns)))
-    _require_lines(columns["f_hz"], file_name)
+    require_lines(columns["f_hz"], f"{file_name} f_hz")
     components = np.stack([columns["re"], columns["im"]], axis=1)
     values = components.view(complex)[:, 0]  # without arithmetic: they may be NaN
     return FrequencyResponse(file_name, columns["f_hz"], values, motion)
@@ -154,10 +155,10 @@ def sampling_rate(times: Floats, file_name: str, rate: float | None = None) -> f
     return rate or float(f"{own_rate:.7g}")
 
 
-def _require_lines(hertz: Floats, file_name: str) -> None:
-    """Refuse frequencies that are not evenly spaced lines."""
+def require_lines(hertz: Floats, place: str) -> None:
+    """Refuse frequencies in Hz that are not evenly spaced lines."""
     steps = np.diff(np.where(np.abs(hertz) < _LARGEST_VALUE, hertz, -1.0))
     is_even = hertz.size >= _FEWEST_LINES and hertz[0] >= 0 and (steps > 0).all()
     if not is_even or np.ptp(steps) > _SPACING_TOLERANCE * float(np.mean(steps)):
         wanted = "a hundred evenly spaced lines or more, rising"
-        raise InputError(Fault(f"{file_name} f_hz", wanted, f"{hertz.size} others"))
+        raise InputError(Fault(place, wanted, f"{hertz.size} others"))

@@ -81,7 +81,7 @@ def averaged_responses(spectra: Spectra) -> tuple[AveragedResponse, ...]:
             level = cross / power
             if of_place.sum() > 1:
                 coherence = cross**2 / power / np.maximum(np.sum(np.abs(y) ** 2, axis=1), 1e-300)
-        name = spectra.names[int(np.flatnonzero(of_place)[0])].rpartition(" hit ")[0] or spectra.names[0]
+        name = spectra.file_names[int(np.flatnonzero(of_place)[0])]
         responses.append(AveragedResponse(name, spectra.frequency, level, coherence))
     return tuple(responses)
 

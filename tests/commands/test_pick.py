@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -125,13 +126,18 @@ def test_a_sweep_is_given_by_its_file_as_by_its_numbers_and_no_other_file_stands
     for peak in by_numbers:
         assert np.abs(board().damped / peak.hz - 1.0).min() < max(1e-3, 4.0 * peak.sd_hz / peak.hz)
     np.testing.assert_allclose([peak.hz for peak in by_file], [peak.hz for peak in by_numbers], rtol=1e-4)
+    unrated = tmp_path / "unrated.csv"
+    unrated.write_text("sound\n" + "\n".join(f"{sample:.6g}" for sample in sweep.signal(rate)))
+    (heard_table := tmp_path / "heard.csv").write_text("sound\n" + "\n".join(f"{one:.6g}" for one in response))
+    in_tables = bayesplate.pick([heard_table], sweep=unrated, rate=rate, motion="displacement", highest=HIGHEST)
+    np.testing.assert_allclose([peak.hz for peak in in_tables.summary.likely], [p.hz for p in by_numbers], rtol=1e-3)
     for which, fault in (
         (heard, "heard.wav: wanted a sweep, as it was played, got its level goes up and down by"),
         (tmp_path / "nowhere.wav", "nowhere.wav: wanted a recording, got no such file"),
-        ("nowhere", "sweep: wanted F1,F2,SECONDS or a file"),
+        (Path("nowhere"), "sweep: wanted F1,F2,SECONDS or a file"),
     ):
         with pytest.raises(InputError) as caught:
-            bayesplate.pick([heard], sweep=str(which), motion="displacement", highest=HIGHEST)
+            bayesplate.pick([heard], sweep=which, motion="displacement", highest=HIGHEST)
         assert str(caught.value).startswith(fault)
 
 

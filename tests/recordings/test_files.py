@@ -44,6 +44,8 @@ def test_times_of_six_digits_give_the_rate_of_the_whole_span(tmp_path):
 REFUSED = [
     (RESPONSE | {"unit": "rpm"}, 'wanted an abscissa in hz, khz, rad/s, rad/sec, got "rpm"'),
     (RESPONSE | {"top": 3}, "wanted a force or displacement, velocity, acceleration, pressure, got kind of data 3"),
+    (RESPONSE | {"x": HERTZ[:50], "y": ACCELERANCE[:50]}, "a.uff set 1 frequencies: wanted a hundred evenly spaced"),
+    (RESPONSE | {"top": 0, "top_unit": "rpm"}, "a.uff set 1: wanted a unit among n, kn, lbf, m/s2"),
     (RESPONSE | {"under": 12}, "wanted a motion over a force, got acceleration over acceleration"),
     (RESPONSE | {"top": 13}, "wanted a motion over a force, got a force over a force"),
     (RESPONSE | {"y": np.abs(ACCELERANCE)}, "wanted a response with its phase, got one that answers before"),
@@ -80,6 +82,35 @@ def test_a_force_is_told_by_its_kind_or_its_unit(tmp_path):
 
         np.testing.assert_allclose(one.force, FORCE, rtol=1e-9, err_msg=str(top))
         assert one.motion == "velocity"
+
+
+def test_the_unit_of_an_ordinate_of_unknown_kind_tells_its_quantity(tmp_path):
+    """Volts, and no unit, tell none: it is as said."""
+    for unit, motion in (("um", "displacement"), ("(m/s)/N", "velocity"), ("V", "pressure"), ("", "pressure")):
+        one = only(tmp_path / "a.uff", uff([RESPONSE | {"top": 0, "top_unit": unit}]), motion="pressure")
+        assert one.motion == motion, unit
+
+
+@pytest.mark.parametrize("order", ["frfr", "rfrf", "frr", "rrf"])
+def test_a_force_is_that_of_the_responses_beside_it_whichever_comes_first(order, tmp_path):
+    """The second force, and what it answers, are half as loud; a file's only force is that of all."""
+    halves = (FORCE, HEARD), (FORCE / 2.0, HEARD / 2.0)
+    sets = []
+    for k, kind in enumerate(order):
+        force, heard = halves[order[:k].count(kind)]
+        top = {"f": {"y": force, "top": 13}, "r": {"y": heard, "top": 11}}[kind]
+        sets.append({"kind": 1, "x": TIMES} | top)
+    (tmp_path / "a.uff").write_bytes(uff(sets))
+    ((first, second),) = read_recordings([tmp_path / "a.uff"])
+
+    np.testing.assert_allclose(first.force, FORCE, rtol=1e-9)
+    np.testing.assert_allclose(second.force, FORCE / (2.0 if order.count("f") == 2 else 1.0), rtol=1e-9)
+    np.testing.assert_allclose(second.response, HEARD / 2.0, rtol=1e-9)
+
+
+def test_a_rate_that_the_file_contradicts_is_refused(tmp_path):
+    said = refusal(lambda: only(tmp_path / "a.uff", uff([TIME]), rate=44100.0))
+    assert said.startswith("a.uff set 1 rate: wanted 44100 Hz, as --rate says, got 6000")
 
 
 def test_of_the_sets_of_a_file_unknown_and_silent_ones_and_copies_are_left_out(tmp_path):
@@ -176,7 +207,7 @@ def test_a_channel_of_noise_beside_a_response_is_left_out(tmp_path):
 
     taken = take_spectra(read_recordings([tmp_path / "a b.wav"], channels="response,response"), 400.0)
 
-    assert len(taken.spectra.names) == 1
+    assert taken.spectra.n_records == 1
     assert taken.remarks == ("a b.wav channel 2 left out: no hit stands out of its noise (is it connected?)",)
 
 
@@ -195,7 +226,7 @@ def test_a_force_in_the_place_of_a_response_is_set_aside_or_refused_where_nothin
         struck = Recording("force", float(RATE), signal)
         taken = take_spectra([[struck], [heard]], 400.0)
 
-        assert taken.spectra.names == ("heard hit 1",)
+        assert taken.spectra.file_names == ("heard",)
         assert taken.remarks == ("force left out: it is silent after its pulse: is it the force?",)
         said = "force: wanted a response, which rings, got it is silent after its pulse"
         assert said in refusal(take_spectra, [[struck]], 400.0)

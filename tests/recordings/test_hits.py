@@ -45,7 +45,7 @@ def test_a_bounce_is_a_double_hit_and_the_others_are_used(has_force):
     taken = take_spectra([[clicked]], 500.0)
 
     assert [hit.fault[:12] for hit in find_hits(clicked)] == ["a double hit", "a double hit", "", ""]
-    assert len(taken.spectra.names) == 2
+    assert taken.spectra.n_records == 2
     assert [line.partition(", ")[0] for line in taken.remarks] == [
         "a.wav: hit 1 at 0.50 s left out", "a.wav: hit 2 at 0.56 s left out",
     ]  # fmt: skip
@@ -101,7 +101,7 @@ def test_a_soft_tap_is_found_in_the_hiss_of_a_wide_band_and_a_softer_one_is_told
 
     softer = take_spectra([[with_hiss(0.08)]], 500.0)
 
-    assert len(softer.spectra.names) == 3
+    assert softer.spectra.n_records == 3
     (told,) = softer.remarks
     assert told.startswith("tap.wav: the sound rises again within a ring-down, at 1.90 s: a soft tap or a noise")
     assert take_spectra([[with_hiss(0.4)]], 500.0).remarks == ()
@@ -152,7 +152,7 @@ def test_a_force_that_rings_or_is_the_response_is_none_and_told_once_for_each_fi
     exchanged = replace(one, name="exchanged.wav", force=one.response, response=one.force)
     stereo = replace(one, name="stereo.wav", force=-0.8 * one.response + hiss)
 
-    assert len(take_spectra([[one]], 500.0).spectra.names) == 4
+    assert take_spectra([[one]], 500.0).spectra.n_records == 4
     first, second = refusal(take_spectra, [[one], [exchanged], [stereo]], 500.0).split("\n")
 
     assert first.startswith("exchanged.wav force: wanted a channel with a pulse for each hit, got one that rings on")

@@ -36,7 +36,7 @@ def tone(hertz: float, share: float) -> np.ndarray:
 def picked(added: np.ndarray, decibels: float = 45.0) -> PickedModes:
     """Modes of the taps with something added, from all five of them."""
     taken = take_spectra([[Recording("tap.wav", RATE, taps(decibels) + added)]], HIGHEST)
-    assert (len(taken.spectra.names), taken.remarks) == (5, ())
+    assert (taken.spectra.n_records, taken.remarks) == (5, ())
     return pick_modes(taken.spectra, 20.0, HIGHEST)
 
 

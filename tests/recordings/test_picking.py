@@ -106,6 +106,19 @@ def test_a_frequency_response_is_picked_as_it_is():
     assert max(np.abs(board().damped / mode.hz - 1.0).min() for mode in found) < 2e-3
 
 
+@pytest.mark.parametrize(("first", "last"), [(120.0, 420.0), (20.0, 283.0), (239.0, 389.0)])
+def test_a_frequency_response_may_begin_and_end_anywhere_in_the_band(first, last):
+    """Of some windows a line or two was measured, which tells no mode."""
+    hertz = np.arange(first, last + 0.5)
+    values = with_complex_noise(np.random.default_rng(4), accelerance(hertz, HAMMERS[0]), 1e-3)
+    response = FrequencyResponse("frf", hertz, values)
+    found = pick_modes(response_spectra([response], HIGHEST), LOWEST, HIGHEST).likely
+
+    assert found
+    assert all(first <= mode.hz <= last for mode in found)
+    assert max(np.abs(board().damped / mode.hz - 1.0).min() for mode in found) < 2e-3
+
+
 def test_a_sweep_gives_the_frequencies_of_the_board_by_its_parameters_as_by_itself():
     """The response to a sweep, by convolution with the modal impulse response; harmonics of the loudspeaker added."""
     rate, sweep = 2000.0, Sweep(20.0, 800.0, 3.0)

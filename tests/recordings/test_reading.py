@@ -72,6 +72,17 @@ def test_a_table_names_its_columns_and_may_hold_the_time(tmp_path):
     assert (one.motion, other.motion, other.rate) == ("acceleration", "velocity", 4000.0)
 
 
+def test_a_comment_may_be_of_another_encoding_and_a_quantity_stands_once(tmp_path):
+    path = write_table(tmp_path / "a.csv", sound=RING, time=TIMES)
+    path.write_bytes("# für Platte 3, 23 °C\n".encode("latin-1") + path.read_bytes())
+    np.testing.assert_allclose(only(path).response, RING, atol=1e-9)
+
+    twice = write_table(tmp_path / "b.csv", t=TIMES, sound=RING, pressure=RING, time=TIMES)
+    said = refusal(only, twice)
+    assert 'b.csv line 1: wanted each quantity once, got "pressure" again' in said
+    assert 'got "time" again' in said
+
+
 def test_a_frequency_response_is_read_and_its_coherence_is_not_needed(tmp_path):
     hertz = np.arange(200) * 0.5
     path = write_table(tmp_path / "a.csv", f_hz=hertz, re=hertz**2, im=-hertz, coherence=np.full(200, 0.9))

@@ -56,14 +56,38 @@ def test_a_picture_is_read_as_it_is_seen(tmp_path):
     np.testing.assert_allclose(read_picture(tmp_path / "a.png"), values / 255.0, atol=0.01)
 
 
+def test_a_picture_is_read_as_its_camera_was_held_whatever_its_shades_are(tmp_path):
+    values = np.full((60, 120), 40, dtype=np.uint8)
+    values[:30] = 200
+    Image.fromarray(values.astype(np.uint16) * 257).save(tmp_path / "deep.png")
+    turned = Image.fromarray(values.T[::-1])
+    orientation = turned.getexif()
+    orientation[0x0112] = 6  # to be turned by a quarter, clockwise
+    turned.save(tmp_path / "turned.png", exif=orientation)
+    clear = np.zeros((60, 120, 4), dtype=np.uint8)
+    clear[..., 3] = 255 - values
+    Image.fromarray(clear).save(tmp_path / "clear.png")
+
+    for name in ("deep", "turned", "clear"):
+        np.testing.assert_allclose(read_picture(tmp_path / f"{name}.png"), values / 255.0, atol=0.01, err_msg=name)
+
+
 def test_what_is_no_picture_with_lines_is_refused(tmp_path):
     (tmp_path / "a.png").write_bytes(b"not a picture")
     (tmp_path / "a.svg").write_bytes(b"<svg/>")
     Image.fromarray(np.full((60, 60), 99, dtype=np.uint8)).save(tmp_path / "blank.png")
+    Image.fromarray(np.arange(8000, dtype=np.uint8).reshape(20, 400)).save(tmp_path / "thin.png")
+    broken = bytearray((tmp_path / "blank.png").read_bytes())
+    broken[8:12] = b"\0\0\0\1"
+    (tmp_path / "broken.png").write_bytes(broken)
+    (tmp_path / "folder.png").mkdir()
     for name, said in {
-        "a.png": "a.png: wanted a PNG or JPEG picture",
+        "a.png": "a.png: wanted a PNG or JPEG picture, got another kind of file",
+        "broken.png": "broken.png: wanted a PNG or JPEG picture, got Truncated",
+        "folder.png": "folder.png: wanted a PNG or JPEG picture, got Is a directory",
+        "thin.png": "thin.png: wanted a picture of the whole board, got 400 x 20 (is it cropped to the board?)",
         "a.svg": 'a.svg: wanted a PNG or JPEG picture, got ".svg" (crop it to the board',
         "a.jpg": "a.jpg: wanted a picture, got no such file",
-        "blank.png": "blank.png: wanted a picture with lines on it",
+        "blank.png": "blank.png: wanted a picture with lines on it, got one shade",
     }.items():
         assert said in refusal(read_picture, tmp_path / name)
