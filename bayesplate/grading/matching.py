@@ -140,28 +140,40 @@ def proposed_pairs(log_mean: Floats, covariance: Floats, percent: Mapping[str, f
     Two boards match if each figure of `percent` agrees within its tolerance in per cent: |ln(E_a / E_b)| <=
     ln(1 + tolerance). The errors of two boards are taken to be independent.
     """
-    from scipy.spatial import KDTree
-
     if len(log_mean) < 2 or not percent:
         return ()
     directions = np.stack([FIGURES[name].direction for name in percent])
     width = np.log1p(np.array(list(percent.values())) / 100.0)
     mean, covariances = log_mean @ directions.T, covariance_along(directions, covariance)
     spread = np.median(2.0 * np.diagonal(covariances, axis1=1, axis2=2), axis=0)
-    tree = KDTree(mean / np.sqrt(width**2 + spread))
-    partners = tree.query(tree.data, k=min(_N_NEIGHBOURS + 1, len(mean)))[1]
-    boards = np.broadcast_to(np.arange(len(mean))[:, None], partners.shape)
-    candidates = np.unique(np.sort(np.stack([boards.ravel(), partners.ravel()], axis=1), axis=1), axis=0)
-    first, second = candidates[candidates[:, 0] < candidates[:, 1]].T
-    probability = box_probability(mean[first] - mean[second], covariances[first] + covariances[second], -width, width)
+    points = mean / np.sqrt(width**2 + spread)
     pairs: list[BoardPair] = []
-    paired: set[int] = set()
-    for i in np.argsort(-probability, kind="stable"):
-        pair = BoardPair(int(first[i]), int(second[i]), float(probability[i]))
-        if pair.probability >= LEAST_MATCH_PROBABILITY and paired.isdisjoint((pair.first, pair.second)):
-            pairs.append(pair)
-            paired |= {pair.first, pair.second}
-    return tuple(pairs)
+    boards, n_pairs = np.arange(len(mean)), -1
+    while boards.size > 1 and len(pairs) > n_pairs:  # the nearest of a board may all have found their partners
+        n_pairs = len(pairs)
+        first, second = boards[_near_pairs(points[boards])]
+        probability = box_probability(
+            mean[first] - mean[second], covariances[first] + covariances[second], -width, width
+        )
+        paired: set[int] = set()
+        for i in np.argsort(-probability, kind="stable"):
+            pair = BoardPair(int(first[i]), int(second[i]), float(probability[i]))
+            if pair.probability >= LEAST_MATCH_PROBABILITY and paired.isdisjoint((pair.first, pair.second)):
+                pairs.append(pair)
+                paired |= {pair.first, pair.second}
+        boards = np.setdiff1d(boards, list(paired))
+    return tuple(sorted(pairs, key=lambda pair: -pair.probability))
+
+
+def _near_pairs(points: Floats) -> NDArray[np.intp]:
+    """Indices of the boards of all pairs of which one is among the nearest of the other: (2, n_pairs) array."""
+    from scipy.spatial import KDTree
+
+    tree = KDTree(points)
+    partners = tree.query(points, k=min(_N_NEIGHBOURS + 1, len(points)))[1]
+    boards = np.broadcast_to(np.arange(len(points))[:, None], partners.shape)
+    candidates = np.unique(np.sort(np.stack([boards.ravel(), partners.ravel()], axis=1), axis=1), axis=0)
+    return np.asarray(candidates[candidates[:, 0] < candidates[:, 1]].T)
 
 
 def _limit_probabilities(

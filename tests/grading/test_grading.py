@@ -148,6 +148,23 @@ def test_no_pair_that_may_match_is_passed_over(monkeypatch):
     assert least < 0.06
 
 
+def test_no_two_boards_that_match_are_left_without_a_partner():
+    """Of boards that are all alike each has many neighbours that found a partner earlier."""
+    rng = np.random.default_rng(1)
+    for n in (14, 60, 200):
+        mean = 0.03 * rng.standard_normal((n, 7))
+        covariance = np.broadcast_to(0.03**2 * np.eye(7), (n, 7, 7))
+        pairs = proposed_pairs(mean, covariance, {"E_x": 10.0, "E_y": 10.0})
+        left = sorted({*range(n)} - {one for pair in pairs for one in (pair.first, pair.second)})
+        width = np.full(2, np.log(1.1))
+        for k, one in enumerate(left):
+            for other in left[k + 1 :]:
+                apart = mean[None, one, :2] - mean[None, other, :2]
+                assert box_probability(apart, 2.0 * covariance[:1, :2, :2], -width, width)[0] < 0.05
+        assert [pair.probability for pair in pairs] == sorted((pair.probability for pair in pairs), reverse=True)
+    assert len(left) < 4
+
+
 def test_pairs_take_memory_in_proportion_to_the_boards(monkeypatch):
     """All beside all would take the square: 2 MB for each figure of five hundred."""
     monkeypatch.setattr("bayesplate.grading.figures._CHUNK_SIZE", 8)
