@@ -171,28 +171,27 @@ def choose_places(shapes: Floats, grid: Floats, sensor: BenchPlace | None = None
     The sensor stays at a given place, or stands where the smallest residue at the driving point is largest. The hammer
     strikes where the smallest residue between the two is largest, of the modes that the sensor can see.
     """
+    from scipy.interpolate import RegularGridInterpolator
     from scipy.linalg import qr
 
     inner = (grid >= _MARGIN) & (grid <= 1.0 - _MARGIN)
     coordinates = grid[inner]
-    inner_shapes = shapes[:, inner][:, :, inner]
-    relative = inner_shapes / np.abs(shapes).max(axis=(1, 2))[:, None, None]
-    flat = relative.reshape(len(shapes), -1)
+    relative = shapes / np.abs(shapes).max(axis=(1, 2))[:, None, None]
+    flat = relative[:, inner][:, :, inner].reshape(len(shapes), -1)
     places = [(float(x), float(y)) for x in coordinates for y in coordinates]
     if sensor is None:
         sensor_index = int(np.argmax((flat**2).min(axis=0)))
+        sensor, at_sensor = places[sensor_index], flat[:, sensor_index]
     else:
-        sensor_index = int(np.argmin([np.hypot(x - sensor[0], y - sensor[1]) for x, y in places]))
-    is_apart = np.array(
-        [max(abs(x - places[sensor_index][0]), abs(y - places[sensor_index][1])) >= _LEAST_DISTANCE for x, y in places]
-    )
-    residues = np.abs(flat * flat[:, [sensor_index]])
-    can_be_seen = np.abs(flat[:, sensor_index]) >= NODAL_LINE
+        at_sensor = RegularGridInterpolator((grid, grid), np.moveaxis(relative, 0, -1), method="cubic")(sensor)
+    is_apart = np.array([max(abs(x - sensor[0]), abs(y - sensor[1])) >= _LEAST_DISTANCE for x, y in places])
+    residues = np.abs(flat * at_sensor[:, None])
+    can_be_seen = np.abs(at_sensor) >= NODAL_LINE
     weakest = residues[can_be_seen if can_be_seen.any() else slice(None)].min(axis=0)
     hammer_index = int(np.argmax(np.where(is_apart, weakest, -1.0)))
     taps = tuple(places[i] for i in qr(flat, mode="economic", pivoting=True)[2][: len(shapes)])
     seen = tuple(float(residue) for residue in residues[:, hammer_index])
-    return Placing(places[sensor_index], places[hammer_index], seen, taps)
+    return Placing(sensor, places[hammer_index], seen, taps)
 
 
 def draw_up_plan(

@@ -153,13 +153,18 @@ def _count_from_estimate(law: BareLaw) -> BareLaw:
 
 
 def _add_peaks(law: BareLaw) -> BareLaw:
-    """The law with the modes that lie close to a peak without a label among the readings."""
+    """The law with the modes that lie closest to a peak without a label among the readings."""
     station, n_old = law.station, law.station.n_old
     peaks, further = station.base.peaks, range(n_old, len(station.setup.readings))
     if not peaks:
         return law
     misses = np.abs(np.log([peak.frequency.mean for peak in peaks]) - law.solved[0, n_old:, None])
-    peak_of = {n_old + int(i): peaks[j] for i, j in enumerate(misses.argmin(axis=1)) if misses[i, j] < _PEAK_REACH}
+    nearest_mode = misses.argmin(axis=0)  # of each peak, which is read once
+    peak_of = {
+        n_old + i: peaks[j]
+        for i, j in enumerate(misses.argmin(axis=1))
+        if misses[i, j] < _PEAK_REACH and nearest_mode[j] == i
+    }
     order = [*range(n_old), *peak_of, *(i for i in further if i not in peak_of)]
     new = (replace(station.setup.readings[i], frequency=peak.frequency) for i, peak in peak_of.items())
     base = replace(station.base, readings=(*station.base.readings, *new))

@@ -13,7 +13,7 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Peak
 from bayesplate.campaign.scatter import expected_width
 from bayesplate.planning.bench import make_benches, reading_bands
-from bayesplate.planning.campaign import _linearise_board, _weigh_readings, campaign_beliefs
+from bayesplate.planning.campaign import _add_peaks, _linearise_board, _weigh_readings, campaign_beliefs
 from bayesplate.planning.proposals import Costs, Planner
 from bayesplate.planning.tables import plan_tables
 
@@ -113,6 +113,20 @@ def test_peaks_that_stand_by_a_mode_are_taken_for_it(posed):
     assert set(law.station.base.labels) == set(setup.labels)
 
 
+def test_a_peak_between_two_modes_is_one_reading(planner):
+    """Two further modes 0.3 % apart with one peak between them: the nearer one has it."""
+    law = planner.beliefs.boards[0].laws[0]
+    n_old, hertz = law.station.n_old, np.exp(law.solved[0])
+    hertz[n_old + 1] = 1.003 * hertz[n_old]
+    peak = Peak(Quantity.from_mean(1.001 * hertz[n_old], 0.1))
+    near = replace(law, station=replace(law.station, base=replace(law.station.base, peaks=(peak,))),
+                   solved=np.log(hertz)[None])  # fmt: skip
+    taken = _add_peaks(near).station
+
+    assert taken.n_old == n_old + 1
+    assert taken.setup.labels[n_old] == law.station.setup.labels[n_old]
+
+
 def test_modes_to_look_for_have_a_sheet_with_the_sensor_where_it_stands(posed, planner, listed):
     found = [one.entry for one in make_benches(planner.beliefs, listed)]
 
@@ -129,7 +143,7 @@ def test_modes_to_look_for_have_a_sheet_with_the_sensor_where_it_stands(posed, p
         if asked.what == "edges":
             continue
         ((x, y),) = next(one for one in posed[0] if one.name == bench.board).setups[0].attached[0].places
-        assert bench.sensor_mm == pytest.approx((1e3 * x, 1e3 * y), abs=25)  # the grid of places
+        assert bench.sensor_mm == pytest.approx((1e3 * x, 1e3 * y), abs=0.5)  # whole mm
 
 
 def test_boards_that_tell_most_may_be_held_another_way(planner, listed):

@@ -43,6 +43,17 @@ def test_a_sensor_that_stands_on_a_nodal_line_is_told():
     assert found.seen[1] == pytest.approx(0.0, abs=1e-12)
 
 
+def test_a_sensor_that_is_fixed_stays_where_it_is_off_the_grid_and_at_the_edge():
+    for place in ((0.31, 0.47), (0.012, 0.5)):
+        found = choose_places(np.stack([shape(1, 1), shape(2, 1)]), GRID, sensor=place)
+        (x, y), (hammer_x, hammer_y) = place, found.hammer
+
+        assert found.sensor == place
+        for m, seen in zip((1, 2), found.seen, strict=True):
+            of_hammer = np.sin(m * np.pi * hammer_x) * np.sin(np.pi * hammer_y)
+            assert seen == pytest.approx(abs(np.sin(m * np.pi * x) * np.sin(np.pi * y) * of_hammer), abs=1e-3)
+
+
 def test_taps_tell_all_figures_apart():
     shapes = np.stack([shape(1, 1), shape(2, 1), shape(1, 2)])
 
