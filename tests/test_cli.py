@@ -155,6 +155,7 @@ BOARD = "fiemme-spruce-clamped"
 LONG = "d" * 300
 """A name that no file system takes; a place that may not be looked into ends in the same way."""
 THERE = "already there (--force replaces them, --out takes another place)"
+NOTES = "--out notes: wanted a new folder, or one of an earlier run, got other files: notes.txt (--out takes another"
 USED = "--out used: wanted a new folder, got one that exists (--force replaces its results, --resume continues"
 UNTOLD = "wanted the frequencies of a board, by which effects are told apart"
 NO_CHECKPOINT = "wanted the checkpoint of an interrupted run, got"
@@ -222,7 +223,9 @@ REFUSED = [
     (f"new {LONG} --mass 41", 3, "at most 80 characters"),
     (f"fit {BOARD} --out used", 3, USED),
     (f"fit {BOARD}", 3, f"--out results/{BOARD}: wanted a new folder"),
-    (f"fit {BOARD} --out notes", 3, "--out notes: wanted a new folder, got one that exists"),
+    (f"fit {BOARD} --out notes", 3, NOTES),
+    (f"fit {BOARD} --out notes --force", 3, NOTES),
+    ("batch . --out notes --force", 3, NOTES),
     (f"diagnose {BOARD} --out used", 3, USED),
     ("batch . --out used", 3, USED),
     (f"compare {BOARD} --out used", 3, f"compare.json {THERE}"),

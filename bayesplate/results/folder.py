@@ -44,9 +44,12 @@ RESULT_FILES = (
     *BATCH_FILES,
 )
 """Files of a run besides its figures; the next run in the same folder replaces them."""
+_MARKS = (SUMMARY_FILE, DIAGNOSIS_FILE, *BATCH_FILES[:2], CHECKPOINT_FOLDER)
+"""What every run leaves in its folder: without one of these the files of a folder are the user's."""
 COMPANION_FILES = ("compare.json", "modes.png", "modes.svg", "plan.json")
 """Files of commands that may share the folder with a fit: a folder with these alone counts as new."""
 _COMPANION_FIGURES = ("modes-", "plan.", "plan-bench")
+_MOST_NAMED = 3
 
 
 class OutputFolder:
@@ -69,14 +72,18 @@ class OutputFolder:
 
     def require_usable(self, *, force: bool, resume: bool) -> None:
         """Check, before any work and without writing, that the run may use this folder: InputError, CheckpointError."""
-        has_content = any(map(_is_run_file, names_in(self.path)))
+        names = names_in(self.path)
+        has_content = any(map(_is_run_file, names))
         self._is_new = not force and not resume
         if resume:
             if not os.path.isdir(self.checkpoint):
-                state = "a finished run" if os.path.exists(self.path / SUMMARY_FILE) else "nothing to resume"
-                raise CheckpointError(
-                    f"{self.path}: wanted the checkpoint of an interrupted run, got {state} (--force runs it anew)"
-                )
+                is_finished = os.path.exists(self.path / SUMMARY_FILE)
+                state = "a finished run (--force runs it anew)" if is_finished else "nothing to resume"
+                raise CheckpointError(f"{self.path}: wanted the checkpoint of an interrupted run, got {state}")
+        elif has_content and not {*_MARKS} & {*names}:
+            other_files = ", ".join(sorted(filter(_is_run_file, names))[:_MOST_NAMED])
+            wanted, remedy = "a new folder, or one of an earlier run", "--out takes another place"
+            raise InputError(Fault(f"--out {self.path}", wanted, f"other files: {other_files}", remedy))
         elif has_content and not force:
             raise self._used_folder_error()
 

@@ -187,13 +187,26 @@ def test_force_lays_aside_what_runs_left_and_nothing_else_until_there_is_somethi
     assert files_in(folder.path) == {"summary.json": b"new", "boards/b/notes.txt": b"boards/b/notes.txt"}
 
 
+def test_a_folder_that_no_run_has_written_is_its_owners(tmp_path):
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures" / "photo.png").write_text("mine")
+    (tmp_path / "boards.csv").write_text("mine")
+    folder = OutputFolder(tmp_path)
+
+    for force in (False, True):
+        with pytest.raises(InputError, match="or one of an earlier run, got other files: boards.csv, figures"):
+            folder.require_usable(force=force, resume=False)
+    (tmp_path / "summary.json").touch()
+    folder.require_usable(force=True, resume=False)
+
+
 def test_files_of_commands_that_share_the_folder_with_a_fit_do_not_make_it_a_used_one(tmp_path):
     for name in ("compare.json", "modes.png", "modes-water.svg", "plan.json", "plan.svg", "plan-bench-2.png"):
         (tmp_path / name).touch()
 
     OutputFolder(tmp_path).require_usable(force=False, resume=False)
     (tmp_path / "plan.txt").touch()
-    with pytest.raises(InputError, match="wanted a new folder"):
+    with pytest.raises(InputError, match="got other files: plan.txt"):
         OutputFolder(tmp_path).require_usable(force=False, resume=False)
 
 
