@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -22,7 +23,7 @@ def ask_card_arguments(path: str | None) -> dict[str, Any]:
 
     An empty answer leaves the argument out.
     """
-    from bayesplate.commands.new import example_labels, require_edges, require_path
+    from bayesplate.commands.new import example_labels, require_edges, require_path, require_prior
 
     if path is not None:
         require_path(path)  # before anything is asked in vain
@@ -30,7 +31,11 @@ def ask_card_arguments(path: str | None) -> dict[str, Any]:
     answers: dict[str, Any] = {"path": path or _ask("Name", "my-board", require_path)}
     answers["sizes"] = _without_blanks({name: _ask_number(question) for name, question in SIZE_QUESTIONS.items()})
     answers["edges"] = _ask("Edges: free, cantilever, clamped, supported", "free", require_edges)
-    answers["prior"] = click.prompt("Wood: spruce, or weakly-informative", default="weakly-informative", err=True)
+    answers["prior"] = _ask(
+        "Wood: spruce, or weakly-informative",
+        "weakly-informative",
+        lambda prior: require_prior(prior, answers["path"]),
+    )
     click.echo("Frequencies; (m,n) crosses m nodal lines along the grain and n across.", err=True)
     answers["frequencies"] = _without_blanks(
         {label: _ask_number(f"{label}, Hz") for label in example_labels(answers["edges"])}
@@ -58,7 +63,10 @@ def _ask_number(question: str) -> str:
 
 def _read_number(text: str) -> str:
     try:
-        return text and str(float(text))
+        number = float(text) if text else 0.0
+        if not math.isfinite(number):
+            raise ValueError
+        return text and str(number)
     except ValueError:
         raise click.BadParameter("a number with a decimal point, 2.8, or nothing") from None
 

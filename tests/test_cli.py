@@ -193,6 +193,8 @@ REFUSED = [
     (f"diagnose {BOARD} --force --resume", 2, "force starts anew and resume continues"),
     (f"fit {BOARD} --linear --exact", 2, "--linear and --exact force different laws"),
     (f"check {BOARD} --effects none,fluid_loading", 2, "--effects none declares nothing"),
+    (f"check {BOARD} --effects ,", 2, '--effects: wanted names, or "none", got nothing'),
+    (f"check {BOARD} --effects=", 2, '--effects: wanted names, or "none", got nothing'),
     ("fit", 2, "Missing argument 'CARD'"),
     ("fit one two", 2, "unexpected extra argument (two)"),
     ("plan bare.toml --cost reading", 2, "wanted CLASS=MINUTES"),

@@ -32,7 +32,7 @@ from bayesplate.board.stated import are_instances, quantities_of, type_faults
 from bayesplate.board.unstatable import attribute_faults, unstatable_faults
 from bayesplate.board.words import canonical_effect
 from bayesplate.board.writing import toml_text, write_card
-from bayesplate.errors import InputError
+from bayesplate.errors import Fault, InputError
 
 Values = Mapping[str, NDArray[np.float64]]
 """Values of named quantities, SI: each a number or an (n_draws,) array."""
@@ -93,8 +93,9 @@ class Board:
     card: CardFile | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        if isinstance(self.effects, Iterable):
-            object.__setattr__(self, "effects", tuple(map(canonical_effect, self.effects)))
+        effects: object = self.effects  # of any type until the board is used
+        if isinstance(effects, Iterable) and not isinstance(effects, str):
+            object.__setattr__(self, "effects", tuple(map(canonical_effect, effects)))
 
     @property
     def symmetry(self) -> Symmetry:
@@ -161,7 +162,9 @@ class Board:
         )
 
     def without(self, effects: Collection[str]) -> Board:
-        """The board without some of its declared effects, by their names."""
+        """The board without some of its declared effects, by their names; InputError for a plain text."""
+        if isinstance(effects, str):
+            raise InputError(Fault("effects", "a list of names", repr(effects), f"[{effects!r}]"))
         effects = {*map(canonical_effect, effects)}
         return replace(
             self,

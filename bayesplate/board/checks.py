@@ -272,7 +272,7 @@ def _thickness_remark(board: Board, setup: Setup, effects: Collection[str]) -> R
     share = board.inputs["thickness"].mean / shorter
     return share > THICK_SHARE and _SHEAR not in effects, (
         f"the thickness is 1/{1 / share:.1f} of the shorter side, more than a tenth: transverse shear matters, and "
-        f"without it the moduli come out too low; declare it with --effects {_SHEAR}"
+        f"without it the moduli come out too low; declare it with --effects {','.join((*effects, _SHEAR))}"
     )
 
 

@@ -43,7 +43,7 @@ def merge_fragment(table: Mapping[str, Any], file: str, fragment: str | os.PathL
     ]
     if faults:
         raise InputError(faults)
-    card_setups = table.get("setup", {})
+    card_setups = table.get("setup", [])
     setups = [
         dict(entry)
         for entry in (card_setups if isinstance(card_setups, list) else [card_setups])
@@ -67,7 +67,7 @@ def _setup_index(setups: list[dict[str, Any]], setup: Mapping[str, Any], fragmen
         return names.index(setup["name"])
     if "name" not in setup and len(setups) == 1:
         return 0
-    if "name" in setup and "edges" in setup:
+    if not setups or ("name" in setup and "edges" in setup):
         return None
     wanted = f"the name of a setup of {file}: {', '.join(quote_text(str(name)) for name in names)}"
     got = show_value(setup["name"]) if "name" in setup else "no name"

@@ -66,7 +66,9 @@ class QuantityReader:
         """A quantity in the unit of its key, in the shortest form that states it completely."""
         scale = self.number.si
         if quantity.readings:
-            details: dict[str, Any] = {"resolution": in_unit(quantity.resolution, scale)} if quantity.resolution else {}
+            # of readings that are all alike the reader takes the instrument's own, where none is stated
+            is_stated = bool(quantity.resolution) or (self.resolution > 0.0 and are_equal(list(quantity.readings)))
+            details: dict[str, Any] = {"resolution": in_unit(quantity.resolution, scale)} if is_stated else {}
             places = {"at_x_mm": quantity.at_x, "at_y_mm": quantity.at_y}
             details |= {
                 key: [in_unit(coordinate, SI["mm"]) for coordinate in values]

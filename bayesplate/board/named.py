@@ -37,11 +37,9 @@ def load_named_cards(
     if prior is not None:
         name, prior = prior.name, prior.for_board(board.isotropic)
         faults += [] if prior is not None else [_symmetry_fault(card_place, name, board.isotropic)]
-    if tables is not None:
-        return NamedCards(prior, tables, tuple(faults))
-    coefficient_tables: dict[str, CoefficientCard] = {}
+    coefficient_tables = dict(tables or {})
     for setup, card_place in zip(board.setups, setup_places(file, [setup.name for setup in board.setups]), strict=True):
-        if setup.table_name:
+        if setup.table_name and setup.name not in coefficient_tables:
             place = f"{card_place} published_coefficients"
             table = _read_card(load_coefficients, setup.table_name, folder, place, faults)
             coefficient_tables |= {} if table is None else {setup.name: table}

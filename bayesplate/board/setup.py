@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -180,7 +181,8 @@ class Setup:
             ("edges", edges, isinstance(edges, str | Mapping), "a word, or a dict of words by edge"),
             ("noise", noise, noise is None or (isinstance(noise, Quantity) and not noise.is_exact), NOISE_WANTED),
             ("resolution", resolution, is_number(resolution), "a number, in Hz"),
-            ("first_label", first_label, is_place(first_label), "a pair of whole numbers"),
+            ("first_label", first_label, is_place(first_label) and all(isinstance(m, Integral) for m in first_label),
+             "a pair of whole numbers"),
             ("clamped", clamped, isinstance(clamped, Mapping | None), "a dict of lengths by edge"),
             ("signs", signs, isinstance(signs, Mapping | None), "a dict of signs by label"),
             ("unlabelled", unlabelled, isinstance(unlabelled, list | tuple | np.ndarray), "a list of peaks"),
@@ -239,7 +241,7 @@ class Setup:
             frequencies=frequencies_by_label,
             signs=signs_by_label,
             attached=tuple(attached),
-            hammer=None if hammer is None else HammerKeys.model_construct(place=hammer),
+            hammer=None if hammer is None else HammerKeys.model_construct(place=(float(hammer[0]), float(hammer[1]))),
             support=None if bounce is None else SupportKeys.model_construct(bounce=bounce),
             fluid=fluid,
         )

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from bayesplate.board.toml import parse_toml, read_file
-from bayesplate.board.words import did_you_mean, quote_text
+from bayesplate.board.words import did_you_mean, quote_text, show_value
 from bayesplate.board.writing import toml_text
 from bayesplate.errors import Fault, InputError, printable
 
@@ -42,6 +42,8 @@ def find_card(kind: CardKind, name_or_path: str | os.PathLike[str], folder: Path
 
     Raises InputError if a name is not on the shelf, with the nearest card and how to write a path.
     """
+    if not isinstance(name_or_path, str | os.PathLike):
+        raise InputError(Fault(f"{_SINGULAR[kind]} card", "a name or a path", show_value(name_or_path)))
     text = os.fspath(name_or_path)
     if isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or any(mark in text for mark in "/\\"):
         return Path(text) if folder is None else folder / text
@@ -81,6 +83,8 @@ class CardFile:
     @classmethod
     def of(cls, content: bytes | str, name: str, folder: Path | None = None) -> CardFile:
         """A card from the content of a file; raises InputError if it is no table."""
+        if not isinstance(content, bytes | str):
+            raise InputError(Fault(printable(name), "the text of a card", show_value(content)))
         data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
         return cls(parse_toml(data, printable(name)), name, folder, data.decode("utf-8"))
 

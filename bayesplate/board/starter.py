@@ -39,10 +39,10 @@ def starter_text(
         *(f"{key} = {toml_value(text)}" for key, text in texts.items() if text),
         "",
         "[plate]  # the whole board; x is along the grain",
-        _size_line(sizes, "length_x", "length_x_mm = {:g}"),
-        _size_line(sizes, "length_y", "length_y_mm = {:g}"),
-        _size_line(sizes, "thickness", f"thickness_mm = {{{{ mean = {{:g}}, sd = {CALIPER:g} }}}}"),
-        f"mass_g = {sizes['mass']:g}"
+        _size_line(sizes, "length_x", "length_x_mm = {}"),
+        _size_line(sizes, "length_y", "length_y_mm = {}"),
+        _size_line(sizes, "thickness", f"thickness_mm = {{{{ mean = {{}}, sd = {CALIPER:g} }}}}"),
+        f"mass_g = {_shortest(sizes['mass'])}"
         if "mass" in sizes
         else f"density_kg_m3 = {SPRUCE_DENSITY:g}  # an example: put mass_g here in its place",
         "",
@@ -57,12 +57,17 @@ def starter_text(
     lines.append("# unlabelled_hz = [404, 448.8]  # peaks of which you cannot tell the mode")
     lines += ["", *_AIR_LINES]
     lines += ["", '[setup.frequencies_hz]  # "(m,n)": m nodal lines crossed along x, n along y']
-    lines += [f"{toml_value(label)} = {hz:g}" for label, hz in frequencies.items()]
+    lines += [f"{toml_value(label)} = {_shortest(hz)}" for label, hz in frequencies.items()]
     lines += [f'# "{label}" = ' for label in examples if str(label) not in frequencies]
     return "\n".join(lines) + "\n"
 
 
 def _size_line(sizes: Mapping[str, float], name: str, form: str) -> str:
     if name in sizes:
-        return form.format(sizes[name])
-    return f"{form.format(HALF_TOP[name])}  {_EXAMPLE_COMMENT}"
+        return form.format(_shortest(sizes[name]))
+    return f"{form.format(_shortest(HALF_TOP[name]))}  {_EXAMPLE_COMMENT}"
+
+
+def _shortest(number: float) -> str:
+    """All digits of a number, without a point where it is whole."""
+    return toml_value(int(number) if float(number).is_integer() else float(number))

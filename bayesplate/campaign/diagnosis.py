@@ -150,8 +150,8 @@ def campaign_claim_sentence(diagnosis: CampaignDiagnosis) -> str:
         f"error of the left-out boards {diagnosis.before.left_out_boards_rms_cents:.1f} cents before, "
         f"{diagnosis.after.left_out_boards_rms_cents:.1f} after"
     )
-    verb = "does" if len(claim.refused_by) == 1 else "do"
-    refused = f"; {join_words(claim.refused_by)} {verb} not want it" if claim.refused_by else ""
+    verb = "disagrees" if len(claim.refused_by) == 1 else "disagree"
+    refused = f"; {join_words(claim.refused_by)} {verb} with the others" if claim.refused_by else ""
     head = f"The boards share {effects}" if diagnosis.claim else f"It is not claimed that the boards share {effects}"
     return f"{head}: {scores}{refused}; {errors}."
 
@@ -173,16 +173,15 @@ def next_step(
 ) -> str:
     """The recommendation: what to do next.
 
-    Measure a board that refuses again, declare an effect of which each board has its own size, or search for the cause
-    of residuals that all boards have in common. Where the card names the shared effects, there was no search.
+    Measure a board again that disagrees, declare an effect of which each board has its own size, or search for the
+    cause of residuals that all boards have in common. Where the card names the shared effects, there was no search.
     """
     if conditions is not None and conditions.refused_by:
         boards, is_one = join_words(conditions.refused_by), len(conditions.refused_by) == 1
         if len(conditions.refused_by) == n_boards:
             return f"measure {boards} again: they do not agree on what they share"
-        they, do = ("it", "does") if is_one else ("they", "do")
-        them = "it" if is_one else "them"
-        return f"measure {boards} again, or take {them} out of the campaign: {they} {do} not want what the others share"
+        them, they_disagree = ("it", "it disagrees") if is_one else ("them", "they disagree")
+        return f"measure {boards} again, or take {them} out of the campaign: {they_disagree} with the others"
     best = next((explanation for explanation in explanations if explanation.effects), None)
     if verdict == "unexplained" and best is not None:
         card, effect = f"the card of {best.board}" if best.board else "the campaign's card", best.effects[-1]

@@ -169,8 +169,8 @@ def learning_warnings(posterior: SharedPosterior, effective: Mapping[str, float]
         boards = "board" if len(refusing_names) == 1 else "boards"
         scatter_words = "so little scatter" if scatters_of(posterior.combined.shared) else "one value for all"
         warnings.append(
-            f"{boards} {join_words(refusing_names)} {'does' if len(refusing_names) == 1 else 'do'} not want what the "
-            f"others teach: {scatter_words} is not what these boards say"
+            f"{boards} {join_words(refusing_names)} {'disagrees' if len(refusing_names) == 1 else 'disagree'} with "
+            f"what the others teach: {scatter_words} is not what these boards say"
         )
     if posterior.combined.fewest_points < FEWEST_POINTS:
         warnings.append(

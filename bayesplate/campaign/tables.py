@@ -90,7 +90,7 @@ def searched_tables(diagnosis: CampaignDiagnosis) -> tuple[Table, ...]:
 
 
 def _p_value(left_out: LeftOutBoard | TaughtBoard) -> str:
-    return f"{left_out.p_value:.2g}" + (" refuses" if left_out.refuses else "")
+    return f"{left_out.p_value:.2g}" + (" disagrees" if left_out.refuses else "")
 
 
 def shared_words(name: str) -> str:

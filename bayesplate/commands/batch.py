@@ -47,7 +47,7 @@ from bayesplate.grading.boards import FORMAT, BatchSummary, BoardRow, DoubtfulBo
 from bayesplate.grading.matching import Grading, GradingRequest, grade
 from bayesplate.grading.storage import Journal, TableKind, parquet_library, write_table
 from bayesplate.results.contract import json_text
-from bayesplate.results.folder import OutputFolder, hold_output_folders
+from bayesplate.results.folder import GRADING_PAGE, OutputFolder, hold_output_folders
 from bayesplate.results.summary import versions
 
 JOURNAL_FILE = "boards.jsonl"
@@ -260,6 +260,7 @@ def _write_grading(folder: Path, grading: Grading, summary: BatchSummary, *, fol
     from bayesplate.grading.tables import write_grading
 
     write_grading(folder, grading)
+    (folder / GRADING_PAGE).unlink(missing_ok=True)  # that of another grading
     if report:
         from bayesplate.report.grading import write_grading_page
 

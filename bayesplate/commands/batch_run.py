@@ -21,7 +21,7 @@ from bayesplate.errors import BayesplateError, InputError, NotConvergedError, No
 from bayesplate.grading.boards import FORMAT, TEXT_COLUMNS, BoardRow, board_row
 from bayesplate.grading.storage import Journal
 from bayesplate.posterior.sampling import Progress
-from bayesplate.results.folder import BOARDS_FOLDER, SUMMARY_FILE
+from bayesplate.results.folder import BOARDS_FOLDER, PAGE_FILE, SUMMARY_FILE
 from bayesplate.results.summary import versions
 
 _REFUSED, _INTERNAL, _DIED = "refused", "internal error", "worker died"
@@ -94,9 +94,10 @@ class BatchRun:
 
     def _is_complete(self, row: BoardRow) -> bool:
         """Whether the row of an earlier run is complete, so that its board need not be fitted again."""
-        summary_file = self.folder / BOARDS_FOLDER / row.name / SUMMARY_FILE
+        files = (SUMMARY_FILE, PAGE_FILE) if self.report else (SUMMARY_FILE,)
+        folder = self.folder / BOARDS_FOLDER / row.name
         return row.outcome not in _RETRIED_OUTCOMES and (
-            not self.folders or not row.is_fitted or summary_file.is_file()
+            not self.folders or not row.is_fitted or all((folder / name).is_file() for name in files)
         )
 
     def _prepare_fit(self, board: BatchBoard) -> tuple[str, BoardRow, Call]:

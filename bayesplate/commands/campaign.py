@@ -14,7 +14,7 @@ from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.campaign.population import require_moduli
 from bayesplate.campaign.shared import SharedParameter, find_shared_parameters
 from bayesplate.commands.arguments import check_arguments
-from bayesplate.commands.options import CARD, Effects, Law, Robust
+from bayesplate.commands.options import ANY_PATH, Effects, Law, Robust
 from bayesplate.commands.prepare import CardSource, PreparedBoard, prepare
 from bayesplate.commands.problem import Problem, as_problem, pose_all
 from bayesplate.errors import Fault, InputError
@@ -49,7 +49,7 @@ class Campaign:
     @check_arguments()
     def from_card(
         cls,
-        card: Annotated[CampaignPath, CARD],
+        card: Annotated[CampaignPath, ANY_PATH],
         effects: Effects = None,
         law: Law = None,
         robust: Robust = False,
@@ -122,7 +122,8 @@ def dispatch_card(
     """
     if isinstance(card, Campaign) or is_campaign(card):
         if setup is not None:
-            raise InputError(Fault("setup", "a board, whose setup it completes", "a campaign", "give it to each board"))
+            wanted, remedy = "a board, whose setup it completes", "write it into the board's card"
+            raise InputError(Fault("setup", wanted, "a campaign", remedy))
         if not isinstance(card, Campaign):
             return of_campaign(Campaign.from_card(card, effects, law, robust))
         if effects is not None or law is not None or robust:

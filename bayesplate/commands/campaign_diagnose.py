@@ -36,6 +36,7 @@ from bayesplate.commands.campaign_fit import (
 )
 from bayesplate.commands.fitting import FIT_TIME, FitResult, Run, Stages
 from bayesplate.commands.printout import Printout, show_campaign_diagnosis
+from bayesplate.commands.problem import require_normal_noise
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.claim import IMPROBABLE_BELOW
 from bayesplate.diagnosis.forms import forms
@@ -109,6 +110,7 @@ def diagnose_campaign(campaign: Campaign, run: Run, *, report: bool) -> Campaign
     Shared effects that the card names are judged: each board is predicted from the others, with these effects and
     without. Otherwise every effect that the boards may share is tried, and the one that stands out is judged likewise.
     """
+    require_normal_noise(campaign.problems)
     unshared = _without_shared(campaign)
     campaign.pose()
     time_per_board = 2.0 * FIT_TIME + (0.0 if campaign.shared else _SEARCH_TIME)

@@ -63,7 +63,7 @@ class CampaignFitResult:
         By name: each board, given what all boards tell of the shared parameters.
     alone : dict of FitResult
         By name: each board by itself.
-    learnt : SharedPosterior or None
+    shared_posterior : SharedPosterior or None
         The posterior of the shared parameters; None where nothing is shared.
     population : Population or None
     """

@@ -22,7 +22,7 @@ from bayesplate.commands.fitting import FIT_TIME, FitResult, Run, with_board
 from bayesplate.commands.options import CARD, Effects, Force, OnProgress, Out, Report, Resume, Seed, SetupFile
 from bayesplate.commands.prepare import CardSource
 from bayesplate.commands.printout import Printout, show_diagnosis
-from bayesplate.commands.problem import Problem
+from bayesplate.commands.problem import Problem, require_normal_noise
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.claim import Claim, effects_named_in_part, judge_claim, nested_errors_of_board
 from bayesplate.diagnosis.findings import Case, FittedModel, diagnosis_of
@@ -37,7 +37,7 @@ from bayesplate.diagnosis.sizes import refit_board
 from bayesplate.diagnosis.stated import stated_claims
 from bayesplate.diagnosis.verdict import Explanation, Verdict, decide_verdict, explanation_words
 from bayesplate.diagnosis.words import relabelled_sentence, worse_fit_sentence
-from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
+from bayesplate.errors import NotConvergedError, NotIdentifiableError
 from bayesplate.estimates.leave_one_out import carrying_modes, indices_of, unite_carrying_modes
 from bayesplate.files import write_text
 from bayesplate.planning.bench import plan_first_line
@@ -168,9 +168,7 @@ def diagnose(
 
 def _diagnose_board(problem: Problem, run: Run, n_null: int, *, report: bool) -> DiagnoseResult:
     """Fit one board, diagnose the fit, and write the result."""
-    if problem.robust:
-        wanted = "a problem with normal noise, which the search for an effect assumes"
-        raise InputError(Fault("robust", wanted, "Student's distribution"))
+    require_normal_noise([problem])
     run.open({BEFORE_FOLDER: problem}, 2.0 * FIT_TIME + _SEARCH_TIME + _KNOWN_TIME + _CONTROL_TIME + _CHOICE_TIME)
     before = run.fit(problem, BEFORE_FOLDER, "fit without further effects", tells_failure=True)
     diagnosis, after = _diagnose_fit(problem, before, run, n_null)

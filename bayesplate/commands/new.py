@@ -11,8 +11,10 @@ import click
 
 from bayesplate.board.board import Board
 from bayesplate.board.checks import physical_faults
+from bayesplate.board.named import load_named_cards
 from bayesplate.board.prior import load_prior
 from bayesplate.board.setup_keys import EdgeCondition, edge_words
+from bayesplate.board.shelf import CardFile
 from bayesplate.board.starter import HALF_TOP, starter_text
 from bayesplate.board.values import Complaint, Key, Number, Refusal
 from bayesplate.board.words import EDGES, did_you_mean, name_complaint, show_value
@@ -129,7 +131,7 @@ def new(
         words = dict.fromkeys(EDGES, "free")
     size_values, hertz = _to_numbers(sizes or {}, faults), _to_numbers(frequencies or {}, faults)
     text = starter_text(card.stem, size_values, words, prior, hertz, _example_modes(words), title=title, notes=notes)
-    faults += _card_faults(text, card.stem)
+    faults += _card_faults(text, card)
     if faults:
         raise InputError(faults)
     with catch_write_errors(card):
@@ -159,6 +161,11 @@ def require_edges(edges: str) -> None:
     """Refuse a text that does not say how four edges are held."""
     if edge_words(_ARRANGEMENTS.get(edges, edges)) is None:
         raise InputError(Fault("edges", _EDGES_WANTED, show_value(edges)))
+
+
+def require_prior(prior: str, path: str) -> None:
+    """Refuse a prior that a card at this path cannot name."""
+    load_prior(prior, _new_card_path(path).parent)
 
 
 def example_labels(edges: str) -> list[str]:
@@ -192,10 +199,11 @@ def _to_number(value: float | str) -> float | str:
         return value
 
 
-def _card_faults(text: str, name: str) -> list[Fault]:
-    """Every fault of the text of a card."""
+def _card_faults(text: str, card: Path) -> list[Fault]:
+    """Every fault of the text of a card, and of the prior that it names."""
     try:
-        board = Board.from_text(text, name, may_lack_frequencies=True)
+        board = Board.from_card(CardFile.of(text, card.name, card.parent), may_lack_frequencies=True)
     except InputError as error:
         return list(error.faults)
-    return physical_faults(board) or label_faults(board.assuming(load_prior(board.prior)))
+    named = load_named_cards(board)
+    return [*physical_faults(board), *named.faults] or label_faults(board.assuming(named.prior))

@@ -93,6 +93,8 @@ def _effects_from_text(context: click.Context, option: click.Parameter, effects:
     if effects is None:
         return None
     names = [name.strip() for name in effects.split(",") if name.strip()]
+    if not names:
+        raise click.UsageError('--effects: wanted names, or "none", got nothing.')
     refuse_both("none" in names, len(names) > 1, "--effects none declares nothing and a name declares an effect")
     return [] if "none" in names else names
 

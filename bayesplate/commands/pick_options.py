@@ -127,8 +127,9 @@ def place_faults(arguments: Mapping[str, Any]) -> Iterator[Fault]:
             continue
         for number, place in enumerate(places, start=1):
             is_pair = isinstance(place, list | tuple) and len(place) == 2
+            remedy = f"{argument}=[(0.02, 0.02)], or --{argument} 20,20 in mm"
             if not is_pair or not all(map(is_number, place)):
-                yield Fault(f"{argument} {number}", "a place (x, y) in m", value_text(place), "hammer=[(0.02, 0.02)]")
+                yield Fault(f"{argument} {number}", "a place (x, y) in m", value_text(place), remedy)
 
 
 def band_faults(arguments: Mapping[str, Any], lowest: float, highest: float) -> Iterator[Fault]:

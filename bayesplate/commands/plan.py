@@ -30,7 +30,7 @@ from bayesplate.commands.options import (
 )
 from bayesplate.commands.prepare import CardSource, PreparedBoard
 from bayesplate.commands.printout import Printout, show_plan
-from bayesplate.commands.problem import Problem
+from bayesplate.commands.problem import Problem, require_normal_noise
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.hypotheses import RELABELLING
 from bayesplate.diagnosis.joint import full_search
@@ -167,9 +167,8 @@ def plan(
     new_plan, benches = draw_up_plan(
         planner, planned_card.name, planned_card.title, planned_card.sha256, priors, request.shared
     )
-    if folder is not None:
-        _write(new_plan, benches, folder, files)
-    return PlanResult(new_plan, benches, tuple(path for path in files if path.exists()))
+    written = () if folder is None else _write(new_plan, benches, folder, files)
+    return PlanResult(new_plan, benches, written)
 
 
 @dataclass(frozen=True)
@@ -199,6 +198,7 @@ def _board_beliefs(
     progress: OnProgress,
 ) -> Beliefs:
     """Beliefs of a board: from a search, from a finished diagnosis, or from the prior."""
+    require_normal_noise([problem])
     prepared, rng = problem.prepared, random_stream(seed, BELIEFS_STREAM)
     read_setups = tuple(setup for setup in prepared.board.setups if setup.readings or setup.peaks)
     prepared = replace(prepared, board=replace(prepared.board, setups=read_setups or prepared.board.setups))
@@ -213,7 +213,7 @@ def _board_beliefs(
             raise InputError(_frequencies_fault("between" if between else "goal", "a board without any"))
         return prior_beliefs(board, prior, rng)
     try:
-        baseline = baseline_of(Problem(prepared).posed)
+        baseline = baseline_of(replace(problem, prepared=prepared).posed)
     except NotIdentifiableError as error:
         if needs_frequencies:
             raise
@@ -302,7 +302,8 @@ def _read_diagnosis(folder: Path, prepared: PreparedBoard) -> _FinishedDiagnosis
     return _FinishedDiagnosis(survivors, p_none, rivals) if survivors else None
 
 
-def _write(new_plan: Plan, benches: Sequence[Bench], folder: Path, files: Sequence[Path]) -> None:
+def _write(new_plan: Plan, benches: Sequence[Bench], folder: Path, files: Sequence[Path]) -> tuple[Path, ...]:
+    """Write a plan and its figures, in place of all files of an earlier one; the files that were written."""
     from bayesplate.report.planning import bench_sheet, gains_picture
     from bayesplate.report.saving import matplotlib_defaults, save_figure
 
@@ -313,3 +314,7 @@ def _write(new_plan: Plan, benches: Sequence[Bench], folder: Path, files: Sequen
         for i, figure in enumerate(figures):
             for path in files[1 + 2 * i : 3 + 2 * i]:
                 save_figure(figure, path)
+    n_written = 1 + 2 * len(figures)
+    for path in files[n_written:]:
+        path.unlink(missing_ok=True)
+    return tuple(files[:n_written])

@@ -302,3 +302,10 @@ def as_problem(
         names = ", ".join(name for name, is_given in is_stated.items() if is_given)
         raise InputError(Fault(names, "nothing beside a Problem", "a value", "Problem.from_card takes it"))
     return card
+
+
+def require_normal_noise(problems: Sequence[Problem]) -> None:
+    """Refuse problems with robust noise; raises InputError."""
+    if any(problem.robust for problem in problems):
+        wanted = "a problem with normal noise, which the search for an effect assumes"
+        raise InputError(Fault("robust", wanted, "Student's distribution"))

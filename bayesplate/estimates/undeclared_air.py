@@ -49,7 +49,8 @@ def air_sentence(board: Board, estimate: Estimate) -> str:
     if np.abs(rise).max() < SMALLEST_RISE:
         return ""
     is_stated = any(setup.fluid is not None for setup in board.setups)
-    remedy = "the card states it: --effects fluid_loading, or its name among the effects of the card, puts it in"
+    effects = ",".join((*board.effects, "fluid_loading"))
+    remedy = f"the card states it: --effects {effects}, or fluid_loading among the effects of the card, puts it in"
     if not is_stated:
         remedy = 'add to [setup.fluid] the lines density_kg_m3 = 1.2 and baffle = "none"'
     changes = [f"{name} {100.0 * change:+.1f} %" for name, change in zip(board.symmetry.moduli, rise, strict=False)]

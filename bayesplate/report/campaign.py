@@ -112,7 +112,8 @@ def boards_picture(summary: CampaignSummary) -> Picture:
             panel.axvspan(low, high, color=LIGHT, label="the next board, 90 %")
         for row, board in enumerate(boards):
             draw_whisker(panel, row, _interval_ends(summary.boards[board].elastic[name], GPA), BLUE)
-        draw_heading(panel, modulus_title(name))
+        isotropic = all(board.model.isotropic for board in summary.boards.values())
+        draw_heading(panel, modulus_title(name, isotropic=isotropic))
         panel.set(xlabel="GPa")
     draw_legend(figure, 2, legend_entry("board, 90 %", BLUE, "o"))
     details = "; ".join(f"{board} E_x {plus_minus(fit.elastic.E_x, GPA)} GPa" for board, fit in summary.boards.items())
@@ -167,7 +168,7 @@ def left_out_picture(diagnosis: CampaignDiagnosis) -> Picture:
     )
     caption = (
         "To the right: the board's readings are more probable with the effect as the other boards teach it than "
-        "without it. A claim rests on these bars alone."
+        "without it. A claim asks that most bars do so, and clearly in sum."
     )
     return Picture("left-out", "Boards that were left out", f"Gains: {details}.", caption, figure)
 

@@ -131,16 +131,18 @@ def percentiles_pictures(draws: Draws) -> list[Picture]:
     estimate = percentile_estimate(system)
     if estimate is None or estimate.n_subsets == 1 or not np.isfinite(list(estimate.mean.values())).all():
         return []
-    return [_percentiles_picture(estimate, system.psi.size, draws.moduli)]
+    return [_percentiles_picture(estimate, system.psi.size, draws.moduli, isotropic=problem.board.isotropic)]
 
 
-def _percentiles_picture(percentile: PercentileEstimate, n_modes: int, moduli: Mapping[str, Floats]) -> Picture:
+def _percentiles_picture(
+    percentile: PercentileEstimate, n_modes: int, moduli: Mapping[str, Floats], *, isotropic: bool
+) -> Picture:
     """Estimates of each modulus: a dot for each subset of modes, at the height of its number of modes."""
     heights = [min(1.9, 0.5 + 0.24 * (n_modes - 2))] * len(MODULI)
     figure, panels = stacked_panels(heights, left=0.55, top=0.3, bottom=0.95, gap=0.72)
     for panel, name in zip(panels, MODULI, strict=True):
         _draw_estimates(panel, name, percentile, n_modes, moduli[name])
-        draw_heading(panel, modulus_title(name))
+        draw_heading(panel, modulus_title(name, isotropic=isotropic))
         panel.set(ylabel="modes used")
     draw_legend(figure, 2)
     kept_counts = ", ".join(

@@ -185,12 +185,14 @@ def setups_table(board: Board) -> Table:
 
 
 def priors_table(prior: PriorCard) -> Table:
-    rows = tuple((name, _prior_text(stated.quantity), stated.source) for name, stated in prior.stated_constants.items())
+    rows = tuple(
+        (name, _prior_text(name, stated.quantity), stated.source) for name, stated in prior.stated_constants.items()
+    )
     return Table(f"Prior card {prior.name}", ("constant", "density", "source"), rows)
 
 
-def _prior_text(quantity: Quantity) -> str:
-    unit, factor = ("GPa", GPA) if quantity.median > 1e4 else ("N m", 1.0)
+def _prior_text(name: str, quantity: Quantity) -> str:
+    unit, factor = ("N m", 1.0) if name.startswith("D") else ("GPa", GPA)
     if quantity.kind == "log-normal":
         return f"log-normal, median {quantity.median * factor:.4g} {unit}, factor {quantity.factor:.3g}"
     return f"log-uniform, {quantity.lower * factor:.4g} to {quantity.upper * factor:.4g} {unit}"

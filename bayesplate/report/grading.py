@@ -40,7 +40,7 @@ from bayesplate.report.style import (
     shorten,
     stacked_panels,
 )
-from bayesplate.results.folder import PAGE_FILE
+from bayesplate.results.folder import GRADING_PAGE, PAGE_FILE
 from bayesplate.results.tables import Table
 from bayesplate.results.words import percent
 
@@ -58,7 +58,7 @@ _NAME_OFFSET, _NAME_RISE, _NAME_LINE = 8.0, 3.0, SMALL_SIZE + 2.0
 """Typographic points: offset of a name beside and above its data point, and distance of two names."""
 _MOST_VECTORS = 1000
 """Most boards that are drawn as vectors; more would make a page of many megabytes."""
-_STYLES = {"E_x": (BLUE, "o"), "E_y": (ORANGE, "D"), "G_xy": (GREEN, "s")}
+_STYLES = {"E_x": (BLUE, "o"), "E_y": (ORANGE, "D"), "G_xy": (GREEN, "s"), "density": (DARK, "^")}
 
 
 def grading_pictures(graded: Grading) -> dict[str, list[Picture]]:
@@ -185,7 +185,9 @@ def limits_picture(graded: Grading) -> Picture:
 def pairs_picture(graded: Grading) -> Picture:
     """The proposed pairs: differences of their constants, and the tolerance."""
     pairs = graded.pairs[:_MOST_PAIRS]
-    names = [name for name in MODULI if name in graded.request.match_percent] or list(MODULI)
+    tolerances = graded.request.match_percent
+    names = list(tolerances)
+    steps = np.linspace(-0.22, 0.22, len(names)) if len(names) > 1 else np.zeros(1)
     pair_names = [
         [shorten(drawable_text(graded.names[i]), _LONGEST) for i in (pair.first, pair.second)] for pair in pairs
     ]
@@ -195,20 +197,21 @@ def pairs_picture(graded: Grading) -> Picture:
     )
     for row, pair in enumerate(pairs):
         boards = [pair.first, pair.second]
-        for step, name in zip(np.linspace(-0.22, 0.22, len(names)), names, strict=True):
+        for step, name in zip(steps, names, strict=True):
+            width = tolerances[name]
+            panel.barh(row + step, width + 100.0 * width / (100.0 + width), left=-100.0 * width / (100.0 + width),
+                       height=0.42 / len(names), color=LIGHT, zorder=0)  # fmt: skip
             mean, sd = graded.log(FIGURES[name], boards)
             log_ratio, spread = float(mean[1] - mean[0]), HALF_WIDTH_90 * float(np.sqrt((sd**2).sum()))
             ends = 100.0 * np.expm1(log_ratio + spread * np.array([-1.0, 0.0, 1.0]))
             draw_whisker(panel, row + step, tuple(ends), *_STYLES[name])
         panel.annotate(str(percent(pair.probability)), (1.02, row), xycoords=("axes fraction", "data"), ha="left",
                        va="center", fontsize=SMALL_SIZE, weight="bold", annotation_clip=False)  # fmt: skip
-    for width in sorted({graded.request.match_percent.get(name, 0.0) for name in names}):
-        panel.axvspan(-100.0 * width / (100.0 + width), width, color=LIGHT, zorder=0)
     panel.axvline(0, color=DARK, lw=0.8)
-    panel.set(xlabel="constants of the partner over the board's, %")
+    panel.set(xlabel="value of the partner over the board's, %")
     draw_legend(figure, 3, *(legend_entry(mathtext(name), *_STYLES[name]) for name in names))
     alt = "; ".join(f"{graded.names[p.first]} and {graded.names[p.second]} {percent(p.probability)}" for p in pairs)
-    caption = "Grey: within the tolerance. Bars: 90 % intervals. A pair matches where all its bars lie in the grey."
+    caption = "Grey: within the tolerance. Bars: 90 % intervals. A pair matches where its values lie in the grey."
     return Picture("pairs", "Pairs that may match", f"Probabilities: {alt}.", caption, figure)
 
 
@@ -255,7 +258,6 @@ def _limit_band(panel: Axes, graded: Grading, name: str) -> None:
         )
 
 
-GRADING_PAGE = "grading.html"
 _TABLES = ("constants", "makers", "limits", "pairs", "doubts")
 
 

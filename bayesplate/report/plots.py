@@ -202,7 +202,9 @@ def _figure_of_picture(picture: Picture | None, place: str, wanted: str, got: st
 
 
 def _name_index(kind: str, name: str | None, names: Sequence[str]) -> int:
-    """Index of a name among `names`, 0 for None; InputError for another name."""
+    """Index of a name among `names`, 0 for None; InputError for another name, or where there is none."""
+    if not names:
+        raise InputError(Fault(kind, f"one {kind} or more", "none"))
     if name is not None and name not in names:
         raise InputError(Fault(kind, f"one of {', '.join(names)}", repr(name)))
     return 0 if name is None else list(names).index(name)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from bayesplate.board.writing import toml_value
+from bayesplate.effects.words import join_words
 from bayesplate.results.checking import CheckReport
 from bayesplate.results.comparison import MethodRow, ModulusEstimate, TheoryRow
 from bayesplate.results.sheets import EnergyShares, ModesReport, SheetReport, SheetRow
@@ -152,7 +154,12 @@ def _proposed_table(report: ModesReport) -> Table:
         label = proposal.label or _NO_MODE
         alternatives = {name: p for name, p in proposal.probability.items() if name != label and p > _LEAST_ALTERNATIVE}
         rows.append(
-            (proposal.measured_hz, label, percent(proposal.probability[label]), probabilities_text(alternatives))
+            (
+                mode_name(f"{proposal.measured_hz:g}", proposal.setup, several=len(report.setups) > 1),
+                label,
+                percent(proposal.probability[label]),
+                probabilities_text(alternatives),
+            )
         )
     return Table(f"Labels proposed for the peaks of {report.name}", ("Hz", "mode", "probability", "or"), tuple(rows))
 
@@ -161,12 +168,17 @@ def proposal_remarks(report: ModesReport) -> tuple[str, ...]:
     """How to use proposed labels: compare the figures, then write the labels on the card."""
     if not report.proposed:
         return ()
-    lines = ", ".join(
-        f'"{proposal.label}" = {proposal.measured_hz:g}' for proposal in report.proposed if proposal.label
+    frequencies: dict[str, dict[str, float]] = {}
+    for proposal in report.proposed:
+        if proposal.label:
+            frequencies.setdefault(proposal.setup, {})[proposal.label] = proposal.measured_hz
+    tables = (
+        f"frequencies_hz = {toml_value(labelled)}" + (f" in setup {setup}" if len(report.setups) > 1 else "")
+        for setup, labelled in frequencies.items()
     )
     return (
         "no peak has a label, so these are proposals: compare the figures in sand with the sheet, then write "
-        f"frequencies_hz = {{ {lines} }}",
+        f"{join_words(tuple(tables))}",
     )
 
 

@@ -32,7 +32,8 @@ BEFORE_AFTER_FILES = ("before-after.csv", "before-after.tex")
 KNOWN_EFFECTS_FILES = ("known-effects.csv", "known-effects.tex")
 EARLIER_FOLDER = "earlier"
 """Subfolder of the checkpoint with the results that a run replaces, until it is done."""
-BATCH_FILES = ("batch.json", "boards.jsonl", "boards.csv", "boards.parquet", "grading.csv", "grading.html")
+GRADING_PAGE = "grading.html"
+BATCH_FILES = ("batch.json", "boards.jsonl", "boards.csv", "boards.parquet", "grading.csv", GRADING_PAGE)
 RESULT_FILES = (
     SUMMARY_FILE,
     ARCHIVE_FILE,

@@ -39,6 +39,12 @@ def test_cards_that_are_not_there_are_named_at_once():
     assert table_alone.prior is not None
 
 
+def test_a_board_that_was_read_names_its_cards_still():
+    for card in ("fiemme-spruce-clamped", Board.from_toml("fiemme-spruce-clamped")):
+        (setup,) = prepare(card).board.setups
+        assert setup.published_coefficients.name == "paper-clamped", card
+
+
 def test_cards_are_found_beside_the_board(tmp_path):
     """Wherever the program was started: a relative path begins at the folder of the board card."""
     text = changed("poisson_xy = 0.51", 'prior = "./mine.toml"')
@@ -78,6 +84,8 @@ def test_the_former_name_of_an_effect_is_accepted_wherever_one_is_named():
     found = bayesplate.Problem.from_card("finnish-spruce-cantilever", effects=["air_loading"])
     assert found.prepared.board.effects == ("fluid_loading",)
     assert found.prepared.board.without(["air_loading"]).effects == ()
+    with pytest.raises(InputError, match="effects: wanted a list of names, got 'air_loading'"):
+        found.prepared.board.without("air_loading")
     with pytest.raises(InputError, match='effects 2: wanted each name once, got "fluid_loading" again'):
         bayesplate.Problem.from_card("finnish-spruce-cantilever", effects=["fluid_loading", "air_loading"])
 

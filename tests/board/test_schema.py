@@ -468,6 +468,7 @@ REMARKS = [
     (MASS, "mass_g = [41, 41]", (), ["were taken as rounded, mass to 1 g;"]),
     (MASS, WARP, (), ["were taken as rounded, cup to 0.1 mm;"]),
     (THICKNESS, "{ mean = 11.5, sd = 0.1 }", (), ["the thickness is 1/9.9 of the shorter side", THICK]),
+    (THICKNESS, "{ mean = 11.5, sd = 0.1 }", ("warp",), [THICK, "declare it with --effects warp,transverse_shear"]),
     (THICKNESS, "{ mean = 11.5, sd = 0.1 }", ("transverse_shear",), []),
     (THICKNESS, "{ mean = 11.3, sd = 0.1 }", (), []),
     ("{ x0 = 30 }", "{ x0 = 224 }", (), [THICK]),

@@ -185,6 +185,18 @@ def test_a_card_and_the_same_numbers_in_python_are_one_board():
     assert alone == Quantity.from_mean(1e-3, 1e-3, "normal", lower=0.0)
 
 
+def test_readings_that_are_all_alike_are_not_taken_as_rounded_once_they_are_in_python():
+    setup = Setup.from_frequencies({"(1,1)": 50.0, "(2,0)": 60.0, "(0,2)": 70.0}, edges="free", hammer=[0.02, 0.01])
+    board = Board.from_numbers(
+        "alike", length_x=0.5, length_y=0.2, thickness=[0.003, 0.003], mass=np.array([0.1]), setups=setup
+    )
+    read_again = Board.from_text(board.to_toml(), "alike")
+
+    assert (board.inputs["thickness"].sd, board.inputs["mass"].sd) == (0.0, 0.0)
+    assert read_again == board
+    assert read_again.setups[0].hammer == (0.02, 0.01)
+
+
 def test_every_shipped_card_comes_back():
     for name in card_names("boards"):
         board = prepare(name).board

@@ -72,8 +72,8 @@ def test_what_all_boards_have_is_clear_of_zero():
 @pytest.mark.parametrize(
     ("refused", "told"),
     [
-        (("a",), "measure a again, or take it out of the campaign: it does not want what the others share"),
-        (("a", "b"), "measure a and b again, or take them out of the campaign: they do not want what the others share"),
+        (("a",), "measure a again, or take it out of the campaign: it disagrees with the others"),
+        (("a", "b"), "measure a and b again, or take them out of the campaign: they disagree with the others"),
         (("a", "b", "c"), "measure a, b and c again: they do not agree on what they share"),
     ],
 )

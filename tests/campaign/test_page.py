@@ -102,7 +102,7 @@ def test_what_is_claimed_is_said_and_what_is_not_is_said_too(diagnosis):
     assert campaign_claim_sentence(diagnosis).startswith("The boards share attached mass: 2 of 3")
     assert "5.0 ± 1.5 in log score" in campaign_claim_sentence(diagnosis)
     assert campaign_claim_sentence(refused).startswith("It is not claimed that the boards share attached mass")
-    assert "board-1 does not want it" in campaign_claim_sentence(refused)
+    assert "board-1 disagrees with the others" in campaign_claim_sentence(refused)
     assert campaign_claim_sentence(nothing) == "Nothing is claimed: nothing is lacking."
     assert "that the boards share transverse shear and attached mass: 2 of 3" in campaign_claim_sentence(group)
 

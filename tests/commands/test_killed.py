@@ -194,7 +194,7 @@ def test_a_folder_that_no_run_has_written_is_its_owners(tmp_path):
     folder = OutputFolder(tmp_path)
 
     for force in (False, True):
-        with pytest.raises(InputError, match="or one of an earlier run, got other files: boards.csv, figures"):
+        with pytest.raises(InputError, match=r"or one of an earlier run, got other files: boards\.csv, figures"):
             folder.require_usable(force=force, resume=False)
     (tmp_path / "summary.json").touch()
     folder.require_usable(force=True, resume=False)
@@ -206,7 +206,7 @@ def test_files_of_commands_that_share_the_folder_with_a_fit_do_not_make_it_a_use
 
     OutputFolder(tmp_path).require_usable(force=False, resume=False)
     (tmp_path / "plan.txt").touch()
-    with pytest.raises(InputError, match="got other files: plan.txt"):
+    with pytest.raises(InputError, match=r"got other files: plan\.txt"):
         OutputFolder(tmp_path).require_usable(force=False, resume=False)
 
 

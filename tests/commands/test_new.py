@@ -10,10 +10,12 @@ from stated import frequencies, millimetres
 
 import bayesplate
 from bayesplate.board.board import Board
+from bayesplate.board.prior import load_prior
 from bayesplate.board.setup_keys import edge_letters
 from bayesplate.cli import main
 from bayesplate.commands.new import new
 from bayesplate.commands.prepare import prepare
+from bayesplate.errors import InputError
 from bayesplate.frequencies.labels import label_faults
 from bayesplate.labels import Label
 
@@ -74,11 +76,12 @@ def test_the_examples_are_modes_that_the_board_has():
 
 def test_a_name_and_edges_that_cannot_be_are_asked_again_at_once():
     Path("there.toml").write_text("mine", encoding="utf-8")
-    answers = ["Böden", "there", "mine", "", "", "", "", "round", "cantilever", *[""] * 12]
+    answers = ["Böden", "there", "mine", "nan", "", "", "", "", "round", "cantilever", "sprouce", "spruce", *[""] * 12]
     result = invoke(answers="\n".join(answers))
 
     assert result.exit_code == 0, result.output
-    for said in ("name: wanted A-Z, a-z, 0-9", "there.toml: wanted a new file", 'edges: wanted "free"'):
+    for said in ("name: wanted A-Z, a-z, 0-9", "there.toml: wanted a new file", 'edges: wanted "free"',
+                 "a number with a decimal point", '"sprouce": wanted the name of a prior card'):  # fmt: skip
         assert said in result.stderr
     assert 'x0 = "clamped"' in Path("mine.toml").read_text(encoding="utf-8")
 
@@ -102,6 +105,17 @@ def test_options_ask_nothing():
     assert "Next: bayesplate modes bare.toml" in invoke("bare", "--length-x", "253").output
     assert edge_letters(card.setups[0].edges) == "CFFF"
     assert frequencies(card.setups[0])[Label(1, 0)].mean == 52
+
+
+def test_a_prior_is_looked_for_where_the_card_will_look_and_digits_are_kept():
+    Path("own.toml").write_text(load_prior("spruce").to_toml().replace('"spruce"', '"own"'), encoding="utf-8")
+    with pytest.raises(InputError, match=r"b\.toml \[material\] prior -> sub/own\.toml: wanted"):
+        new("sub/b", prior="own.toml")
+    new("sub/b", prior="../own.toml", sizes={"mass": 1234.567}, frequencies={"(1,1)": 1234.567})
+    board = Board.from_toml("sub/b.toml")
+
+    assert board.inputs["mass"].mean == pytest.approx(1.234567, rel=1e-12)
+    assert board.setups[0].readings[0].frequency.mean == 1234.567
 
 
 def test_a_folder_is_no_name_of_a_card():

@@ -73,6 +73,22 @@ def test_the_sheet_says_where_each_mode_will_be_and_is_seen(planned):
     assert found["first"].split(":")[0] in " ".join(printed.split())
 
 
+def test_no_sheet_of_an_earlier_plan_is_left(planned, monkeypatch):
+    """A plan for which the board is held one way has no second sheet."""
+    out, files = planned[0], [planned[0] / name for name in home._file_names()]
+    monkeypatch.setattr("bayesplate.report.planning.gains_picture", lambda _: SimpleNamespace(figure="drawn"))
+    monkeypatch.setattr("bayesplate.report.planning.bench_sheet", lambda _: "drawn")
+    monkeypatch.setattr("bayesplate.report.saving.save_figure", lambda figure, path: path.write_text(figure))
+    earlier = {path: path.read_bytes() for path in files}
+    try:
+        written = home._write({}, ["one"], out, files)
+        assert {path.name for path in written} == FILES - {"plan-bench-2.png", "plan-bench-2.svg"}
+        assert set(out.iterdir()) == {*written}
+    finally:
+        for path, content in earlier.items():
+            path.write_bytes(content)
+
+
 def free_board(hertz):
     """A board of some readings, under the default prior, whose moduli are independent: a part is no material's."""
     setup = bayesplate.Setup.from_frequencies(hertz, edges="free")

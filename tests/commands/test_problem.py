@@ -197,6 +197,7 @@ def test_what_is_no_point_or_no_problem_or_states_it_again_is_refused(clamped):
     """A diagnosis wants normal noise, which its search assumes."""
     campaign = bayesplate.Campaign.from_card("spruce-half-tops")
     robust = bayesplate.Problem.from_card(BOARD, robust=True)
+    robust_campaign = bayesplate.Campaign.from_card("spruce-half-tops", robust=True)
     points = r"theta: wanted .* \(4,\) or \(n, 4\), columns log_D_x.* got "
     no_board = r"card: wanted a board: .* got a Campaign \(its boards are"
     for function, given, options, said in (
@@ -214,6 +215,11 @@ def test_what_is_no_point_or_no_problem_or_states_it_again_is_refused(clamped):
         (bayesplate.modes, clamped, {"effects": []}, "effects: wanted nothing beside a Problem"),
         (bayesplate.cite, clamped, {"effects": []}, "effects: wanted nothing beside a Problem"),
         (bayesplate.diagnose, robust, {}, "robust: wanted a problem with normal noise"),
+        (bayesplate.plan, robust, {}, "robust: wanted a problem with normal noise"),
+        (bayesplate.diagnose, robust_campaign, {}, "robust: wanted a problem with normal noise"),
+        (bayesplate.Campaign.from_card, clamped, {}, "card: wanted a name or a path"),
+        (bayesplate.Board.from_toml, 3, {}, "board card: wanted a name or a path, got 3"),
+        (bayesplate.Board.from_text, 3, {"name": "b"}, r"b\.toml: wanted the text of a card, got 3"),
     ):
         with pytest.raises(bayesplate.InputError, match=said):
             function(given, **options)

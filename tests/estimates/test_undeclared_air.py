@@ -55,7 +55,7 @@ def test_an_isotropic_board_has_one_constant_to_tell_of():
     assert air_sentence(board, estimate) == ""
 
 
-def test_the_sentence_says_by_how_much_and_what_to_add_but_for_lines_that_the_card_has():
+def test_the_sentence_says_by_how_much_and_what_to_add_but_for_lines_that_the_card_has(monkeypatch):
     """By `effects = []` what a card states is not declared: a fit without it is meant."""
     board, estimate = in_air(HALF_TOP, BEAMS["half-top"])
     E_x, E_y, G_xy = (f"{100.0 * one:+.1f} %" for one in rise_with_air(board, estimate))
@@ -64,6 +64,10 @@ def test_the_sentence_says_by_how_much_and_what_to_add_but_for_lines_that_the_ca
     assert told.endswith('add to [setup.fluid] the lines density_kg_m3 = 1.2 and baffle = "none"')
     stated = tuple(replace(setup, fluid=DeclaredFluid(1.2, "none")) for setup in board.setups)
     told = air_sentence(replace(board, setups=stated, effects=()), estimate)
-    assert told.endswith("--effects fluid_loading, or its name among the effects of the card, puts it in")
+    assert told.endswith("--effects fluid_loading, or fluid_loading among the effects of the card, puts it in")
     assert "add to" not in told
+    monkeypatch.setattr("bayesplate.estimates.undeclared_air.rise_with_air", lambda *_: np.full(3, 0.1))
+    told = air_sentence(replace(board, setups=stated, effects=("transverse_shear",)), estimate)
+    assert "--effects transverse_shear,fluid_loading, or" in told
+    monkeypatch.undo()
     assert air_sentence(declare(replace(board, effects=("fluid_loading",))), estimate) == ""

@@ -12,7 +12,9 @@ from diagnoses import DIAGNOSES
 from made_isotropic import steel
 from made_reports import FIGURES, cut_off
 from made_summaries import spread
+from matplotlib.text import Text
 
+from bayesplate.board.material import MODULI
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Peak
 from bayesplate.commands.prepare import prepare
@@ -161,6 +163,8 @@ def test_a_plate_without_grain_is_drawn_and_told_so():
         draws = SimpleNamespace(problem=Problem.from_card(board).posed, rigidities=constants, inputs={})
         (modes,) = modes_pictures(draws, SimpleNamespace(modes=()))
         words.append(modes.caption)
+        estimates = SimpleNamespace(problem=draws.problem, moduli=dict.fromkeys(MODULI, np.geomspace(1e11, 3e11, 8)))
+        words += [text.get_text() for one in percentiles_pictures(estimates) for text in one.figure.findobj(Text)]
         drawn = chladni_sheet(sheet(board, system_of(board, board.setups[0]), values, "as given")).texts
         words += [text.get_text() for text in (*panel.texts, *drawn)]
         told[isotropic] = sum("grain" in text for text in words), len(panel.lines)

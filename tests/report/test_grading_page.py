@@ -11,7 +11,7 @@ from read_pages import Read, faults, not_as_text
 
 from bayesplate.grading.boards import BatchSummary, BoardRow, FailedBoard
 from bayesplate.grading.matching import GradingRequest, grade
-from bayesplate.report.grading import MOST_NAMED_ROWS, speed_picture, write_grading_page
+from bayesplate.report.grading import MOST_NAMED_ROWS, pairs_picture, speed_picture, write_grading_page
 from bayesplate.results.contract import JOINT_NAMES, JointMoments
 
 LOG = np.log([12e9, 0.9e9, 0.7e9, 25.0, 2.0, 5.0, 440.0])
@@ -56,6 +56,17 @@ def test_no_name_stands_over_another_whether_boards_have_one_density_or_many(spr
 
     assert len(boxes) == 12
     assert not any(one.overlaps(other) for i, one in enumerate(boxes) for other in boxes[:i])
+
+
+def test_each_value_of_a_pair_lies_on_its_own_tolerance():
+    tolerances = {"E_x": 5.0, "E_y": 15.0, "density": 3.0}
+    graded = grade(rows_of(6, spread=0.005), GradingRequest(tolerances))
+    (panel,) = pairs_picture(graded).figure.axes
+
+    assert len(graded.pairs) > 1
+    greys = sorted((bar.get_y(), bar.get_x(), bar.get_width()) for bar in panel.patches)
+    expected = [ends for _ in graded.pairs for ends in ((-100 * p / (100 + p), p) for p in tolerances.values())]
+    np.testing.assert_allclose([(x, x + width) for _, x, width in greys], expected, rtol=1e-12)
 
 
 def test_the_page_says_what_was_found(few):
