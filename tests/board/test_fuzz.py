@@ -196,6 +196,14 @@ def test_what_is_spoilt_here_was_sound():
     assert [board.card().name for board in boards] == ["a", "b"]
 
 
+def test_a_card_without_a_setup_has_that_of_the_fragment_alone():
+    bare = {key: value for key, value in SOUND.items() if key != "setup"}
+    for name in ("", 'name = "held"\n'):
+        fragment = f'[setup]\n{name}edges = {{ x0 = "free", x1 = "free", y0 = "free", y1 = "free" }}\n'
+        whole, _ = merge_fragment(bare, "board.toml", written("fragment.toml", fragment))
+        assert isinstance(whole["setup"], dict), name
+
+
 HUGE = "0x" + "f" * 5000
 """A whole number of 20,000 bits, which TOML may have and Python does not write in tens."""
 

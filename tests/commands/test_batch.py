@@ -31,7 +31,9 @@ from bayesplate.board.prior import load_prior
 from bayesplate.cli import main
 from bayesplate.commands.batch import default_batch_folder
 from bayesplate.commands.batch_boards import list_boards
+from bayesplate.commands.batch_run import BatchRun
 from bayesplate.errors import BatchError, InputError
+from bayesplate.grading.boards import BoardRow
 from bayesplate.results.contract import json_text
 
 WHY = "correct their cards or rows: --resume then fits these alone"
@@ -329,6 +331,22 @@ def test_a_row_is_the_card_that_the_template_and_its_cells_make(table):
     assert len(two.setups[0].labels) == 4
 
 
+def test_a_board_is_complete_with_the_files_that_are_asked_for(tmp_path):
+    """Its folder, and its page only where there are pages, to which the batch's own page leads."""
+    row = BoardRow("top", "fitted")
+    (folder := tmp_path / "boards" / "top").mkdir(parents=True)
+    for files, expected in (
+        ((), (True, False, False)),
+        (("summary.json",), (True, True, False)),
+        (("report.html",), (True, True, True)),
+    ):
+        for file in files:
+            (folder / file).touch()
+        kept = [BatchRun([], None, tmp_path, *asked, None)._is_complete(row)
+                for asked in ((False, True), (True, False), (True, True))]  # fmt: skip
+        assert tuple(kept) == expected, files
+
+
 def test_two_boards_of_one_name_have_two_rows_and_one_line_whether_begun_or_gone_on_with(table, tmp_path):
     header, row = TABLE.splitlines()[0], next(line for line in TABLE.splitlines() if line.startswith("twice,"))
     (tmp_path / "tops.csv").write_text("\n".join([header, row, row]) + "\n")
@@ -337,6 +355,8 @@ def test_two_boards_of_one_name_have_two_rows_and_one_line_whether_begun_or_gone
     for resume in (False, True):
         result = bayesplate.batch(table, folder, template=template, resume=resume, report=False)
         found.append((result.table.read_bytes(), (folder / "boards.jsonl").read_bytes()))
+        assert not (folder / "grading.html").exists()
+        (folder / "grading.html").write_text("of another grading")
 
     assert found[0] == found[1]
     assert (found[0][0].count(b"more than once"), found[0][1].count(b"\n")) == (2, 1)

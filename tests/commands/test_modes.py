@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import tomllib
 from dataclasses import replace
 
 import numpy as np
@@ -155,3 +157,9 @@ def test_bare_peaks_are_given_labels_and_told_how_to_write_them(tmp_path):
         assert sum(one.probability.values()) == pytest.approx(1.0)
     measured = {mode.label: mode.measured_hz for mode in report.setups[0].modes if mode.measured_hz is not None}
     assert measured == {one.label: one.measured_hz for one in report.proposed if one.label}
+    other = [replace(one, setup="other") for one in report.proposed]
+    two = replace(report, setups=(report.setups[0],) * 2, proposed=(*report.proposed, *other))
+    (remark,) = show_modes(two).remarks
+    own, others = re.findall(r"frequencies_hz = \{ .*? \}(?= in setup)", remark)
+    assert tomllib.loads(own) == tomllib.loads(others) == {"frequencies_hz": measured}
+    assert [row[0] for row in show_modes(two).tables[0].rows][-1] == "176.2 other"

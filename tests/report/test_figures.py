@@ -15,6 +15,7 @@ from made_summaries import spread
 from matplotlib.text import Text
 
 from bayesplate.board.material import MODULI
+from bayesplate.board.prior import PriorCard
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Peak
 from bayesplate.commands.prepare import prepare
@@ -24,7 +25,7 @@ from bayesplate.frequencies.system import system_of
 from bayesplate.report.board import board_picture
 from bayesplate.report.chladni import chladni_sheet
 from bayesplate.report.constants import modulus_title, percentiles_pictures
-from bayesplate.report.content import inputs_table
+from bayesplate.report.content import inputs_table, priors_table
 from bayesplate.report.corner_plot import axis_label
 from bayesplate.report.diagnosis import null_picture
 from bayesplate.report.modes import modes_pictures, predictive_picture
@@ -314,6 +315,14 @@ def test_what_the_readings_made_of_each_prior(clamped):
     mean = clamped.summary.elastic.E_x.mean / 1e9
     assert np.log(found["E_x"].draws).mean() == pytest.approx(np.log(mean), rel=1e-3)
     assert np.log(found["noise"].prior.median) == pytest.approx(np.log(0.8))
+
+
+def test_a_prior_is_told_in_the_unit_of_its_constant_whatever_its_size():
+    thick = {name: Quantity.from_median(8e5, 2.0) for name in ("D_x", "D_y", "D_s")}
+    soft = {name: Quantity.from_median(8e3, 2.0) for name in MODULI}
+    for constants, words in ((thick, "median 8e+05 N m"), (soft, "median 8e-06 GPa")):
+        prior = PriorCard.from_quantities("mine", constants, source="made")
+        assert all(words in row[1] for row in priors_table(prior).rows)
 
 
 def test_the_corner_plot_names_a_quantity_in_two_lines():
