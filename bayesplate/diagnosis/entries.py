@@ -209,7 +209,7 @@ def _fate_without_need(result: SearchResult, verdict: Verdict) -> FateAndReason 
     if verdict.is_needed:
         return None
     fate: Fate = "not established" if verdict.word == "unexplained" else "not needed"
-    return fate, f"{fate}: nothing lacking has a probability of {result.probability_of_none:.2f}"
+    return fate, f"{fate}: that nothing is missing has a probability of {result.probability_of_none:.2f}"
 
 
 def _fate_of_misfit(result: SearchResult, index: int) -> FateAndReason | None:

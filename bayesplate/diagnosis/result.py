@@ -126,7 +126,7 @@ class Diagnosis:
     declared : tuple of str
         Effects that were part of the model from the beginning.
     known : tuple of KnownModel
-        What physics knows, computed before the search and not fitted: the board as it stands first, then with its
+        What physics knows, not fitted and not chosen by the search: the board as it stands first, then with its
         known effects in every combination of up to three, whether the card declares them or not.
     stated_claims : tuple of StatedClaim
         Whether it may be said that what the card states reduces the error; empty where it states no known effect.
@@ -145,7 +145,7 @@ class Diagnosis:
         Best first; the one that comes nearest where none is enough.
     elastic_averaged, rigidity_averaged : dict of Spread
         The constants to quote, Pa and N m: averaged over everything that may be the case, each by its probability; if
-        nothing explains the readings, those of the first fit. The rigidities are not written to JSON.
+        nothing explains the readings, those of the model named in part, or else of the first fit. The rigidities are not written to JSON.
     answers : tuple of ExplanationSummary
         Best first; with the probability of none they sum to one.
     candidates : tuple of EffectEntry and ExchangeEntry

@@ -48,9 +48,9 @@ class SheetMode:
     shape: Floats  # (n_x, n_y): of `sample_shapes` at `grid_points`
 
     @property
-    def miss_cents(self) -> float | None:
-        """Computed less measured, cents; None if it was not measured."""
-        return None if self.measured_hz is None else float(cents(np.log(self.hertz / self.measured_hz)))
+    def residual_cents(self) -> float | None:
+        """Measured over computed, cents; None if it was not measured."""
+        return None if self.measured_hz is None else float(cents(np.log(self.measured_hz / self.hertz)))
 
 
 @dataclass(frozen=True, eq=False)

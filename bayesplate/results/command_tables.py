@@ -117,7 +117,7 @@ def forward_table(theory: TheoryRow) -> Table:
         (
             mode_name(mode.label, mode.setup, several=several),
             mode.measured_hz,
-            *(number(method.forward[i].cents, 1, signed=True, factor=-1.0) for method in theory.methods),
+            *(number(method.forward[i].cents, 1, signed=True) for method in theory.methods),
             number(mode.left_out_cents, 1, signed=True),
         )
         for i, mode in enumerate(theory.modes)

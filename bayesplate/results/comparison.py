@@ -30,7 +30,7 @@ class ModulusEstimate:
 
 @dataclass(frozen=True)
 class ForwardPrediction:
-    """The exact law's prediction of one mode at a method's constants, and its excess over the reading."""
+    """The exact law's prediction of one mode at a method's constants, and the reading over it."""
 
     setup: str
     label: str

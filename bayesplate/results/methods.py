@@ -93,15 +93,15 @@ def _method_row(
     measured = np.array([reading.frequency.mean for _, reading in readings])
     is_plate = all(float(values[rigidity]) > 0 for rigidity in RIGIDITIES)
     predicted = full_frequencies(problem, values) if is_plate else np.full(measured.size, np.nan)
-    misses = cents(np.log(predicted / measured))
+    residuals = cents(np.log(measured / predicted))
     return MethodRow(
         name,
         Elastic(**elastic),
         condition_number,
         n_subsets,
         tuple(
-            ForwardPrediction(setup, str(reading.label), finite_or_none(float(hertz)), finite_or_none(float(miss)))
-            for (setup, reading), hertz, miss in zip(readings, predicted, misses, strict=True)
+            ForwardPrediction(setup, str(reading.label), finite_or_none(float(hertz)), finite_or_none(float(residual)))
+            for (setup, reading), hertz, residual in zip(readings, predicted, residuals, strict=True)
         ),
-        rms(misses) if is_plate else None,
+        rms(residuals) if is_plate else None,
     )

@@ -27,7 +27,7 @@ class SheetRow:
     label: str  # or "cannot tell"
     hz: float
     measured_hz: float | None
-    miss_cents: float | None  # computed over measured
+    residual_cents: float | None  # measured over computed
     likely_hz: tuple[float, float] | None  # interval of probability 2/3 of a mode that was not measured
     share_percent: EnergyShares
     # a, b, c: the paper's coefficients
@@ -134,4 +134,4 @@ def sheet_report(sheet: Sheet) -> SheetReport:
 def _sheet_row(mode: SheetMode) -> SheetRow:
     shares = EnergyShares(*(round(100.0 * float(share), 1) for share in mode.shares))
     a, b, c = (float(value) for value in mode.coefficients)
-    return SheetRow(mode.name, mode.hertz, mode.measured_hz, mode.miss_cents, mode.band_hz, shares, a, b, c)
+    return SheetRow(mode.name, mode.hertz, mode.measured_hz, mode.residual_cents, mode.band_hz, shares, a, b, c)

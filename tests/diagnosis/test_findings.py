@@ -136,7 +136,7 @@ def test_an_exchange_is_told_with_its_likelihood_ratio():
         found = made({(): 0.5, (RELABELLING,): 0.1}, residual=QUIET)
         found = replace(found, log_evidence=np.array([2.0, 0.0, 0.0, 0.0, 2.0 + gained, 0.0]))
         told = entries(found)[RELABELLING]
-        assert told.rejected_because.startswith("not needed: nothing lacking has a probability of 0.50; with these")
+        assert told.rejected_because.startswith("not needed: that nothing is missing has a probability of 0.50; with these")
         assert told.rejected_because.endswith(f" labels exchanged the readings are {words}")
         assert told.log_bayes_factor == pytest.approx(gained)
 
@@ -192,7 +192,7 @@ def test_a_candidate_that_is_not_needed_is_told_with_the_probability_of_none():
     calm = made({(): 0.1, (SHEAR,): 0.9}, residual=QUIET)
     for found, fate in ((calm, "not needed"), (replace(calm, residual=BEYOND_NOISE), "not established")):
         told = entries(found)[SHEAR]
-        assert (told.fate, told.rejected_because) == (fate, f"{fate}: nothing lacking has a probability of 0.10")
+        assert (told.fate, told.rejected_because) == (fate, f"{fate}: that nothing is missing has a probability of 0.10")
 
 
 def test_the_winner_that_fails_the_gate_is_told_so():
