@@ -85,7 +85,7 @@ STATED = (
     ),
 )
 STATED_COLUMNS = ("board", "with", "how", "error, cents", "left out", "E_x, GPa", "known from", "compare")
-SHORT_COLUMNS = ("board", "what acts on it", "error left out, cents", "E_x, GPa", "known from elsewhere")
+SHORT_COLUMNS = ("board", "what acts on it", "leave-one-out error, cents", "E_x, GPa", "known from elsewhere")
 COMPUTED, FITTED = "computed, nothing of it fitted", "fitted"
 STATED_HEAD = """# Closing the loop on measured boards
 
@@ -110,7 +110,7 @@ and leaves more than noise.
   itself; left out: of each mode by a fit that has not seen it; nested: the same, and the effect is searched for again
   without that mode.
 - E_x, E_y, G_xy: what the effect changes each constant by, in standard deviations of the first fit.
-- Nearest: where nothing explains the board, the effect that comes nearest, and the error left out with it, in cents.
+- Nearest: where nothing explains the board, the effect that comes nearest, and its leave-one-out error, in cents.
 - Known: what the card states, its sizes not chosen by the readings, and the error that may be said to be reduced.
 - Fact: what is known of the board apart from its frequencies, and speaks for or against the verdict.
 
@@ -201,7 +201,7 @@ def _fitted(board: str, effects: Sequence[str], seed: int) -> tuple[str, str, st
 def rows(diagnoses: Mapping[str, Diagnosis]) -> list[tuple[str, ...]]:
     """One row per board: errors in cents before -> after, shift of each constant in standard deviations.
 
-    Nearest is for a board that nothing explains: what comes nearest, and the left-out error with it.
+    Nearest is for a board that nothing explains: what comes nearest, and the leave-one-out error with it.
     """
     return [
         (

@@ -30,17 +30,17 @@ _FEWEST_SCORED_MODES = 2
 IMPROBABLE_IN_PART_BELOW = 1e-4
 """Bound on the probability of no effect where an effect is named in part."""
 LARGEST_ERROR_RATIO = 2.0 / 3.0
-"""Nested left-out error after over before, at most, where an effect is named in part."""
+"""Nested leave-one-out error after over before, at most, where an effect is named in part."""
 
 
 @dataclass(frozen=True)
 class Condition:
     """One condition of the claim."""
 
-    # "chance selection": nested left-out error after over before, to be below that of 95 % of null simulations made to
-    # choose. "log score": nested gain, to exceed two standard errors. "probability of none": the largest over the
-    # widths of the sizes' priors, to be below 0.05. "probability of another": that something else is lacking than what
-    # the verdict tells, the largest over the same widths, to be below 0.05. "prior predictive": p-value with the
+    # "chance selection": nested leave-one-out error after over before, to be below that of 95 % of null simulations
+    # made to choose. "log score": nested gain, to exceed two standard errors. "probability of none": the largest over
+    # the widths of the sizes' priors, to be below 0.05. "probability of another": that something else is lacking than
+    # what the verdict tells, the largest over the same widths, to be below 0.05. "prior predictive": p-value with the
     # effect, at least 0.05.
     name: ConditionName
     # value, limit: None where too few readings leave nothing to judge by
@@ -97,7 +97,7 @@ def effects_named_in_part(
 
     These are the effects of the nearest explanation, if its p-value is too small and none of its sizes is at a limit,
     the probability of no effect is below `IMPROBABLE_IN_PART_BELOW`, it stands out under every other assumption, and
-    the nested left-out error falls to `LARGEST_ERROR_RATIO` or further. The verdict stays what it is, nothing is
+    the nested leave-one-out error falls to `LARGEST_ERROR_RATIO` or further. The verdict stays what it is, nothing is
     claimed, and the constants are not to be trusted.
     """
     nearest = verdict.nearest

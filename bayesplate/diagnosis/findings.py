@@ -82,7 +82,7 @@ class Case:
     has_slip: bool = False  # whether the fit without an effect names a reading or two that a slip explains
     notes: tuple[str, ...] = ()
     effects_in_part: tuple[str, ...] = ()  # effects that explain the readings in part
-    # modes that count in no left-out error or score, before and after alike
+    # modes that count in no leave-one-out error or score, before and after alike
     carrying_modes: tuple[CarryingMode, ...] = ()
 
     @property
@@ -180,7 +180,7 @@ def _model_errors(case: Case, model: FittedModel) -> ModelErrors:
 
 
 def left_out_rms_cents(summary: Summary, carrying_modes: Sequence[CarryingMode]) -> float | None:
-    """Left-out error of a fit, rms cents, without the modes that alone carry a constant or a size in a model."""
+    """Leave-one-out error of a fit, rms cents, without the modes that alone carry a constant or a size in a model."""
     if set(carrying_modes) <= set(summary.carrying_modes):
         return summary.error.leave_one_out_rms_cents
     return rms([row.left_out_cents for row in drop_carrying_modes(summary.modes, carrying_modes)])

@@ -40,14 +40,14 @@ class KnownModel:
     leave_one_out_rms_cents: float | None
     change_percent: Mapping[str, float]  # of E_x, E_y, G_xy against the board as it stands
     combination: tuple[str, ...]  # all known effects that it has, declared or not
-    n_left_out: int  # readings that have a left-out error
+    n_left_out: int  # readings that have a leave-one-out error
     n_readings: int  # all of them
 
 
 def known_models(fits: Sequence[KnownFit], carrying_readings: Sequence[int] = ()) -> tuple[KnownModel, ...]:
     """Errors in cents and changes in percent, in the order of the fits, the board as it stands first.
 
-    `carrying_readings`, whose mode alone carries a constant or a size, do not count in the left-out errors.
+    `carrying_readings`, whose mode alone carries a constant or a size, do not count in the leave-one-out errors.
     """
     if not fits:
         return ()
@@ -125,12 +125,13 @@ def known_sentence(known_models: Sequence[KnownModel]) -> str:
 
 
 def _partial_error_sentences(known: Sequence[KnownModel]) -> list[str]:
-    """A sentence on how many readings have a left-out error, where not all have one."""
+    """A sentence on how many readings have a leave-one-out error, where not all have one."""
     n, n_all = known[0].n_left_out, known[0].n_readings
     if n in (0, n_all):
         return []
     return [
-        f"Left-out errors are of {n} of {n_all} readings: without one of the others a model leaves a constant open."
+        f"Leave-one-out errors are of {n} of {n_all} readings: without one of the others a model leaves a constant "
+        "open."
     ]
 
 
@@ -139,7 +140,7 @@ class _ComparedError:
 
     def __init__(self, known: Sequence[KnownModel]) -> None:
         self._is_left_out = all(model.leave_one_out_rms_cents is not None for model in known)
-        self.name = "left-out error" if self._is_left_out else "error in the fit"
+        self.name = "leave-one-out error" if self._is_left_out else "error in the fit"
 
     def of(self, model: KnownModel) -> float:
         left_out = model.leave_one_out_rms_cents if self._is_left_out else None
@@ -208,7 +209,7 @@ def stated_sentence(claim: StatedClaim) -> str:
     if claim.predicts:
         prediction = f"the error of setup '{claim.predicts}', predicted by the constants of the first setup alone,"
     else:
-        prediction = "the left-out error"
+        prediction = "the leave-one-out error"
     sentence = (
         f"{subject[0].upper()}{subject[1:]} {verb} {prediction} from {claim.before_rms_cents:.1f} to "
         f"{claim.after_rms_cents:.1f} cents; the log score changes by {claim.log_score_gain:+.1f} ± "

@@ -25,7 +25,7 @@ _BATCH, _CONFIDENCE = 100, 0.99
 FALSE_ALARMS = 0.02
 """Share of boards without any effect on which an effect is called needed."""
 CHANCE_SHARE = 0.05
-"""Share of such boards, each made to choose an effect, whose left-out error falls further than a claim needs."""
+"""Share of such boards, each made to choose an effect, whose leave-one-out error falls further than a claim needs."""
 
 
 @dataclass(frozen=True, eq=False)

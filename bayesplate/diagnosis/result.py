@@ -145,7 +145,8 @@ class Diagnosis:
         Best first; the one that comes nearest where none is enough.
     elastic_averaged, rigidity_averaged : dict of Spread
         The constants to quote, Pa and N m: averaged over everything that may be the case, each by its probability; if
-        nothing explains the readings, those of the model named in part, or else of the first fit. The rigidities are not written to JSON.
+        nothing explains the readings, those of the model named in part, or else of the first fit. The rigidities are
+        not written to JSON.
     answers : tuple of ExplanationSummary
         Best first; with the probability of none they sum to one.
     candidates : tuple of EffectEntry and ExchangeEntry
@@ -157,7 +158,7 @@ class Diagnosis:
     in_part_words : str
         The same as people read it; not written to JSON.
     carrying_modes : tuple of CarryingMode
-        Modes that alone carry a constant or a size, before or after: they count in no left-out error and no score.
+        Modes that alone carry a constant or a size, before or after: they count in no leave-one-out error and no score.
     """
 
     format: int = FORMAT

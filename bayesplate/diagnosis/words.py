@@ -75,7 +75,7 @@ class FigureOfMerit:
     @property
     def title(self) -> str:
         """The words as a row of a table has them."""
-        return f"error {self.words}, rms cents" if self.is_rms else self.words
+        return f"{self.words}, rms cents" if self.is_rms else self.words
 
 
 def _cents(value: float | None) -> Value:
@@ -83,13 +83,13 @@ def _cents(value: float | None) -> Value:
 
 
 MERITS = (
-    FigureOfMerit("in the fit", lambda errors: errors.in_sample_rms_cents, _cents, True),
-    FigureOfMerit("of a mode left out", lambda errors: errors.leave_one_out_rms_cents, _cents, True),
-    FigureOfMerit("left out, the search repeated", lambda errors: errors.nested_leave_one_out_rms_cents, _cents, True),
+    FigureOfMerit("error in the fit", lambda errors: errors.in_sample_rms_cents, _cents, True),
+    FigureOfMerit("leave-one-out error", lambda errors: errors.leave_one_out_rms_cents, _cents, True),
+    FigureOfMerit("nested leave-one-out error", lambda errors: errors.nested_leave_one_out_rms_cents, _cents, True),
     FigureOfMerit("log score", lambda errors: errors.log_score, lambda value: number(value, 2)),
     FigureOfMerit("readings inside their 90 % intervals", lambda errors: errors.hits_90, percent),
 )
-"""Figures of merit in the order of the tables: the first falls with every added effect, the third is the honest one."""
+"""Figures of merit in the order of the tables: the first mostly falls with an effect, the third is the honest one."""
 
 
 def verdict_meaning(diagnosis: Diagnosis) -> str:
@@ -101,7 +101,7 @@ def verdict_meaning(diagnosis: Diagnosis) -> str:
 
 
 def claim_sentence(diagnosis: Diagnosis) -> str:
-    """The change of the left-out error, and whether an improvement is claimed; empty where no effect was added."""
+    """The change of the leave-one-out error, and whether an improvement is claimed; empty where no effect was added."""
     if not diagnosis.is_refitted:
         return ""
     change, is_gain = _error_change(diagnosis)
@@ -136,9 +136,9 @@ class ConditionWords:
 
 CONDITIONS: dict[ConditionName, ConditionWords] = {
     "chance selection": ConditionWords(
-        "left-out error after over before",
+        "leave-one-out error after over before",
         "below {limit}, what 95 of 100 simulated boards without any effect stay above",
-        "an effect chosen by chance may lower the left-out error as much",
+        "an effect chosen by chance may lower the leave-one-out error as much",
     ),
     "log score": ConditionWords(
         "gain in log score of readings left out",
@@ -172,10 +172,9 @@ def _error_change(diagnosis: Diagnosis) -> tuple[str, bool]:
     ]
     before, after = (merits[-1].value_of(errors) or 0.0 for errors in (diagnosis.before, diagnosis.after))
     old, new = cents_texts(before, after)
-    name = "left-out error" if len(merits) > 1 else "error in the fit"
     if old == new:
-        return f"{name} stayed at {new} cents", False
-    return f"{name} {'fell' if after < before else 'rose'} from {old} to {new} cents", after < before
+        return f"{merits[-1].words} stayed at {new} cents", False
+    return f"{merits[-1].words} {'fell' if after < before else 'rose'} from {old} to {new} cents", after < before
 
 
 def candidate_names(candidates: Sequence[CandidateEntry]) -> list[str]:
@@ -192,7 +191,7 @@ def candidate_names(candidates: Sequence[CandidateEntry]) -> list[str]:
 
 
 def carrying_words(diagnosis: Diagnosis) -> str:
-    """A sentence on the modes that alone carry a constant or a size, and count in no left-out error; empty if none."""
+    """A sentence on the modes that alone carry a constant or a size: no leave-one-out error counts them."""
     sentence = carrying_sentence(diagnosis.carrying_modes)
     if not sentence:
         return ""

@@ -2,7 +2,7 @@
 
 A mode of leverage above `HIGH_LEVERAGE` alone carries a constant or a size: without it no reading determines that
 parameter, and the prediction of the mode, hundreds of cents off, says nothing about the model. Such a mode counts in no
-left-out error and in no score; where models are compared, it counts for none of them.
+leave-one-out error and in no score; where models are compared, it counts for none of them.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class PredictionErrors:
 
 @dataclass(frozen=True)
 class CarryingMode:
-    """A mode that alone carries a constant or a size, so that it does not count in left-out errors.
+    """A mode that alone carries a constant or a size, so that it does not count in leave-one-out errors.
 
     Attributes
     ----------
@@ -140,7 +140,7 @@ def carrying_sentence(modes: Sequence[CarryingMode]) -> str:
         carried = f"the size of {effect_name(mode.carries)}" if mode.carries in EFFECTS else mode.carries
         clauses.append(f"mode {mode.label}{f' of {mode.setup}' if has_several_setups else ''} alone carries {carried}")
     verb = "it does" if len(modes) == 1 else "they do"
-    return f"{join_words(clauses)}: {verb} not count in the left-out error"
+    return f"{join_words(clauses)}: {verb} not count in the leave-one-out error"
 
 
 def _reading_names(board: Board) -> list[tuple[str, str]]:

@@ -127,7 +127,7 @@ class _NullStatistic:
 
 
 def null_picture(diagnosis: Diagnosis) -> Picture | None:
-    """Odds that an effect is lacking, and ratio of left-out errors, on simulated boards and on this board."""
+    """Odds that an effect is lacking, and ratio of leave-one-out errors, on simulated boards and on this board."""
     statistics = _null_statistics(diagnosis.null_control)
     if not statistics:
         return None
@@ -174,7 +174,7 @@ def _null_statistics(null_control: NullControlSummary) -> list[_NullStatistic]:
         and null_control.nested_ratio is not None
         and null_control.nested_ratio_to_beat is not None
     ):
-        words, axis = "claimed below", "left-out error with the chosen effect over that without"
+        words, axis = "claimed below", "leave-one-out error with the chosen effect over that without"
         statistics.append(
             _NullStatistic(
                 null_control.nested_ratio_of_sets,

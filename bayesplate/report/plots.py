@@ -88,7 +88,7 @@ class FitPlots(Plots):
         return priors_picture(self.draws).figure
 
     def residuals(self) -> Figure:
-        """Residual and left-out error of each mode, cents."""
+        """Residual and leave-one-out error of each mode, cents."""
         return residuals_picture(self.summary).figure
 
     def predictive(self) -> Figure:

@@ -14,7 +14,7 @@ from bayesplate.results.modes import drop_carrying_modes
 
 FORMAT = 1
 SAME_CENTS = 0.5
-"""Cents; two theories whose left-out errors differ by less are equally good."""
+"""Cents; two theories whose leave-one-out errors differ by less are equally good."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class Comparison:
         Thin, then shear-flexible.
     verdict : BetterTheory
     carrying_modes : tuple of CarryingMode
-        Modes that alone carry a constant or a size in one of the theories; no left-out error counts them.
+        Modes that alone carry a constant or a size in one of the theories; no leave-one-out error counts them.
     """
 
     format: int
@@ -168,7 +168,7 @@ def theory_row(
 
 
 def recompute_left_out_errors(rows: Sequence[TheoryRow], carrying: Sequence[CarryingMode]) -> tuple[TheoryRow, ...]:
-    """The theories with left-out errors over the same modes: those that carry nothing alone under any theory."""
+    """The theories with leave-one-out errors over the same modes: those that carry nothing alone under any theory."""
 
     def with_left_out_error(row: TheoryRow) -> TheoryRow:
         left_out = rms([mode.left_out_cents for mode in drop_carrying_modes(row.modes, carrying)])

@@ -99,7 +99,7 @@ def write_tables(folder: Path, names: tuple[str, str], number_table: Table, prin
 
 
 def modes_table(summary: Summary) -> Table:
-    """Each labelled mode: measured and predicted frequency, residual with its interval, and left-out error.
+    """Each labelled mode: measured and predicted frequency, residual with its interval, and leave-one-out error.
 
     The half-width of the rounding interval is given where the interval is wider than the noise.
     """

@@ -119,7 +119,7 @@ class LabelledRow(Protocol):
 
 
 def drop_carrying_modes(rows: Iterable[AnyLabelledRow], carrying: Iterable[CarryingMode]) -> list[AnyLabelledRow]:
-    """Rows without the carrying modes, which no other mode predicts: those that count in a left-out error."""
+    """Rows without the carrying modes, which no other mode predicts: those that count in a leave-one-out error."""
     carried = {(mode.setup, mode.label) for mode in carrying}
     return [row for row in rows if (row.setup, row.label) not in carried]
 

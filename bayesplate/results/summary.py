@@ -16,7 +16,7 @@ from bayesplate.results.words import GPA, plus_minus
 
 FORMAT = 1
 TOO_FEW_MODES = "too few modes to leave one out"
-ALL_MODES_CARRYING = "there is no left-out error, for every mode alone carries a constant or a size"
+ALL_MODES_CARRYING = "there is no leave-one-out error, for every mode alone carries a constant or a size"
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class Summary(RunHeader):
     doubts : tuple of str
         The warnings that are reasons not to trust the constants.
     carrying_modes : tuple of CarryingMode
-        Modes that alone carry a constant or a size; no left-out error counts them.
+        Modes that alone carry a constant or a size; no leave-one-out error counts them.
     """
 
     converged: bool
@@ -183,7 +183,7 @@ class Summary(RunHeader):
 
     @property
     def why_no_left_out(self) -> str:
-        """Why there is no left-out error, if there is none."""
+        """Why there is no leave-one-out error, if there is none."""
         are_left_out = any(mode.left_out_cents is not None for mode in self.modes)
         return ALL_MODES_CARRYING if are_left_out else TOO_FEW_MODES
 

@@ -121,7 +121,7 @@ def test_known_effects_are_computed_before_anything_is_fitted_again(with_shear, 
     assert shear["leave_one_out_rms_cents"] < 0.5 * stands["leave_one_out_rms_cents"] < air["leave_one_out_rms_cents"]
     assert shear["in_sample_rms_cents"] < both["in_sample_rms_cents"] < air["in_sample_rms_cents"]
     printed = " ".join(calm.stdout.split())
-    assert "transverse shear lowers the left-out error from" in printed
+    assert "transverse shear lowers the leave-one-out error from" in printed
     assert "fluid loading raises it from" in printed
     assert "Where the error rises, something that acts the other way is lacking" in printed
 

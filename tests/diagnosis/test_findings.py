@@ -136,7 +136,9 @@ def test_an_exchange_is_told_with_its_likelihood_ratio():
         found = made({(): 0.5, (RELABELLING,): 0.1}, residual=QUIET)
         found = replace(found, log_evidence=np.array([2.0, 0.0, 0.0, 0.0, 2.0 + gained, 0.0]))
         told = entries(found)[RELABELLING]
-        assert told.rejected_because.startswith("not needed: that nothing is missing has a probability of 0.50; with these")
+        assert told.rejected_because.startswith(
+            "not needed: that nothing is missing has a probability of 0.50; with these"
+        )
         assert told.rejected_because.endswith(f" labels exchanged the readings are {words}")
         assert told.log_bayes_factor == pytest.approx(gained)
 
@@ -192,7 +194,10 @@ def test_a_candidate_that_is_not_needed_is_told_with_the_probability_of_none():
     calm = made({(): 0.1, (SHEAR,): 0.9}, residual=QUIET)
     for found, fate in ((calm, "not needed"), (replace(calm, residual=BEYOND_NOISE), "not established")):
         told = entries(found)[SHEAR]
-        assert (told.fate, told.rejected_because) == (fate, f"{fate}: that nothing is missing has a probability of 0.10")
+        assert (told.fate, told.rejected_because) == (
+            fate,
+            f"{fate}: that nothing is missing has a probability of 0.10",
+        )
 
 
 def test_the_winner_that_fails_the_gate_is_told_so():
@@ -469,7 +474,7 @@ def test_modes_that_alone_carry_something_count_neither_before_nor_after():
     assert told.before.log_score != pytest.approx(log_score(found.ground, 0, found.residual))
     assert [one["label"] for one in diagnosis_json(told)["carrying_modes"]] == ["(2,0)", "(5,0)"]
     sentence = (
-        "Mode (2,0) alone carries E_y and mode (5,0) alone carries E_y: they do not count in the left-out error, "
+        "Mode (2,0) alone carries E_y and mode (5,0) alone carries E_y: they do not count in the leave-one-out error, "
         "before and after alike."
     )
     assert sentence in verdict_sentences(told)

@@ -40,7 +40,7 @@ LIMITS = [
     ({}, 0.5, None, True),  # certainly there, and not all
     ({"none": 0.99e-4}, 0.5, None, True),  # no effect is less probable than one in ten thousand
     ({"none": 1.01e-4}, 0.5, None, False),
-    ({}, 0.666, None, True),  # the nested left-out error falls by a third
+    ({}, 0.666, None, True),  # the nested leave-one-out error falls by a third
     ({}, 0.667, None, False),
     ({}, np.nan, None, False),
     ({"rival": 0.24}, 0.5, None, True),  # it stands out by three to one

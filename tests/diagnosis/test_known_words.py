@@ -70,26 +70,26 @@ def test_the_table_has_a_row_a_model_and_no_change_where_nothing_was_changed():
 
 def test_falls_and_rises_are_said_plainly():
     assert known_sentence(KNOWN) == (
-        f"{BEGINNING}transverse shear lowers the left-out error from 46 to 12 cents; fluid loading raises it from 46 "
+        f"{BEGINNING}transverse shear lowers the leave-one-out error from 46 to 12 cents; fluid loading raises it from 46 "
         "to 94 cents; attached mass, as the card states it, lowers it from 61 to 46 cents. "
         f"{RISE}, or the effect has another size on this board, or the fit was that good by chance. Of 5 combinations "
-        "the board with transverse shear and attached mass has the lowest left-out error, 12 cents."
+        "the board with transverse shear and attached mass has the lowest leave-one-out error, 12 cents."
     )
     assert known_sentence(KNOWN[:1]) == known_sentence(()) == ""
     some = [replace(one, n_left_out=4) for one in KNOWN]
-    words = "Left-out errors are of 4 of 6 readings: without one of the others a model leaves a constant open."
+    words = "Leave-one-out errors are of 4 of 6 readings: without one of the others a model leaves a constant open."
     assert known_sentence(some).endswith(words)
 
 
 TOLD = [
-    ((STANDS, SHEAR), "transverse shear lowers the left-out error from 46 to 12 cents.", False),
+    ((STANDS, SHEAR), "transverse shear lowers the leave-one-out error from 46 to 12 cents.", False),
     (
         (STANDS, replace(SENSOR, leave_one_out_rms_cents=12.0)),
-        "attached mass, as the card states it, raises the left-out error from 12 to 46 cents. ",
+        "attached mass, as the card states it, raises the leave-one-out error from 12 to 46 cents. ",
         True,
     ),
-    ((STANDS, replace(AIR, leave_one_out_rms_cents=46.6)), "raises the left-out error from 46 to 47 cents. ", True),
-    ((STANDS, replace(AIR, leave_one_out_rms_cents=46.3)), "leaves the left-out error at 46 cents.", False),
+    ((STANDS, replace(AIR, leave_one_out_rms_cents=46.6)), "raises the leave-one-out error from 46 to 47 cents. ", True),
+    ((STANDS, replace(AIR, leave_one_out_rms_cents=46.3)), "leaves the leave-one-out error at 46 cents.", False),
     ((STANDS, replace(AIR, leave_one_out_rms_cents=None)), "the error in the fit from 21 to 43 cents.", True),
     ((known_model(4.0, 6.0), known_model(5.0, 8.25, "fluid_loading")), "from 6.0 to 8.2 cents. ", True),
 ]  # fmt: skip
@@ -111,8 +111,10 @@ def of_errors(neither, first, second, both):
     )
 
 
-NONE_BETTER = "No combination has a lower left-out error than the board as it stands."
-BEST = "Of 4 combinations the board with transverse shear and fluid loading has the lowest left-out error, {} cents."
+NONE_BETTER = "No combination has a lower leave-one-out error than the board as it stands."
+BEST = (
+    "Of 4 combinations the board with transverse shear and fluid loading has the lowest leave-one-out error, {} cents."
+)
 
 
 @pytest.mark.parametrize(
@@ -135,7 +137,7 @@ TOGETHER = [
 
 def test_two_effects_that_work_only_together_are_told_so():
     words = (
-        "Transverse shear and fluid loading work only together: transverse shear alone takes the left-out error from "
+        "Transverse shear and fluid loading work only together: transverse shear alone takes the leave-one-out error from "
         "16.0 to 20.0 cents, fluid loading alone to 43.0, both to 4.0."
     )
     for errors, is_told in TOGETHER:

@@ -115,7 +115,7 @@ def test_every_word_of_the_verdict_and_every_error_has_its_words():
 PASSAGES = [
     ("none needed", "no more than their noise would make them"),
     ("named", "point to membrane tension. The reason: the reason of it. The error of the prediction is reduced: "
-     "the left-out error fell from 46 to 12 cents, and every condition of that claim is met."),
+     "the nested leave-one-out error fell from 46 to 12 cents, and every condition of that claim is met."),
     ("indistinguishable group", "cannot tell which: membrane tension or fluid loading."),
     ("unexplained", "no effect that was tried explains it"),
     ("undetectable", "could not show them even if they were there"),
@@ -152,10 +152,10 @@ def test_the_page_says_what_its_constants_are():
 
 
 ROSE = [
-    (53.2, 61.4, "The left-out error rose from 53 to 61 cents. No improvement is claimed."),
-    (53.2, 53.4, "The left-out error stayed at 53 cents. No improvement is claimed."),
-    (5.2, 5.44, "The left-out error rose from 5.2 to 5.4 cents. No improvement is claimed."),
-    (61.4, 53.2, "The left-out error fell from 61 to 53 cents. No improvement is claimed: the readings left out "
+    (53.2, 61.4, "The nested leave-one-out error rose from 53 to 61 cents. No improvement is claimed."),
+    (53.2, 53.4, "The nested leave-one-out error stayed at 53 cents. No improvement is claimed."),
+    (5.2, 5.44, "The nested leave-one-out error rose from 5.2 to 5.4 cents. No improvement is claimed."),
+    (61.4, 53.2, "The nested leave-one-out error fell from 61 to 53 cents. No improvement is claimed: the readings left out "
      "are not predicted better beyond two standard errors."),
 ]  # fmt: skip
 
@@ -174,7 +174,7 @@ def test_with_too_few_readings_the_error_that_both_models_have_is_told():
     """Nothing was chosen anew without a reading: what that would have given is not said to fail, for nobody knows."""
     one, missing = DIAGNOSES["indistinguishable group"], {}
     for lost, told in [
-        ("nested_leave_one_out_rms_cents", "The left-out error fell from 46.5 to 9.5 cents. "),
+        ("nested_leave_one_out_rms_cents", "The leave-one-out error fell from 46.5 to 9.5 cents. "),
         ("leave_one_out_rms_cents", "The error in the fit fell from 21.2 to 4.2 cents. "),
     ]:
         missing[lost] = None
@@ -274,8 +274,8 @@ def test_errors_before_and_after_or_as_they_are():
     assert (both.title, both.columns) == ("Error before and after: a-board", ("", "before", "after: membrane tension"))
     assert both.texts == (
         ("error in the fit, rms cents", "21.2", "4.2"),
-        ("error of a mode left out, rms cents", "46.5", "9.5"),
-        ("error left out, the search repeated, rms cents", "46.5", "12.5"),
+        ("leave-one-out error, rms cents", "46.5", "9.5"),
+        ("nested leave-one-out error, rms cents", "46.5", "12.5"),
         ("log score", "-24.75", "-15.50"),
         ("readings inside their 90 % intervals", "50 %", "100 %"),
     )

@@ -287,7 +287,10 @@ def test_modes_that_carry_something_are_named():
     labels = [str(label) for label in setup.labels]
     assert [(one.label, one.carries) for one in told] == [(labels[3], "clamp_rotation"), (labels[5], "E_y")]
     assert indices_of(told, board) == (3, 5)
-    assert carrying_sentence(told[1:]) == f"mode {labels[5]} alone carries E_y: it does not count in the left-out error"
+    assert (
+        carrying_sentence(told[1:])
+        == f"mode {labels[5]} alone carries E_y: it does not count in the leave-one-out error"
+    )
     assert "the size of clamp rotation" in carrying_sentence(told)
     assert carrying_sentence(()) == ""
     again = (CarryingMode(setup.name, labels[5], 0.99, "E_x"), CarryingMode(setup.name, labels[0], 0.91, "E_x"))

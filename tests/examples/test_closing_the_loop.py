@@ -88,7 +88,7 @@ def test_the_readme_says_what_the_page_of_measured_boards_shows(example):
     (alone,) = [row for row in shown_rows() if row[0] == "spruce-free-1R"]
     assert alone[1:4] == ("indistinguishable group", "transverse_shear, grain_angle", "no claim")
     before, after = alone[6].split(" → ")
-    assert f"the error left out, the search repeated, goes from {before} to {after} cents" in words
+    assert f"the nested leave-one-out error goes from {before} to {after} cents" in words
 
 
 def test_on_fiemme_air_and_exciter_work_only_together():

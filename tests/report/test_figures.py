@@ -255,7 +255,9 @@ def test_odds_are_told_and_drawn_as_odds(log_odds, words):
     named = DIAGNOSES["named"]
     null = replace(named.null_control, log_odds=log_odds, log_odds_needed=np.log(2.0))
     picture = null_picture(replace(named, null_control=null))
-    assert picture.alt.startswith(f"odds that something is lacking: this board {words}, limit 2 : 1; left-out error")
+    assert picture.alt.startswith(
+        f"odds that something is lacking: this board {words}, limit 2 : 1; leave-one-out error"
+    )
     picture.figure.canvas.draw()
     labels = picture.figure.axes[0].get_xticklabels()
     boxes = [one.get_window_extent() for one in labels]

@@ -94,7 +94,7 @@ def test_a_mode_that_alone_carries_a_constant_is_named_and_left_out_of_the_left_
     assert doubtful.error.leave_one_out_rms_cents == pytest.approx(np.sqrt(np.mean(np.square(others))))
     (own,) = (row.left_out_cents for row in doubtful.modes if row.label == LABEL)
     assert abs(own) > 3.0 * doubtful.error.leave_one_out_rms_cents  # it would show
-    sentence = f"mode {LABEL} alone carries {CARRIES}: it does not count in the left-out error"
+    sentence = f"mode {LABEL} alone carries {CARRIES}: it does not count in the leave-one-out error"
     assert sentence in doubtful.identifiability
     assert sentence in show_fit(doubtful).remarks
     assert json.loads(json_text(doubtful))["carrying_modes"][0]["carries"] == CARRIES
@@ -104,7 +104,10 @@ def test_where_every_mode_carries_something_alone_it_is_said_that_there_is_no_le
     none = replace(SUMMARY.error, leave_one_out_rms_cents=None)
     carrying = replace(SUMMARY, error=none)
     few = replace(carrying, modes=tuple(replace(row, left_out_cents=None) for row in SUMMARY.modes))
-    assert "there is no left-out error, for every mode alone carries a constant or a size" in show_fit(carrying).closing
+    assert (
+        "there is no leave-one-out error, for every mode alone carries a constant or a size"
+        in show_fit(carrying).closing
+    )
     assert "every mode alone carries a constant or a size." in summary_sentences(carrying)[1]
     assert "too few modes to leave one out" in show_fit(few).closing
     assert "too few modes to test it" in summary_sentences(few)[1]

@@ -32,7 +32,7 @@ def pareto(folder: Path) -> str:
         )
         for label, k in found["pareto_k"].items()
     ]
-    columns = ("mode", "leverage", "Pareto k", "ln density by weights", "by a refit", "error left out, cents")
+    columns = ("mode", "leverage", "Pareto k", "ln density by weights", "by a refit", "leave-one-out error, cents")
     return table(columns, rows)
 
 

@@ -301,7 +301,7 @@ def verdict_limits(folder: Path) -> str:
         ),
         ("and noises times", join_words([f"{one:.2g}" for one in NOISE_FACTORS.values()])),
         (
-            "a claim: an effect chosen by chance lowers the left-out error as far in fewer than",
+            "a claim: an effect chosen by chance lowers the leave-one-out error as far in fewer than",
             f"{100 * CHANCE_SHARE:g} of 100",
         ),
         ("a claim: standard errors by which the nested log score rises, more than", f"{STANDARD_ERRORS:g}"),
