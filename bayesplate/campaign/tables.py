@@ -35,7 +35,7 @@ def campaign_check_tables(report: CampaignCheck) -> tuple[Table, ...]:
     for name, checked_number in report.shared.items():
         factor, unit = display_unit(checked_number.unit)
         prior = f"{checked_number.prior_q05 * factor:.2g} to {checked_number.prior_q95 * factor:.2g} {unit}".rstrip()
-        best = min(checked_number.boards.values(), default=1.0)
+        best = min(checked_number.boards.values())
         shared.append((shared_words(name), prior, number(best, 2), number(checked_number.expected_sd, 2)))
     boards: list[Row] = []
     for board, board_report in report.boards.items():

@@ -57,7 +57,7 @@ class CompareResult(Comparison):
 
     Attributes
     ----------
-    sampled : dict of (Inference, Draws)
+    sampled : dict of Draws
         The posterior under the exact law, by theory of the plate.
     """
 

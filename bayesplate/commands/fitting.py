@@ -49,7 +49,7 @@ class FitResult:
     summary : Summary
         What summary.json holds: constants, modes, errors, the sampler's health.
     folder : Path or None
-        None if no files were asked for.
+        Where its files are, of a fit by itself; None without files, and for one of several fits.
     """
 
     problem: Problem

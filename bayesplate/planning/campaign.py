@@ -238,7 +238,10 @@ def _further_board(beliefs: Beliefs, known_board: KnownBoard, sentence: str, lab
 def _cut_board(
     known_board: KnownBoard, noise: Floats, prior: PriorCard, shared: Sequence[SharedParameter]
 ) -> KnownBoard:
-    """A board of the same material and width but half as long, with as many of its lowest modes read, no profiles."""
+    """A board of the same material and width but half as long, no profiles.
+
+    As many of its lowest modes are read as the first setup of the board has readings, as far as they are looked at.
+    """
     board = known_board.board.without(_PROFILES)
     halved = {name: board.inputs[name] for name in ("length_x", "mass") if name in board.inputs}
     cut = {

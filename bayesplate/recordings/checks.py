@@ -55,7 +55,7 @@ def signal_faults(signal: Signal, *, was_played: bool = False) -> Iterator[Fault
         return
     if not _LOWEST_RATE <= signal.rate <= _HIGHEST_RATE:
         wanted = f"{_LOWEST_RATE:g} to {_HIGHEST_RATE:g} samples a second"
-        yield Fault(f"{signal.name} rate", wanted, f"{signal.rate:g}", "is it in Hz?")
+        yield Fault(f"{signal.name} rate", wanted, f"{signal.rate:g}", "is it in Hz, or are the times in s?")
     if signal.force is None:
         yield from _channel_faults(signal, signal.response, signal.name, was_played=was_played)
     else:
@@ -169,7 +169,7 @@ def _level_fault(recording: Recording, signal: Floats, name: str) -> Fault | Non
     is_quiet = np.isfinite(recording.full_scale) and height < _QUIET_LEVEL * recording.full_scale
     if is_quiet and height < _N_STEPS * _number_step(signal):
         got = f"{20.0 * np.log10(height / recording.full_scale):.0f} dB of what the file can hold"
-        remedy = "too quiet: turn the gain up, or go closer"
+        remedy = "too quiet: turn the gain up"
         return Fault(name, "a signal that is more than rounding", got, remedy)
     if (count := clipped_samples(signal, recording.full_scale)) > 0:
         got = f"{count} samples cut off at the largest value"
