@@ -137,8 +137,8 @@ TOGETHER = [
 
 def test_two_effects_that_work_only_together_are_told_so():
     words = (
-        "Transverse shear and fluid loading work only together: transverse shear alone takes the leave-one-out error from "
-        "16.0 to 20.0 cents, fluid loading alone to 43.0, both to 4.0."
+        "Transverse shear and fluid loading work only together: transverse shear alone takes the leave-one-out error "
+        "from 16.0 to 20.0 cents, fluid loading alone to 43.0, both to 4.0."
     )
     for errors, is_told in TOGETHER:
         told = known_sentence(of_errors(*errors))

@@ -58,8 +58,8 @@ def test_two_modes_are_too_few_to_judge_by():
 def test_a_claim_in_words():
     told = stated_sentence(*STATED)
     assert told == (
-        "Attached mass, as stated and not chosen by the readings, takes the leave-one-out error from 61.0 to 46.5 cents; "
-        "the log score changes by +4.5 ± 2.0 over 6 modes: error reduced."
+        "Attached mass, as stated and not chosen by the readings, takes the leave-one-out error from 61.0 to 46.5 "
+        "cents; the log score changes by +4.5 ± 2.0 over 6 modes: error reduced."
     )
     told = stated_sentence(replace(STATED[0], holds=False, predicts="water"))
     assert "takes the error of setup 'water', predicted by the constants of the first setup alone, from 61.0" in told

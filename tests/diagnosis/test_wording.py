@@ -155,8 +155,8 @@ ROSE = [
     (53.2, 61.4, "The nested leave-one-out error rose from 53 to 61 cents. No improvement is claimed."),
     (53.2, 53.4, "The nested leave-one-out error stayed at 53 cents. No improvement is claimed."),
     (5.2, 5.44, "The nested leave-one-out error rose from 5.2 to 5.4 cents. No improvement is claimed."),
-    (61.4, 53.2, "The nested leave-one-out error fell from 61 to 53 cents. No improvement is claimed: the readings left out "
-     "are not predicted better beyond two standard errors."),
+    (61.4, 53.2, "The nested leave-one-out error fell from 61 to 53 cents. No improvement is claimed: the readings "
+     "left out are not predicted better beyond two standard errors."),
 ]  # fmt: skip
 
 
