@@ -1,4 +1,4 @@
-"""A campaign: what six boards of one laboratory share, claimed by the boards that were left out.
+"""A campaign: what six boards of one laboratory share, judged by the boards that were left out.
 
 Six free half-tops were measured on one day with one accelerometer. Each of them alone cannot tell transverse shear from
 the sensor's mass. Together they teach both, and each board is asked whether it wants what the other five teach it. The

@@ -1,6 +1,7 @@
 """Two other samplers: the densities of a problem are any sampler's to use.
 
-The paper's clamped board under the prior for spruce. The package samples its posterior in coordinates of its own; here
+The paper's clamped board under the prior for spruce, which was drawn from this board among others: good enough to
+compare samplers, not to quote the constants. The package samples its posterior in coordinates of its own; here
 emcee walks on `problem.log_prob` by other moves, and dynesty climbs through `problem.prior_transform`, which also gives
 the evidence. All three find the same constants within their Monte Carlo errors. Under another prior they lie elsewhere:
 such a difference is seen.

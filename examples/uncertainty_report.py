@@ -5,8 +5,9 @@ board, writes the results of the fit where it is told to, and answers two questi
 
 *What should be measured better?* Each uncertain input (thickness, mass, lengths, Poisson ratio) is given its part of
 the standard deviation of each constant; what is left belongs to the frequencies. Two computations that share nothing
-with this one stand beside it: the same fit with all inputs taken as exact, whose standard deviation is the part of the
-frequencies alone, and the powers in which a constant depends on the inputs at given frequencies, worked out by hand.
+with this one stand beside it: the same fit with all sizes taken as exact, whose standard deviation is what the
+frequencies and the Poisson ratio leave, and, in the numbers that are returned, the powers in which a constant depends
+on the inputs at given frequencies, worked out by hand.
 
 *What did the frequencies teach?* Each width before the measurement stands beside the width after it. The constants
 shrink by a factor of fifty and more. The thickness and the mass do not shrink at all: no frequency can tell them, so

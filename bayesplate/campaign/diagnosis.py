@@ -42,7 +42,7 @@ class CampaignDiagnosis:
     claim : bool
         Whether it may be said that the boards share the effects.
     effects : tuple of str
-        Named: these are shared. Group: shared by one of the explanations that may be as probable.
+        Named: these are shared. Group: shared by one of the explanations within a factor 3 of the best.
     declared : bool
         Whether the card names them, so that nothing was searched for.
     reason : str
@@ -106,7 +106,8 @@ def campaign_verdict(explanations: Sequence[CampaignExplanation]) -> tuple[str, 
     )
     if best.way != "shared":
         rival = (
-            f"; {join_words([sharing_words(explanation) for explanation in contenders[1:]], 'or')} may be as probable"
+            f"; {join_words([sharing_words(explanation) for explanation in contenders[1:]])} "
+            f"{'come' if contenders[2:] else 'comes'} within a factor 3 of it"
             if contenders[1:]
             else ""
         )
@@ -117,8 +118,9 @@ def campaign_verdict(explanations: Sequence[CampaignExplanation]) -> tuple[str, 
         times = best.probability / max(runner_up.probability, 1e-300)
         factor = f"{times:.0f}" if times < 1000.0 else "more than 1000"
         return "named", shared, f"{sharing_words(best)} is {factor} times as probable as {sharing_words(runner_up)}"
-    words = join_words([sharing_words(explanation) for explanation in contenders], "or")
-    return "indistinguishable group", shared, f"{words} may be as probable"
+    words = join_words([sharing_words(explanation) for explanation in contenders[1:]])
+    come = "come" if contenders[2:] else "comes"
+    return "indistinguishable group", shared, f"{words} {come} within a factor 3 of {sharing_words(best)}"
 
 
 def sharing_words(explanation: CampaignExplanation) -> str:

@@ -195,19 +195,19 @@ def _diagnose_fit(problem: Problem, before: FitResult, run: Run, n_null: int) ->
     control = null_control(ground, np.random.default_rng([run.seed, _NULL_STREAM]), n_null, search.log_odds)
     verdict = decide_verdict(search, control)
     folds = nested_errors_of_board(search, control, verdict.judged_index)
-    in_part = effects_named_in_part(search, verdict, folds)
     finalists = verdict.refitted_explanations[:_MOST_FINALISTS]
     stages.remaining_time = FIT_TIME * len(finalists) + (_CHOICE_TIME if verdict.index else 0.0)
     refits, failures = _refit_finalists(problem, before, run, search, finalists)
     fits = {0: before, **refits}
-    final_index = verdict.judged_index if (verdict.index or in_part) and verdict.judged_index in fits else 0
-    after = fits[final_index]
     known_carrying = (carrying_modes(posed.board, fit.errors.leverages, MODULI) for fit in known_effect_fits)
     fit_carrying = (fit.summary.carrying_modes for fit in fits.values())
     united_modes = unite_carrying_modes(
         find_carrying_modes(search, verdict.judged_index), *fit_carrying, *known_carrying
     )
     folds = folds and folds.without(indices_of(united_modes, posed.board))
+    in_part = effects_named_in_part(search, verdict, folds)
+    final_index = verdict.judged_index if (verdict.index or in_part) and verdict.judged_index in fits else 0
+    after = fits[final_index]
     if verdict.index and folds is not None and folds.is_counted.any():
         stages.begin("the same search on simulated boards, made to choose", _CHOICE_TIME)
         control = force_choices(ground, control, float(folds.ratio[0]), folds.carrying_readings)
@@ -236,7 +236,7 @@ def _diagnose_fit(problem: Problem, before: FitResult, run: Run, n_null: int) ->
             finalists=[
                 (finalist, fitted_models[finalist.index]) for finalist in finalists if finalist.index in fitted_models
             ],
-            has_slip=bool(posed.slip_remarks),
+            has_slip=bool(after.inference.problem.slip_remarks),
             notes=tuple(notes),
             effects_in_part=in_part,
             carrying_modes=united_modes,

@@ -135,7 +135,7 @@ def _chance_condition(errors: NestedErrors | None, control: NullControl) -> Cond
     if errors is None or limit is None or not errors.is_counted.any():
         return Condition("chance selection", None, limit, False)
     ratio = float(errors.ratio[0])
-    return Condition("chance selection", ratio, limit, ratio < limit)
+    return Condition("chance selection", ratio, limit, ratio < min(limit, 1.0))
 
 
 def _score_condition(result: SearchResult, errors: NestedErrors | None) -> Condition:

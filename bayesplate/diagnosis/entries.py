@@ -147,8 +147,8 @@ def _learnt_bits(result: SearchResult, index: int, candidate: Candidate) -> dict
 
 def _size_quantiles(z: Floats, share: Floats, levels: Sequence[float]) -> Floats:
     """Quantiles of a size from the shares of its nodes, each spread half-way to its neighbours."""
-    order = np.argsort(z)
-    nodes, shares = z[order], share[order] / share.sum()
+    nodes, places = np.unique(z, return_inverse=True)  # cells of several sizes have one node more than once
+    shares = np.bincount(places, weights=share) / share.sum()
     if nodes.size == 1:
         return np.repeat(nodes, len(levels))
     ends = nodes[[0, -1]] + 0.5 * (nodes[[0, -1]] - nodes[[1, -2]])

@@ -28,7 +28,7 @@ from bayesplate.diagnosis.result import (
 )
 from bayesplate.diagnosis.search import LEAST_P_VALUE, SearchResult
 from bayesplate.diagnosis.sensitivity import PRIOR_WIDTH_FACTORS, draw_constants, vary_priors
-from bayesplate.diagnosis.sizes import likely_forms
+from bayesplate.diagnosis.sizes import likely_forms, size_at_limit
 from bayesplate.diagnosis.stated import StatedClaim
 from bayesplate.diagnosis.verdict import (
     Explanation,
@@ -39,7 +39,7 @@ from bayesplate.diagnosis.verdict import (
     rank_explanations,
 )
 from bayesplate.effects import EFFECTS, effect_faults
-from bayesplate.effects.words import join_words
+from bayesplate.effects.words import as_sentence, join_words
 from bayesplate.estimates.leave_one_out import CarryingMode, indices_of
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.draws import Draws
@@ -279,12 +279,14 @@ def _stated_sentences(case: Case, verdict_explanations: Sequence[Explanation]) -
     sentences = []
     for explanation in rank_explanations(case.result):
         p_value = case.result.p_value(explanation.index)
-        if explanation in verdict_explanations or not are_stated(board, explanation.members) or p_value < LEAST_P_VALUE:
+        is_told = explanation in verdict_explanations or not are_stated(board, explanation.members)
+        if is_told or p_value < LEAST_P_VALUE or size_at_limit(case.result, explanation.index):
             continue
         effects = ",".join((*board.effects, *explanation.members))
+        too = "" if case.verdict.word == "unexplained" else " as well"
         sentences.append(
-            f"{explanation_words(case.result, explanation).capitalize()}, which are known to be there, explain the "
-            f"readings together as well ({p_value_words(p_value)}): --effects {effects} fits the constants with both."
+            f"{as_sentence(explanation_words(case.result, explanation))}, which are known to be there, explain the "
+            f"readings together{too} ({p_value_words(p_value)}): --effects {effects} fits the constants with both."
         )
     return sentences
 
@@ -294,7 +296,7 @@ def _nearest_sentence(case: Case, explanation: Explanation, summary: Summary) ->
     before, after = case.before.summary, summary
     comes, it = ("come", "them") if len(explanation.members) > 1 else ("comes", "it")
     sentence = (
-        f"{explanation_words(case.result, explanation).capitalize()} {comes} nearest: with {it} the error goes from "
+        f"{as_sentence(explanation_words(case.result, explanation))} {comes} nearest: with {it} the error goes from "
         f"{before.error.in_sample_rms_cents:.1f} to {after.error.in_sample_rms_cents:.1f} cents in the fit"
     )
     left_out_before, left_out_after = (left_out_rms_cents(fit, case.carrying_modes) for fit in (before, after))

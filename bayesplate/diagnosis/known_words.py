@@ -11,7 +11,7 @@ import numpy as np
 from bayesplate.board.material import MODULI
 from bayesplate.diagnosis.known import KnownFit
 from bayesplate.diagnosis.stated import LEAST_ERROR_FALL, StatedClaim
-from bayesplate.effects.words import effect_name, effect_names
+from bayesplate.effects.words import as_sentence, effect_name, effect_names
 from bayesplate.frequencies.laws import cents
 from bayesplate.results.contract import rms
 from bayesplate.results.tables import Row, Table
@@ -47,12 +47,15 @@ class KnownModel:
 def known_models(fits: Sequence[KnownFit], carrying_readings: Sequence[int] = ()) -> tuple[KnownModel, ...]:
     """Errors in cents and changes in percent, in the order of the fits, the board as it stands first.
 
-    `carrying_readings`, whose mode alone carries a constant or a size, do not count in the leave-one-out errors.
+    Modes that alone carry a constant in one of the fits do not count in the leave-one-out errors, nor do
+    `carrying_readings`, whose mode alone carries one or a size elsewhere.
     """
     if not fits:
         return ()
     left_out = np.array([fit.errors.left_out for fit in fits])
     is_of_all = np.isfinite(left_out).all(axis=0)
+    for fit in fits:
+        is_of_all &= fit.errors.leverages.carries < 0
     is_of_all[list(carrying_readings)] = False
     return tuple(
         KnownModel(
@@ -111,7 +114,10 @@ def known_sentence(known_models: Sequence[KnownModel]) -> str:
         return ""
     errors = _ComparedError(known_models)
     single_models = [model for model in known_models[1:] if len(model.effects) + len(model.without) == 1]
-    effect_clauses = [_effect_clause(model, known_models[0], errors) for model in single_models]
+    # the board as it stands has the sizes of declared effects where the fit has them: an effect is added to them at its
+    # known size where that is computed too
+    at_known_sizes = next((model for model in known_models[1:] if not model.effects and not model.without), None)
+    effect_clauses = [_effect_clause(model, at_known_sizes or known_models[0], errors) for model in single_models]
     clauses = "; ".join(
         words.format(error=f"the {errors.name}" if i == 0 else "it") for i, (words, _) in enumerate(effect_clauses)
     )
@@ -121,7 +127,8 @@ def known_sentence(known_models: Sequence[KnownModel]) -> str:
         *_pair_sentences(known_models, errors),
         *_partial_error_sentences(known_models),
     )
-    return " ".join([f"{_COMPUTED_WORDS}{clauses}.{rises}", *further_sentences])
+    first_sentences = [f"{_COMPUTED_WORDS}{clauses}.{rises}"] if clauses else []
+    return " ".join([*first_sentences, *further_sentences])
 
 
 def _partial_error_sentences(known: Sequence[KnownModel]) -> list[str]:
@@ -130,8 +137,8 @@ def _partial_error_sentences(known: Sequence[KnownModel]) -> list[str]:
     if n in (0, n_all):
         return []
     return [
-        f"Leave-one-out errors are of {n} of {n_all} readings: without one of the others a model leaves a constant "
-        "open."
+        f"Leave-one-out errors are of {n} of {n_all} readings: the others carry a constant or a size alone, or are no "
+        "mode, in one of the models compared."
     ]
 
 
@@ -155,9 +162,7 @@ def _effect_clause(model: KnownModel, as_it_stands: KnownModel, errors: _Compare
     """How an effect changes {error}, in words, and whether it rises; a stated effect from the model without it."""
     before_and_after = (model, as_it_stands) if model.without else (as_it_stands, model)
     old, new = errors.texts(*before_and_after)
-    subject = (
-        f"{effect_name(model.without[0])}, as the card states it," if model.without else effect_names(model.effects)
-    )
+    subject = f"{effect_name(model.without[0])}, as declared," if model.without else effect_names(model.effects)
     if old == new:
         return f"{subject} leaves {{error}} at {new} cents", False
     is_rise = errors.of(before_and_after[1]) > errors.of(before_and_after[0])
@@ -196,7 +201,7 @@ def _pair_sentences(known: Sequence[KnownModel], errors: _ComparedError) -> list
             texts = errors.texts(*models)
             name, other = map(effect_name, pair)
             sentences.append(
-                f"{effect_names(pair).capitalize()} work only together: {name} alone takes the {errors.name} from "
+                f"{as_sentence(effect_names(pair))} work only together: {name} alone takes the {errors.name} from "
                 f"{texts[0]} to {texts[1]} cents, {other} alone to {texts[2]}, both to {texts[3]}."
             )
     return sentences
@@ -211,7 +216,7 @@ def stated_sentence(claim: StatedClaim) -> str:
     else:
         prediction = "the leave-one-out error"
     sentence = (
-        f"{subject[0].upper()}{subject[1:]} {verb} {prediction} from {claim.before_rms_cents:.1f} to "
+        f"{as_sentence(subject)} {verb} {prediction} from {claim.before_rms_cents:.1f} to "
         f"{claim.after_rms_cents:.1f} cents; the log score changes by {claim.log_score_gain:+.1f} ± "
         f"{claim.standard_error:.1f} over {claim.n_modes} modes"
     )

@@ -122,7 +122,8 @@ class Diagnosis:
         The same as people read it; not written to JSON.
     reason : str
     sentences : tuple of str
-        What each of `effects` is.
+        What each of `effects` is, which labels may have been exchanged, what comes nearest where nothing is enough,
+        and stated pairs that would explain the readings.
     declared : tuple of str
         Effects that were part of the model from the beginning.
     known : tuple of KnownModel

@@ -184,7 +184,7 @@ def draw_constants(
     hypothesis_indices: Sequence[int] | None = None,
     sampler_draws: Mapping[int, ConstantDraws] | None = None,
 ) -> ConstantDraws:
-    """Draws of the constants and inputs by name, (n_draws,) arrays, from the terms of hypotheses, weighted to the exact
+    """Draws of the constants by name, (n_draws,) arrays, from the terms of hypotheses, weighted to the exact
     law.
 
     The hypotheses `hypothesis_indices` have their probability as weight; by default all have that under the exact law.

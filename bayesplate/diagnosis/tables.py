@@ -14,9 +14,9 @@ from bayesplate.diagnosis.result import Amplitude, Diagnosis, EffectEntry, Final
 from bayesplate.diagnosis.words import (
     CONDITIONS,
     MERITS,
-    VERDICTS,
     candidate_names,
     known_sentences,
+    verdict_heading,
     verdict_sentences,
     warnings,
 )
@@ -38,8 +38,7 @@ from bayesplate.results.words import (
 )
 
 _LEAST_LISTED = 0.01
-_LEAST_EXCHANGE_LISTED = 0.01
-"""Probability below which an exchange of two labels is not listed: any two neighbouring readings are a candidate."""
+"""Probability below which an explanation or an exchange of two labels is not listed."""
 _SD_TO_90_PERCENT = 1.645
 """Standard deviations from the middle of a normal distribution to the ends of its 90 % interval."""
 _NARROW_COLUMNS = ("effect", "shift", "visible", "size (90 %)", "fate")
@@ -145,7 +144,7 @@ def answers_table(diagnosis: Diagnosis) -> Table:
     percentages = _percentages([share for _, share in probabilities])
     rows = tuple((words, share) for (words, _), share in zip(probabilities, percentages, strict=True))
     is_unexplained = diagnosis.verdict == "unexplained"
-    title = "What was tried, and none of it explains the readings" if is_unexplained else "What may be the case"
+    title = "What was tried; none of it is a probable explanation" if is_unexplained else "What may be the case"
     return Table(title, ("explanation", "probability"), rows)
 
 
@@ -169,7 +168,7 @@ def candidates_table(diagnosis: Diagnosis, *, narrow: bool = False) -> Table | N
     likely_candidates = (
         candidate
         for candidate in diagnosis.candidates
-        if isinstance(candidate, EffectEntry) or candidate.inclusion_probability >= _LEAST_EXCHANGE_LISTED
+        if isinstance(candidate, EffectEntry) or candidate.inclusion_probability >= _LEAST_LISTED
     )
     listed_candidates = sorted(likely_candidates, key=lambda candidate: -candidate.inclusion_probability)
     if not listed_candidates:
@@ -272,5 +271,5 @@ def diagnosis_html(diagnosis: Diagnosis) -> str:
     """A diagnosis as HTML for a notebook: heading, sentences, tables, and what to measure next."""
     advice = [f"What to measure next: {diagnosis.recommendation}"] if diagnosis.recommendation else []
     sentences = [*verdict_sentences(diagnosis), *known_sentences(diagnosis), *warnings(diagnosis), *advice]
-    heading = f"{diagnosis.name}: {VERDICTS[diagnosis.verdict].heading}"
+    heading = f"{diagnosis.name}: {verdict_heading(diagnosis)}"
     return notebook_html(heading, sentences, every_table(diagnosis))

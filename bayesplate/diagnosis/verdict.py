@@ -127,10 +127,11 @@ def decide_verdict(
             )
             return Verdict("named", best.members, best.index, best, reason, True, (best,))
         words, rivals = rivalry
-        reason = f"{words} {alternatives_words(result, rivals)} may be as probable"
+        come = "come" if len(rivals) > 1 else "comes"
+        reason = f"{words} {alternatives_words(result, rivals)} {come} within a factor 3 of it"
         contenders = (best, *rivals)
     else:
-        reason = "several explanations are about equally probable"
+        reason = "no explanation is three times as probable as every other"
     effects = tuple(dict.fromkeys(name for explanation in contenders for name in explanation.members))
     return Verdict("indistinguishable group", effects, best.index, best, reason, True, contenders)
 

@@ -12,14 +12,13 @@ from bayesplate.diagnosis.known_words import known_sentence, stated_sentence
 from bayesplate.diagnosis.result import CandidateEntry, Diagnosis, EffectEntry, ExchangeEntry, ModelErrors
 from bayesplate.diagnosis.signatures import LOOK_ALIKE_COSINE
 from bayesplate.diagnosis.verdict import VerdictWord
-from bayesplate.effects.words import effect_name, effect_names, join_words
+from bayesplate.effects.words import as_sentence, effect_name, effect_names, join_words
 from bayesplate.estimates.leave_one_out import carrying_sentence
 from bayesplate.labels import Label
 from bayesplate.results.summary import Summary
 from bayesplate.results.words import Value, cents_texts, number, percent
 
-TOO_FEW_READINGS = "the readings are too few to choose anew without each of them"
-NO_MODE_LEFT = "hardly a mode is left that does not carry a constant or a size alone"
+TOO_FEW_MODES = "too few modes are left to choose anew without each of them"
 
 
 @dataclass(frozen=True)
@@ -43,13 +42,13 @@ VERDICTS: dict[VerdictWord, VerdictMeaning] = {
     "named": VerdictMeaning("An effect was found", "The readings point to {effects}."),
     "indistinguishable group": VerdictMeaning(
         "Something is missing, but not which of several",
-        "One of these would explain the readings, but the readings cannot tell which: {effects}.",
+        "One of these may be what is missing, but the readings cannot tell which: {effects}.",
     ),
     "unexplained": VerdictMeaning(
         "Something is missing that was not found",
-        "The readings disagree with the model by more than their noise, and no effect that was tried explains "
-        "it. Check the labels, the sizes, the mass and the place of whatever is fixed to the board first; then look at "
-        "the largest errors.",
+        "The readings disagree with the model by more than their noise, and none of the effects that were tried is, at "
+        "a possible size, a probable explanation. Check the labels, the sizes, the mass and the place of whatever is "
+        "fixed to the board first; then look at the largest errors.",
     ),
     "undetectable": VerdictMeaning(
         "These readings could not show it",
@@ -92,6 +91,10 @@ MERITS = (
 """Figures of merit in the order of the tables: the first mostly falls with an effect, the third is the honest one."""
 
 
+def verdict_heading(diagnosis: Diagnosis) -> str:
+    return IN_PART_HEADING if diagnosis.named_in_part else VERDICTS[diagnosis.verdict].heading
+
+
 def verdict_meaning(diagnosis: Diagnosis) -> str:
     """The meaning of the verdict in a sentence, with the effects that it names."""
     declared = effect_names(diagnosis.declared)
@@ -112,9 +115,7 @@ def claim_sentence(diagnosis: Diagnosis) -> str:
     if diagnosis.claim:
         return f"The error of the prediction is reduced: the {change}, and every condition of that claim is met."
     reasons = [
-        (NO_MODE_LEFT if diagnosis.carrying_modes else TOO_FEW_READINGS)
-        if condition.value is None
-        else CONDITIONS[condition.name].failure
+        TOO_FEW_MODES if condition.value is None else CONDITIONS[condition.name].failure
         for condition in diagnosis.conditions
         if not condition.is_met
     ]
@@ -172,6 +173,8 @@ def _error_change(diagnosis: Diagnosis) -> tuple[str, bool]:
     ]
     before, after = (merits[-1].value_of(errors) or 0.0 for errors in (diagnosis.before, diagnosis.after))
     old, new = cents_texts(before, after)
+    if old == new and diagnosis.claim:
+        old, new = f"{before:.2f}", f"{after:.2f}"
     if old == new:
         return f"{merits[-1].words} stayed at {new} cents", False
     return f"{merits[-1].words} {'fell' if after < before else 'rose'} from {old} to {new} cents", after < before
@@ -251,8 +254,8 @@ def alike_sentence(diagnosis: Diagnosis) -> str:
     if not look_alikes:
         return ""
     return (
-        f"{effect_names(list(look_alikes)).capitalize()} would look much the same (likeness above "
-        f"{LOOK_ALIKE_COSINE}): less than a third of the trace tells them apart."
+        f"{as_sentence(effect_names(list(look_alikes)))} would look much the same (likeness above "
+        f"{LOOK_ALIKE_COSINE}): less than a third of the visible part tells them apart."
     )
 
 

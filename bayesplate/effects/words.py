@@ -13,6 +13,11 @@ def effect_names(names: Sequence[str], last: str = "and") -> str:
     return join_words([effect_name(name) for name in names], last)
 
 
+def as_sentence(text: str) -> str:
+    """A text with a capital letter at its head, the others as they are."""
+    return f"{text[:1].upper()}{text[1:]}"
+
+
 def join_words(words: Sequence[str], last: str = "and") -> str:
     """A list in prose."""
     return f" {last} ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)

@@ -100,7 +100,7 @@ def before_after_picture(diagnosis: Diagnosis) -> Picture | None:
     )
     shift_texts = "; ".join(f"{name} by {value:+.1f} sd" for name, value in shifts.items())
     alt = f"Error {details}. The constants move: {shift_texts}."
-    caption = "The first error falls with any effect that is added."
+    caption = "The first error mostly falls with whatever effect is added."
     if after.nested_leave_one_out_rms_cents is not None:
         caption += " The last is the honest one: each mode is left out of the search as well as of the fit."
     return Picture("before-after", "Error before and after, and what it does to the constants", alt, caption, figure)

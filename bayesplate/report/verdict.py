@@ -17,12 +17,12 @@ from bayesplate.diagnosis.tables import (
     sizes_table,
 )
 from bayesplate.diagnosis.words import (
-    IN_PART_HEADING,
     VERDICTS,
     headline_sentence,
     known_sentences,
     reason_and_notes,
     shown_model_sentence,
+    verdict_heading,
     verdict_sentences,
     warnings,
 )
@@ -49,7 +49,7 @@ def diagnosis_section(diagnosis: Diagnosis) -> SimpleNamespace:
         sizes_table(diagnosis),
     )
     return SimpleNamespace(
-        heading=IN_PART_HEADING if diagnosis.named_in_part else VERDICTS[diagnosis.verdict].heading,
+        heading=verdict_heading(diagnosis),
         # every possible verdict, its meaning, and whether it was given
         verdicts=tuple((word, verdict.heading, word == diagnosis.verdict) for word, verdict in VERDICTS.items()),
         sentences=tuple(verdict_sentences(diagnosis)),

@@ -155,7 +155,7 @@ def test_what_may_be_as_probable_as_something_that_is_not_shared_is_told():
 
     assert campaign_verdict(found)[2] == (
         "the most probable is b of another size on each board, which the boards do not share; a alike on all boards "
-        "beside b of another size on each may be as probable"
+        "beside b of another size on each comes within a factor 3 of it"
     )
 
 

@@ -69,6 +69,12 @@ def test_the_error_falls_further_than_in_95_of_100_null_sets(found):
         assert (told.value, told.limit) == pytest.approx((ratio, 0.45))
 
 
+def test_an_error_that_rises_is_not_reduced_though_it_rises_further_by_chance(found):
+    control = replace(CONTROL, ratio=3.0 * CONTROL.ratio)
+    for ratio, is_met in [(0.99, True), (1.01, False)]:
+        assert judge_claim(found, decided(found), control, folds(found, ratio)).conditions[0].is_met == is_met
+
+
 def test_the_log_score_rises_by_two_standard_errors_of_the_paired_differences(found):
     told = judge_claim(found, decided(found), CONTROL, folds(found)).conditions[1]
     gains = log_score_gains(found.ground, found.residual, np.ones(9, dtype=int))

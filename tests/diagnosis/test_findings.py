@@ -501,3 +501,5 @@ def test_the_interval_of_a_size_reaches_beyond_its_first_node():
     assert low < z[0] < middle
     assert [low, middle, high] == pytest.approx(halfnorm.ppf([0.05, 0.5, 0.95]), abs=0.125)
     assert _size_quantiles(np.array([0.7]), np.array([1.0]), (0.05, 0.95)) == pytest.approx([0.7, 0.7])
+    of_two = np.tile(z, 5), np.tile(share, 5) / 5.0  # cells of another size beside it
+    assert _size_quantiles(*of_two, (0.05, 0.5, 0.95)) == pytest.approx([low, middle, high])

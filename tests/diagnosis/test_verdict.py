@@ -189,7 +189,7 @@ def test_a_name_that_another_assumption_changes_is_a_group_with_what_it_turned_i
     told = decided(found, others=[stays, changes])
     assert (told.word, told.effects, told.index) == ("indistinguishable group", ("a", "b"), 1)
     assert [(one.members, round(one.support, 6)) for one in told.explanations] == [(("a",), 0.9), (("b",), 0.06)]
-    assert told.reason == "if the noise is larger b may be as probable"
+    assert told.reason == "if the noise is larger b comes within a factor 3 of it"
     gone = turned({(): 0.2, ("c",): 0.8})
     assert decided(found, others=[gone]).effects == ("a", "c")
 

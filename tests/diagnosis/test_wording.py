@@ -25,6 +25,7 @@ from bayesplate.diagnosis.tables import (
 )
 from bayesplate.diagnosis.verdict import VerdictWord
 from bayesplate.diagnosis.words import (
+    IN_PART_HEADING,
     MERITS,
     VERDICTS,
     alike_sentence,
@@ -38,6 +39,7 @@ from bayesplate.diagnosis.words import (
     verdict_sentences,
     warnings,
 )
+from bayesplate.effects.words import as_sentence
 from bayesplate.results.tables import render
 
 KEYS = [
@@ -117,7 +119,7 @@ PASSAGES = [
     ("named", "point to membrane tension. The reason: the reason of it. The error of the prediction is reduced: "
      "the nested leave-one-out error fell from 46 to 12 cents, and every condition of that claim is met."),
     ("indistinguishable group", "cannot tell which: membrane tension or fluid loading."),
-    ("unexplained", "no effect that was tried explains it"),
+    ("unexplained", "none of the effects that were tried is, at a possible size, a probable explanation"),
     ("undetectable", "could not show them even if they were there"),
 ]  # fmt: skip
 
@@ -188,14 +190,14 @@ def test_with_too_few_readings_the_error_that_both_models_have_is_told():
             one, before=replace(BEFORE, **missing), after=replace(AFTER, **missing), conditions=tuple(unjudged)
         )
         assert claim_sentence(few) == (
-            f"{told}No improvement is claimed: the readings are too few to choose anew without each of them."
+            f"{told}No improvement is claimed: too few modes are left to choose anew without each of them."
         )
 
 
 def test_probabilities_of_what_does_not_explain_the_readings_stand_under_that_title():
     for verdict in DIAGNOSES:
         title = answers_table(replace(NAMED, verdict=verdict)).title
-        assert ("none of it explains the readings" in title) == (verdict == "unexplained")
+        assert ("none of it is a probable explanation" in title) == (verdict == "unexplained")
 
 
 def test_the_probabilities_sum_to_one_as_they_are_printed():
@@ -359,6 +361,12 @@ def test_it_shows_itself():
     assert all(sentence in page.text for sentence in known_sentences(NAMED))
     for words in ("An effect was found", "point to membrane tension", "46.5", f"{AFTER.leave_one_out_rms_cents}", NEXT):
         assert words in page.text
+    in_part = replace(DIAGNOSES["unexplained"], named_in_part=("membrane_tension",))
+    assert f"a-board: {IN_PART_HEADING}" in Read(in_part._repr_html_()).text
+
+
+def test_a_sentence_keeps_the_capitals_of_its_names():
+    assert as_sentence("relabelling (2,0) in setup Body") == "Relabelling (2,0) in setup Body"
 
 
 def test_a_plate_with_declared_effects_is_not_called_ideal():

@@ -106,7 +106,10 @@ def exact_law(folder: Path, *cards: str) -> str:
     """The worst error of the exact law against full solves that it has not seen."""
     rows = [(f"`{card}`", f"{_summary(card)['error']['exact_law_worst_cents']:.3f}") for card in cards]
     text = words_table(("board", "largest error over all modes and held-out points, cents"), rows)
-    return text + "\nEvery fit makes this comparison and states it; a tenth of a cent is accepted.\n"
+    return (
+        text
+        + "\nEvery fit makes this comparison and states it; a fifth of the smallest scatter of a reading is accepted.\n"
+    )
 
 
 def sessions_together(folder: Path) -> str:

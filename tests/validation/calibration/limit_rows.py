@@ -65,7 +65,7 @@ COMPUTATION = (
     ),
     Row(
         "V5",
-        "Simulation-based calibration from the prior, 1000 simulations",
+        "Simulation-based calibration from the prior",
         "ranks inside the 95 % simultaneous band",
         page="calibration",
     ),
@@ -77,7 +77,7 @@ COMPUTATION = (
     ),
     Row(
         "V7",
-        "Simulation-based calibration at the posteriors of the paper's two boards, 500 simulations each",
+        "Simulation-based calibration at the posteriors of the paper's two boards",
         "ranks inside the 95 % simultaneous band",
         page="calibration",
     ),
