@@ -12,7 +12,6 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.board.material import MODULI
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.values import Key
 from bayesplate.commands.arguments import check_arguments, integer_reader
@@ -199,7 +198,9 @@ def _diagnose_fit(problem: Problem, before: FitResult, run: Run, n_null: int) ->
     stages.remaining_time = FIT_TIME * len(finalists) + (_CHOICE_TIME if verdict.index else 0.0)
     refits, failures = _refit_finalists(problem, before, run, search, finalists)
     fits = {0: before, **refits}
-    known_carrying = (carrying_modes(posed.board, fit.errors.leverages, MODULI) for fit in known_effect_fits)
+    known_carrying = (
+        carrying_modes(posed.board, fit.errors.leverages, posed.board.symmetry.moduli) for fit in known_effect_fits
+    )
     fit_carrying = (fit.summary.carrying_modes for fit in fits.values())
     united_modes = unite_carrying_modes(
         find_carrying_modes(search, verdict.judged_index), *fit_carrying, *known_carrying

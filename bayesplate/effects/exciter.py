@@ -65,7 +65,6 @@ class Exciter(Effect):
     sentence: ClassVar[str] = (
         "An exciter's magnet stands still on its spring, which holds the board and raises its lowest modes."
     )
-    references: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> Exciter:

@@ -60,7 +60,10 @@ class SupportMass(Effect):
         return replace(self, edge=edge, share=float(np.mean(high - low)))
 
     def contributions(self) -> tuple[Contribution, ...]:
-        """Less the product of the mean deflections, with the share of the vibrating mass in frame and board."""
+        """Less the product of the mean deflections, with the share of the vibrating mass in frame and board.
+
+        The board's mass counts as uniform here.
+        """
 
         def weight(values: Values, setup: Setup) -> Floats:
             vibrating = vibrating_mass(values, setup)

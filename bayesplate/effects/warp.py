@@ -98,7 +98,7 @@ class Warp(Effect):
         pairs = curvature_pairs(curvatures)
 
         def terms(values: Values, field: Field | None) -> tuple[Term, ...]:
-            moduli = tuple(float(modulus) for modulus in np.ravel(_moduli(values)[..., :4]))
+            moduli = tuple(float(modulus) for modulus in np.ravel(_moduli(values)))
             membrane = partial(
                 membrane_terms,
                 aspect_ratio=self.aspect_ratio,

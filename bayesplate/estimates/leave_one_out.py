@@ -131,15 +131,22 @@ def indices_of(modes: Iterable[CarryingMode], board: Board) -> tuple[int, ...]:
 
 
 def carrying_sentence(modes: Sequence[CarryingMode]) -> str:
-    """Sentence on the modes that alone carry a parameter, and what follows; empty where there are none."""
+    """Sentence on the modes that alone carry a parameter, and what follows; empty where there are none.
+
+    Sessions read one mode together: what it carries is told once, without the name of a session.
+    """
     if not modes:
         return ""
     has_several_setups = len({mode.setup for mode in modes}) > 1
-    clauses = []
+    setups: dict[tuple[str, str], list[str]] = {}
     for mode in modes:
-        carried = f"the size of {effect_name(mode.carries)}" if mode.carries in EFFECTS else mode.carries
-        clauses.append(f"mode {mode.label}{f' of {mode.setup}' if has_several_setups else ''} alone carries {carried}")
-    verb = "it does" if len(modes) == 1 else "they do"
+        setups.setdefault((mode.label, mode.carries), []).append(mode.setup)
+    clauses = []
+    for (label, carries), names in setups.items():
+        carried = f"the size of {effect_name(carries)}" if carries in EFFECTS else carries
+        where = f" of {names[0]}" if has_several_setups and len(names) == 1 else ""
+        clauses.append(f"mode {label}{where} alone carries {carried}")
+    verb = "it does" if len(clauses) == 1 else "they do"
     return f"{join_words(clauses)}: {verb} not count in the leave-one-out error"
 
 

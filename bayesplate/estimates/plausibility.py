@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.special import chdtrc
@@ -14,7 +15,7 @@ from bayesplate.board.material import RIGIDITIES
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.reading import NO_OFFSET, Reading
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
-from bayesplate.estimates.least_squares import log_measured, starting_rigidities
+from bayesplate.estimates.least_squares import log_measured, starting_rigidities, with_read_setups
 from bayesplate.frequencies.prior_bands import prior_draws, with_rigidities
 from bayesplate.frequencies.terms import term_weights
 from bayesplate.labels import Label
@@ -138,7 +139,7 @@ class PriorPredictive:
         expected = self.draws[:, reading].mean() + self._covariance[reading, other_readings] @ weights
         return float(offsets @ weights), float(expected)
 
-    @property
+    @cached_property
     def _covariance(self) -> Floats:
         return np.atleast_2d(np.cov(self.draws, rowvar=False)) + _SLACK**2 * np.eye(self.draws.shape[1])
 
@@ -186,7 +187,8 @@ def require_plausible(board: Board, prior: PriorCard, rng: np.random.Generator) 
     carries sound so fast or so slowly. InputError for units and for the impossible, NotIdentifiableError for sides,
     constants or orders that are exchanged.
     """
-    if not all(setup.readings for setup in board.setups):  # refused later, or still to be measured
+    board = with_read_setups(board)  # the others are refused later, or still to be measured
+    if not board.setups:
         return
     speed, ratio = speed_and_ratio(board)
     is_material = bool(board.nominal()["poisson_xy"] ** 2 * ratio < 1.0)

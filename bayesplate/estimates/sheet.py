@@ -75,7 +75,7 @@ class Sheet:
     theory: str
     basis: str  # at which constants the modes are computed
     modes: tuple[SheetMode, ...]  # in the order of frequency
-    combined: tuple[CombinedMode, ...]  # empty where the modes do not tell the constants apart
+    combined: tuple[CombinedMode, ...]  # empty with fewer than three modes
     likely: str = ""  # what the bands come from
     # where the board begins and ends along y at `grid_points`, as fractions of its widest width; None: a rectangle
     limits: WidthLimits | None = None

@@ -41,7 +41,10 @@ def unusual_sentences(board: Board, prior: PriorCard, rigidities: Floats) -> tup
         if not low <= by_name[name] <= high:
             unit, factor = ("GPa", 1e9) if name in MODULI else ("N m", 1.0)
             expected = f"{low / factor:.3g} to {high / factor:.3g}"
-            out_of_reach.append(f"{name} comes out as {by_name[name] / factor:.3g} {unit}, expected were {expected}")
+            shown_name = board.symmetry.moduli[0] if board.isotropic else name
+            out_of_reach.append(
+                f"{shown_name} comes out as {by_name[name] / factor:.3g} {unit}, expected were {expected}"
+            )
     if out_of_reach:
         sentences.append(
             f"out of reach of the prior '{prior.name}': {'; '.join(out_of_reach)}; are sizes, labels and prior right?"

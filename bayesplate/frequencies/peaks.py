@@ -254,8 +254,8 @@ def _orders(signs: Indices, n_modes: int, residues: Floats | None) -> Iterator[O
 def _log_labels(setup: Setup, readings: Indices, labels: Sequence[Label | None]) -> Floats:
     """ln of the probability of each peak's label if the peak is each mode and, last, if it is spurious.
 
-    A label is right with probability c, and otherwise belongs to each other mode with an equal share of 1 - c. A label
-    that the program proposed has no weight.
+    A label is right with probability c; the other modes, and that the peak is spurious, have equal shares of 1 - c. A
+    label that the program proposed has no weight.
     """
     result = np.zeros((readings.size, len(labels) + 1))
     for i, index in enumerate(readings):

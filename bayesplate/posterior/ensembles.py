@@ -138,6 +138,7 @@ def pilot(
     """
     import emcee
 
+    n_walkers = max(n_walkers, 2 * len(centre) + 2)
     points, log_prob = finite_starts(log_density, draws_around_estimate(centre, factor, rng), n_walkers)
     start: Any = emcee.State(points, log_prob=log_prob, random_state=random_state(rng))
     backend, mixture, previous = emcee.backends.Backend(), Mixture.with_covariance(centre, factor @ factor.T), -np.inf

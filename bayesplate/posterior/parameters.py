@@ -106,10 +106,14 @@ class Parameters:
         """ln of the relative noise: (n_draws, n_setups) array."""
         return theta[:, self.n_constants : self.first_input]
 
-    def log_widening(self, theta: Floats) -> float:
-        """ln of the noise at one point over the median of its prior, in the setup where that is largest."""
+    def log_widenings(self, theta: Floats) -> Floats:
+        """ln of the noise at one point over the median of its prior: (n_setups,) array."""
         medians = np.array([setup.noise.median for setup in self.board.setups])
-        return float(np.max(self.log_noise(theta[None])[0] - np.log(medians)))
+        return self.log_noise(theta[None])[0] - np.log(medians)
+
+    def log_widening(self, theta: Floats) -> float:
+        """The largest of `log_widenings`."""
+        return float(np.max(self.log_widenings(theta)))
 
     def log_prior_inputs(self, theta: Floats) -> Floats:
         """Log density of the input columns: (n_draws,) array."""

@@ -82,7 +82,7 @@ class PosedProblem:
     @cached_property
     def _readings(self) -> Remarks:
         if any(self.posterior.peaks):  # the assignment of peaks treats doubtful labels
-            return Remarks((), (*self.veerings, *noise_remarks(self.board, self.log_widening)))
+            return Remarks((), (*self.veerings, *noise_remarks(self.board, self.parameters.log_widenings(self.centre))))
         return reading_remarks(self.posterior, self.centre)
 
     @property
@@ -203,7 +203,8 @@ def _require_reachable(posterior: Posterior, centre: Floats, covariance: Floats)
         if not density.lower <= value <= density.upper:
             factor, unit = _UNITS[name]
             low, high = density.lower / factor, density.upper / factor
-            outside.append(f"{name} is about {value / factor:.3g} {unit}, the prior wants {low:g} to {high:g}")
+            shown_name = posterior.board.symmetry.moduli[0] if posterior.board.isotropic else name
+            outside.append(f"{shown_name} is about {value / factor:.3g} {unit}, the prior wants {low:g} to {high:g}")
     ranges = f" ({'; '.join(outside)})" if outside else ""
     raise NotIdentifiableError(
         f"{posterior.board.name}: the prior {posterior.prior.name} excludes the data: 0 of {_N_TRIED} draws around the "

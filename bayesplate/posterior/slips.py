@@ -72,7 +72,7 @@ class Remarks(NamedTuple):
 def reading_remarks(posterior: Posterior, centre: Floats) -> Remarks:
     """Remarks on the readings of a posterior, whose models hold the exact law, at its (n_dim,) centre."""
     search = SlipSearch(posterior, centre)
-    is_lost = is_noise_large(posterior.board, search.log_widening)
+    is_lost = not np.isfinite(search.log_widening) or is_noise_large(posterior.board, search.log_widening)
     noise = noise_remarks(posterior.board, search.log_widening)
     slip = search.likeliest(anywhere=is_lost)
     if slip is not None:
@@ -113,7 +113,8 @@ class SlipSearch:
             return None
         if anywhere:
             other_fits = (self._fit_from_own_start(i) for i in range(n))
-            self._starts = [self._full_fit, *(fit for fit in other_fits if fit is not None)]
+            fits = [fit for fit in (self._full_fit, *other_fits) if fit is not None and fit.is_plate]
+            self._starts = fits or [self._full_fit]
         single = [slip for i in range(n) for slip in self._slips_of(i)]
         best = max((*single, *self._exchanges(self._pairs())), key=lambda slip: slip.log_odds, default=None)
         return best if best is not None and best.log_odds > np.log(RARITY) else None
@@ -247,17 +248,18 @@ class _Fit:
         )
 
 
-def noise_remarks(board: Board, log_widening: float) -> tuple[str, ...]:
+def noise_remarks(board: Board, log_widening: float | Floats) -> tuple[str, ...]:
     """A sentence if the readings scatter far more than the prior of the noise expects.
 
-    `log_widening` is ln of the noise of the residuals over the median of its prior.
+    `log_widening` is ln of the noise of the residuals over the median of its prior, of all setups or of each.
     """
-    if not is_noise_large(board, log_widening):
+    log_widenings = np.broadcast_to(log_widening, len(board.setups))
+    if not is_noise_large(board, float(np.max(log_widenings))):
         return ()
     levels = ", ".join(
-        f"{100.0 * setup.noise.median * np.exp(log_widening):.2g} % where about {100.0 * setup.noise.median:.2g} % is "
+        f"{100.0 * setup.noise.median * np.exp(own_widening):.2g} % where about {100.0 * setup.noise.median:.2g} % is "
         "expected" + (f" in setup {setup.name}" if len(board.setups) > 1 else "")
-        for setup in board.setups
+        for setup, own_widening in zip(board.setups, log_widenings, strict=True)
     )
     return (
         f"the readings scatter about the fitted plate by {levels}: no plate of these sizes and edges fits them, so do "

@@ -191,7 +191,7 @@ def find_surrogate(
     for _ in range(_MOST_ROUNDS):
         density = coordinates.density(with_surrogate(posterior, surrogate))
         draws = pilot(density, coordinates.start, factor, rng).draws
-        y = draws[rng.choice(len(draws), n_points, replace=False)]
+        y = draws[rng.choice(len(draws), min(n_points, len(draws)), replace=False)]
         law_points = _law_points(posterior, coordinates, coordinates.theta(y))
         weights, pareto_k = smooth_weights(law_points.log_density - density(y))
         proposal = Mixture.fitted(draws).widened(_SEARCH_WIDTH)

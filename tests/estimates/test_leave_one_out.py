@@ -293,6 +293,12 @@ def test_modes_that_carry_something_are_named():
     )
     assert "the size of clamp rotation" in carrying_sentence(told)
     assert carrying_sentence(()) == ""
+    days = tuple(CarryingMode(f"day {i}", "(1,0)", 0.95, "E_x") for i in (1, 2))
+    other = CarryingMode("day 1", "(0,2)", 0.95, "E_y")
+    assert carrying_sentence(days).startswith("mode (1,0) alone carries E_x: it does not")
+    assert carrying_sentence((*days, other)).startswith(
+        "mode (1,0) alone carries E_x and mode (0,2) of day 1 alone carries E_y: they do not"
+    )
     again = (CarryingMode(setup.name, labels[5], 0.99, "E_x"), CarryingMode(setup.name, labels[0], 0.91, "E_x"))
     assert [(one.label, one.carries) for one in unite_carrying_modes(told[1:], again)] == [
         (labels[5], "E_y"),

@@ -283,8 +283,11 @@ def test_one_reading_that_makes_a_plate_of_no_material_is_asked_about():
     """A decimal place in a mode along the grain: no unit, no exchange, and the others tell what they expect."""
     _, board = of_spruce()
     wrong = next(one for one in read_as(board, 0.1).setups[0].readings if one.beams == (2, 0))
-    told = asked(with_readings(board, lambda one: wrong if one.beams == wrong.beams else one), "weakly-informative")
+    slipped = with_readings(board, lambda one: wrong if one.beams == wrong.beams else one)
+    told = asked(slipped, "weakly-informative")
     assert "nu_xy nu_yx is below 1" in told
+    peaks = replace(board.setups[0], name="other", readings=(), peaks=made_boards.peaks_of(50.0, 70.0))
+    assert asked(replace(slipped, setups=(slipped.setups[0], peaks)), "weakly-informative") == told
     assert f"is {wrong.label} at {wrong.frequency.mean:.4g} Hz right? the others expect about " in told
     expected = float(told.split("expect about ")[1].split()[0])
     assert expected == pytest.approx(10.0 * wrong.frequency.mean, rel=_SLACK)  # the error that readings are given there

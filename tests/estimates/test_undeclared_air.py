@@ -64,7 +64,11 @@ def test_the_sentence_says_by_how_much_and_what_to_add_but_for_lines_that_the_ca
     assert told.endswith('add to [setup.fluid] the lines density_kg_m3 = 1.2 and baffle = "none"')
     stated = tuple(replace(setup, fluid=DeclaredFluid(1.2, "none")) for setup in board.setups)
     told = air_sentence(replace(board, setups=stated, effects=()), estimate)
+    assert told.startswith("what the card states of the air or the water around the board is not declared; with it")
     assert told.endswith("--effects fluid_loading, or fluid_loading among the effects of the card, puts it in")
+    thick = tuple(replace(setup, fluid=DeclaredFluid(2.4, "none")) for setup in board.setups)
+    once, twice = (rise_with_air(replace(board, setups=each, effects=()), estimate) for each in (stated, thick))
+    np.testing.assert_allclose(twice, 2.0 * once, rtol=0.05)
     assert "add to" not in told
     monkeypatch.setattr("bayesplate.estimates.undeclared_air.rise_with_air", lambda *_: np.full(3, 0.1))
     told = air_sentence(replace(board, setups=stated, effects=("transverse_shear",)), estimate)

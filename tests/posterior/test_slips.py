@@ -284,6 +284,10 @@ def test_a_noise_far_above_its_prior_is_told_and_one_that_is_allowed_is_not():
     assert noise_remarks(board, 1.49) == ()
     assert "4.5 %" not in noise_remarks(board, 1.51)[0]
     assert "1.4 % where about 0.3 % is expected" in noise_remarks(board, 1.51)[0]
+    second = replace(board.setups[0], name="second")
+    (told,) = noise_remarks(replace(board, setups=(board.setups[0], second)), np.array([1.51, 0.0]))
+    assert "1.4 % where about 0.3 % is expected in setup" in told
+    assert "0.3 % where about 0.3 % is expected in setup second" in told
     sure = with_noise(board, Quantity.from_median(0.003, 1.01))
     assert noise_remarks(sure, np.log(0.99 * LARGE_NOISE)) == ()
     assert noise_remarks(sure, np.log(1.01 * LARGE_NOISE)) != ()
