@@ -46,7 +46,7 @@ def find_card(kind: CardKind, name_or_path: str | os.PathLike[str], folder: Path
         raise InputError(Fault(f"{_SINGULAR[kind]} card", "a name or a path", show_value(name_or_path)))
     text = os.fspath(name_or_path)
     if isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or any(mark in text for mark in "/\\"):
-        return Path(text) if folder is None else folder / text
+        return Path(text) if folder is None else Path(os.path.normpath(folder / text))  # which may still be to be made
     names = card_names(kind)
     if text in names:
         return shelf_folder(kind) / f"{text}.toml"

@@ -74,6 +74,7 @@ def _comparison_step(draws: Draws) -> int:
     return max(1, len(draws.flat) // _N_LINEARISATION)
 
 
-def linear_is_enough(draws: Draws, errors: Floats) -> bool:
+def linear_is_enough(draws: Draws, errors: Floats | None = None) -> bool:
     """Whether the linear law's `errors` over the posterior stay below their share of the posterior's own noise."""
+    errors = linearisation(draws) if errors is None else errors
     return linear_suffices(draws.problem.posterior.n_modes, errors, draws.median_noise)

@@ -30,13 +30,15 @@ def walker_major(draws: Floats) -> Floats:
     return np.swapaxes(draws, 1, 2).reshape(len(draws), -1, *draws.shape[3:])
 
 
-def thin_walker_major(draws: Floats, burn_in: int, tau_max: float, *, n_draws_max: int) -> Floats:
+def thin_walker_major(draws: Floats, burn_in: int, tau_max: float, *, n_draws_max: int | None = None) -> Floats:
     """Draws after burn-in, thinned to half an autocorrelation time, (n_ensembles, n_draws, ...) as `walker_major`.
 
     Thinned further until a chain holds at most `n_draws_max` draws (but at least one per walker).
     """
     n_steps, n_walkers = draws.shape[1:3]
-    step = max(thinning_step(tau_max), -(-(n_steps - burn_in) // max(1, n_draws_max // n_walkers)))
+    step = thinning_step(tau_max)
+    if n_draws_max is not None:
+        step = max(step, -(-(n_steps - burn_in) // max(1, n_draws_max // n_walkers)))
     return walker_major(draws[:, burn_in::step])
 
 

@@ -218,4 +218,4 @@ def test_the_examples_of_the_readme_are_cards(tmp_path):
     (tmp_path / "my-table.toml").write_text(table, encoding="utf-8")
     assert len(load_coefficients(tmp_path / "my-table.toml").table) == 3
     (tmp_path / "my-campaign.toml").write_text(campaign, encoding="utf-8")
-    assert load_campaign(tmp_path / "my-campaign.toml").boards == ("spruce-free-2L", "./my-board.toml")
+    assert load_campaign(tmp_path / "my-campaign.toml").boards == ("spruce-free-4L", "./my-board.toml")

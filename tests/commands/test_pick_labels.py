@@ -105,7 +105,7 @@ def hit_at(given: tuple[tuple[float, float], ...]) -> PickedModes:
     answers = tuple(ModeMobility(row + 0j, np.full(4, 0.01 * np.abs(residues).max()), 1.0) for row in residues)
     lines, n = np.linspace(0.0, 500.0, 9), np.arange(4)
     spectra = Spectra(
-        lines, np.ones((9, 4), dtype=complex), np.ones((9, 4), dtype=complex), ("a", "b", "c", "d"), n, n,
+        lines, np.ones((9, 4), dtype=complex), np.ones((9, 4), dtype=complex), ("a", "b", "c", "d"), n, n, n,
         tuple((hammer, SENSOR) for hammer in given), "acceleration", 2.0,
     )  # fmt: skip
     return PickedModes(tuple(replace(PEAK, hz=one, sd_hz=1e-3 * one) for one in hz), answers, spectra, (), 20.0, 500.0)

@@ -173,7 +173,7 @@ def test_what_is_spoilt_here_was_sound():
 LINES = "".join(f"{i},1,1\n" for i in range(200))
 FOUND = {
     "escapes.csv": (b"\x1b[31mred\n1\n", r'got "\x1b[31mred"'),
-    "a column twice.csv": (b"force,acceleration,force\n1,2,3\n", 'wanted each column once, got "force" again'),
+    "a column twice.csv": (b"force,acceleration,force\n1,2,3\n", 'wanted each quantity once, got "force" again'),
     "no end.csv": (f"f_hz,re,im\n{LINES}inf,1,1\n".encode(), "a hundred evenly spaced lines or more"),
     "infinite.csv": (f"f_hz,re,im\n{LINES}200,inf,1\n".encode(), "wanted finite numbers, got line 201 is none"),
     "huge.csv": (b"acceleration\n" + b"1e300\n-1e300\n" * 999, "wanted numbers up to 1e+100, got larger ones"),

@@ -52,7 +52,7 @@ def test_what_is_four_times_as_broad_as_all_others_is_rather_no_mode():
 HERTZ = np.arange(20.0, 1000.0, 0.5)
 ONES = np.ones((HERTZ.size, 1), dtype=complex)
 FIRST = np.zeros(1, dtype=np.intp)
-SPECTRA = Spectra(HERTZ, ONES, ONES, ("frf",), FIRST, FIRST, ((None, None),), "acceleration", 2.0)
+SPECTRA = Spectra(HERTZ, ONES, ONES, ("frf",), FIRST, FIRST, FIRST, ((None, None),), "acceleration", 2.0)
 
 
 def test_a_weak_mode_is_a_part_of_a_peak_nearby_and_of_nothing_broad():
