@@ -49,7 +49,8 @@ def session_notes(board: Board) -> tuple[str, ...]:
     """A sentence for each group of sessions."""
     return tuple(
         f"{', '.join(setup.name for setup in group[:-1])} and {group[-1].name} hold the board alike: they are taken "
-        "for sessions of one setup, which share how the real board departs from the ideal plate"
+        "for sessions of one setup, which share how the real board departs from the ideal plate; what is predicted in "
+        "the fit includes it, of a mode left out nobody knows it"
         for group in session_groups(board)
     )
 
@@ -85,6 +86,15 @@ def _discrepancy_parameters(owner: Owner, labels: Sequence[Label]) -> Iterator[P
         yield Parameter(
             _discrepancy_key(label), owner, standard_normal, "1", display_name=MODE_DISCREPANCIES, description=look
         )
+
+
+def discrepancy_columns(board: Board) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Indices among the uncertain parameters of the discrepancies of the modes, and of their scales."""
+    of_groups = [(i, parameter) for i, parameter in enumerate(board.uncertain) if parameter.owner.kind == "group"]
+    return (
+        tuple(i for i, parameter in of_groups if parameter.key != DISCREPANCY),
+        tuple(i for i, parameter in of_groups if parameter.key == DISCREPANCY),
+    )
 
 
 def shared_variance_share(setup: Setup) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.arrays import Floats, Indices
+from bayesplate.board.sessions import discrepancy_columns
 from bayesplate.diagnosis.hypotheses import Hypothesis, odds_against_none, probabilities
 from bayesplate.diagnosis.search import SearchGround, SearchResult
 from bayesplate.estimates.leave_one_out import CarryingMode, carrying_modes, leverages_of, unite_carrying_modes
@@ -159,5 +160,6 @@ def _carrying_modes_under(result: SearchResult, index: int) -> tuple[CarryingMod
     columns = np.hstack([baseline.slopes, baseline.input_slopes, size_columns])
     scales = np.where(baseline.is_mode, baseline.scales, np.inf)
     names = (*board.symmetry.moduli, *(parameter.effect or parameter.name for parameter in board.uncertain), *owners)
-    leverages = leverages_of(columns, scales, baseline.readings_by_mode, board.symmetry.n)
+    noise = [board.symmetry.n + i for i in discrepancy_columns(board)[0]]
+    leverages = leverages_of(columns, scales, baseline.readings_by_mode, board.symmetry.n, noise)
     return carrying_modes(board, leverages, names)

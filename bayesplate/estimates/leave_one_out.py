@@ -79,17 +79,28 @@ class CarryingMode:
 
 
 def leverages_of(
-    columns: Floats, scales: Floats, modes: Sequence[Sequence[int]] | None = None, n_open: int = 3
+    columns: Floats,
+    scales: Floats,
+    modes: Sequence[Sequence[int]] | None = None,
+    n_open: int = 3,
+    noise_columns: Sequence[int] = (),
 ) -> Leverages:
     """Leverages of readings that are fitted by weighted squares; zero where the fit has no slopes.
 
     `columns` is (n_readings, n_free): d ln f by ln of the `n_open` free rigidities, and by the standard coordinates of
     the other free parameters, whose priors count as one more observation each. A scale is infinite where a reading is
-    not used.
+    not used. `noise_columns` are of parameters that act as noise which the readings of one mode share: no reading
+    carries them.
     """
+    from scipy.linalg import solve_triangular
+
     weighted = np.nan_to_num(columns / scales[:, None])
     if not np.isfinite(weighted.T @ weighted).all():
         return Leverages(np.zeros(len(weighted)), np.full(len(weighted), -1))
+    shared_noise = weighted[:, list(noise_columns)]
+    root = np.linalg.cholesky(np.eye(len(weighted)) + shared_noise @ shared_noise.T)
+    weighted[:, list(noise_columns)] = 0.0
+    weighted = solve_triangular(root, weighted, lower=True)
     is_prior = np.arange(columns.shape[1]) >= n_open
     covariance = np.linalg.pinv(weighted.T @ weighted + np.diag(is_prior.astype(np.float64)), hermitian=True)
     hat = weighted @ covariance @ weighted.T
@@ -162,13 +173,15 @@ def prediction_errors(
     bounds: Bounds | None = None,
     modes: Sequence[Sequence[int]] | None = None,
     scales: Floats | None = None,
+    noise_columns: Sequence[int] = (),
+    held_columns: Sequence[int] = (),
 ) -> PredictionErrors:
     """Errors of the most likely constants, in sample and with each mode left out in turn.
 
     Each fit begins where its own sum of squares is lowest, among the (n_starts, n_free) `starts` and the fit of all
     modes: Student's likelihood may have another peak without the mode. `target` is ln of the measured frequencies,
     `modes` the readings of each mode, by default one each, and `scales` weigh the readings in the leverages, by default
-    as normal errors.
+    as normal errors. In the leverages the parameters `noise_columns` act as noise, and `held_columns` are held.
     """
     n = n_constants(predict)
 
@@ -196,4 +209,6 @@ def prediction_errors(
             left_out[mode] = (target - predicted)[mode]
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # the fit may be no plate
         scales = 1.0 / np.abs(misfit(target)[1]) if scales is None else scales
-        return PredictionErrors(in_sample, left_out, leverages_of(sensitivities(predict, fit), scales, modes, n))
+        columns = sensitivities(predict, fit)
+        columns[:, list(held_columns)] = 0.0
+        return PredictionErrors(in_sample, left_out, leverages_of(columns, scales, modes, n, noise_columns))

@@ -10,7 +10,7 @@ import numpy as np
 
 from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
-from bayesplate.board.sessions import readings_by_mode
+from bayesplate.board.sessions import discrepancy_columns, readings_by_mode
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.leave_one_out import CarryingMode, PredictionErrors, carrying_modes, prediction_errors
 from bayesplate.estimates.refit import deviance_misfit
@@ -86,7 +86,10 @@ def mode_errors(draws: Draws) -> PredictionErrors:
     starts, bounds = starts[:, problem.parameters.fitted_columns], problem.parameters.fitted_bounds
     scales = reading_sd(problem.board.setups, noise)
     target, modes = log_measured(problem.board), readings_by_mode(problem.board)
-    return prediction_errors(predict, target, misfit, starts, bounds, modes, scales)
+    shared, held = (
+        [problem.parameters.n_constants + i for i in columns] for columns in discrepancy_columns(problem.board)
+    )
+    return prediction_errors(predict, target, misfit, starts, bounds, modes, scales, shared, held)
 
 
 def full_frequencies(problem: PosedProblem, values: Values) -> Floats:

@@ -270,6 +270,20 @@ def test_readings_of_one_mode_carry_together_what_neither_carries_alone():
     assert found.values[5:] == pytest.approx(1.0)
 
 
+def test_what_the_readings_of_a_mode_share_is_noise_that_no_mode_carries():
+    """Two sessions of six modes that repeat far better than the plate fits: leverages of generalised least squares."""
+    rng = np.random.default_rng(4)
+    slopes, shared = np.repeat(rng.uniform(0.1, 1.0, (6, 3)), 2, axis=0), 5.0 * np.repeat(np.eye(6), 2, axis=0)
+    modes = [(2 * i, 2 * i + 1) for i in range(6)]
+    found = leverages_of(np.hstack([slopes, shared]), np.ones(12), modes, noise_columns=range(3, 9))
+
+    mean, variance = slopes[::2], 25.0 + 0.5
+    expected = np.einsum("ij,jk,ik->i", mean, np.linalg.inv(mean.T @ mean / variance), mean) / variance
+    np.testing.assert_allclose(found.values, np.repeat(expected, 2))
+    assert (found.carries < 0).all()
+    assert (leverages_of(np.hstack([slopes, shared]), np.ones(12), modes).carries >= 0).all()  # control
+
+
 def test_errors_of_some_readings_keep_their_places_among_all():
     errors = PredictionErrors(np.ones(2), np.array([1.0, 300.0]), Leverages(np.array([0.5, 0.95]), np.array([-1, 1])))
     spread = errors.at(np.array([0, 2]), 4)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -28,6 +29,7 @@ from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import OtherMode
 from bayesplate.plate.naming import ModePlace
 from bayesplate.plate.terms import Parity
+from bayesplate.posterior.assessment import carried_in_fit, mode_errors
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.sampling import SamplerSettings
@@ -129,6 +131,18 @@ def test_a_peak_that_may_be_the_mode_is_moved_too():
 def rough():
     """A board that is far from its plate in two modes, every day, with a discrepancy that may follow."""
     return pose(board(None, is_rough=True), load_prior("weakly-informative"), law="linear")
+
+
+def test_modes_carry_what_they_carry_in_one_session(rough):
+    """How the board departs from its plate is noise to its modes: none of them is said to carry that."""
+    alone = pose(replace(rough.board, setups=rough.board.setups[:1]).without(()), rough.prior)
+    carried = []
+    for problem, n in ((rough, N_SESSIONS), (alone, 1)):
+        errors = mode_errors(SimpleNamespace(problem=problem, median_noise=np.full(n, SCATTER)))
+        carried.append({(mode.label, mode.carries) for mode in carried_in_fit(problem.board, errors)})
+        assert np.isfinite(errors.left_out[errors.leverages.carries < 0]).sum() >= 4 * n
+
+    assert carried[0] == carried[1]
 
 
 def test_a_search_begins_where_the_board_is_and_not_where_its_plate_would_be(rough):
