@@ -131,11 +131,13 @@ def score_gain(gains: Floats | Sequence[float]) -> tuple[float, float]:
 
 
 def _chance_condition(errors: NestedErrors | None, control: NullControl) -> Condition:
-    limit = control.ratio_to_beat
+    limit = (
+        None if control.ratio_to_beat is None else min(control.ratio_to_beat, 1.0)
+    )  # an error that rises is not reduced
     if errors is None or limit is None or not errors.is_counted.any():
         return Condition("chance selection", None, limit, False)
     ratio = float(errors.ratio[0])
-    return Condition("chance selection", ratio, limit, ratio < min(limit, 1.0))
+    return Condition("chance selection", ratio, limit, ratio < limit)
 
 
 def _score_condition(result: SearchResult, errors: NestedErrors | None) -> Condition:

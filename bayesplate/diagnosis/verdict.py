@@ -127,8 +127,7 @@ def decide_verdict(
             )
             return Verdict("named", best.members, best.index, best, reason, True, (best,))
         words, rivals = rivalry
-        come = "come" if len(rivals) > 1 else "comes"
-        reason = f"{words} {alternatives_words(result, rivals)} {come} within a factor 3 of it"
+        reason = f"{words} {alternatives_words(result, rivals)} comes within a factor 3 of it"
         contenders = (best, *rivals)
     else:
         reason = "no explanation is three times as probable as every other"
