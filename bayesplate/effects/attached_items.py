@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -89,6 +90,13 @@ def radius_on(board: Board, setup: Setup, base: float) -> tuple[float, float]:
     """The radius of a base over the two sides that vibrate in a setup."""
     _, sides = _vibrating_range(board.nominal(), setup)
     return base / sides[0], base / sides[1]
+
+
+def are_mirrored(places: Fractions, axis: int) -> bool:
+    """Whether places are their own mirror images along x (0) or y (1)."""
+    rounded = Counter((round(x, 6), round(y, 6)) for x, y in places)
+    mirrored = [(1.0 - x, y) if axis == 0 else (x, 1.0 - y) for x, y in places]
+    return rounded == Counter((round(x, 6), round(y, 6)) for x, y in mirrored)
 
 
 def _vibrating_range(values: Values, setup: Setup) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -15,9 +14,9 @@ from bayesplate.board.board import Board, Values, nominal_mass, vibrating_length
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.setup import Setup
 from bayesplate.effects.attached_items import (
-    Fractions,
     PlacedItem,
     Places,
+    are_mirrored,
     forgotten_items,
     fractions_on,
     item_on_board,
@@ -152,7 +151,7 @@ class AttachedMass(Effect):
         return ["mass"] if len(self.items) == 1 else [f"mass_{i}" for i in range(1, len(self.items) + 1)]
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
-        along_x, along_y = (all(_are_mirrored(item.places, axis) for item in self.items) for axis in (0, 1))
+        along_x, along_y = (all(are_mirrored(item.places, axis) for item in self.items) for axis in (0, 1))
         return along_x, along_y
 
     def contributions(self) -> tuple[Contribution, ...]:
@@ -203,12 +202,6 @@ def _item_within(item: PlacedItem, shaped: Effect) -> PlacedItem:
     places = tuple(shaped.to_plate(*place) for place in item.places)
     low, high = outline(np.array([x for x, _ in places]))
     return replace(item, places=places, reach=tuple(zip(low.tolist(), high.tolist(), strict=True)))
-
-
-def _are_mirrored(places: Fractions, axis: int) -> bool:
-    rounded = Counter((round(x, 6), round(y, 6)) for x, y in places)
-    mirrored = [(1.0 - x, y) if axis == 0 else (x, 1.0 - y) for x, y in places]
-    return rounded == Counter((round(x, 6), round(y, 6)) for x, y in mirrored)
 
 
 def _tilts(item: PlacedItem, axis: int) -> list[PointMotion]:

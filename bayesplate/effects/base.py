@@ -296,6 +296,10 @@ class Effect(ABC):
         """Whether the two halves of the plate stay alike along x and along y."""
         return True, True
 
+    def is_own_mirror(self) -> tuple[bool, bool]:
+        """Whether the plate is its own mirror image along x and along y."""
+        return self.keeps_symmetry()
+
     def contributions(self) -> tuple[Contribution, ...]:
         """The terms that the effect adds to the budget of energies."""
         return ()

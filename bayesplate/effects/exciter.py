@@ -13,7 +13,7 @@ from bayesplate.board.board import Board, Values
 from bayesplate.board.parameter import Parameter
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import EdgeConditions, Setup
-from bayesplate.effects.attached_items import fractions_on, places_on
+from bayesplate.effects.attached_items import are_mirrored, fractions_on, places_on
 from bayesplate.effects.base import Contribution, Effect, Floats, Mass, Scope, Stiffness
 from bayesplate.effects.drives import (
     Drive,
@@ -200,6 +200,12 @@ class Exciter(Effect):
     def keeps_symmetry(self) -> tuple[bool, bool]:
         """The halves differ: even in the middle of the board, the magnet's mode belongs to one class alone."""
         return False, False
+
+    def is_own_mirror(self) -> tuple[bool, bool]:
+        along_x, along_y = (
+            all(drive.places and are_mirrored(drive.places, axis) for drive in self.drives) for axis in (0, 1)
+        )
+        return along_x, along_y
 
     def contributions(self) -> tuple[Contribution, ...]:
         """For each exciter its suspension between coil and magnet, and their masses."""

@@ -13,11 +13,13 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.effects.attached_mass import AttachedMass
 from bayesplate.effects.base import Effect, Scope
+from bayesplate.effects.exciter import Exciter
 from bayesplate.plate.terms import Weights
 from bayesplate.plate.thin import THIN_TERMS
 
 DEGREE = np.pi / 180.0
 DEFAULT_ANGLE = Quantity.from_mean(0.0, 3.0 * DEGREE, "normal", lower=0.0, upper=6.0 * DEGREE)
+_PLACED = AttachedMass.name, Exciter.name
 _SOURCE = (
     "half-normal of 3 degrees up to 6: boards are sawn along the grain by eye; a rectangle rings alike for either sign"
 )
@@ -128,8 +130,6 @@ def _lacks_mirror_line(board: Board, setup: Setup) -> bool:
     """
     from bayesplate.effects import effects_of
 
-    effects = [
-        effect for effect in effects_of(board, setup) if effect.name == AttachedMass.name or effect.is_implied(board)
-    ]
+    effects = [effect for effect in effects_of(board, setup) if effect.name in _PLACED or effect.is_implied(board)]
     edges = (setup.ends_x[0] == setup.ends_x[1], setup.ends_y[0] == setup.ends_y[1])
-    return not any(edges[axis] and all(effect.keeps_symmetry()[axis] for effect in effects) for axis in (0, 1))
+    return not any(edges[axis] and all(effect.is_own_mirror()[axis] for effect in effects) for axis in (0, 1))

@@ -15,7 +15,7 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Contribution, Effect, Floats, Scope, Stiffness
 from bayesplate.effects.part import aspect_ratio_of
-from bayesplate.plate.fields import Field
+from bayesplate.plate.fields import Field, Outline
 from bayesplate.plate.membrane import MODULI, Curvature, curvature_pairs, membrane_terms
 from bayesplate.plate.terms import ProjectedTerms, Term
 
@@ -37,17 +37,18 @@ class Warp(Effect):
     """A stress-free shape of three constant curvatures, as read with a straightedge and feeler gauges.
 
     Cup, the rise across the width, makes k_y = 8 cup / L_y^2; bow, the rise along the length, k_x = 8 bow / L_x^2;
-    twist, the lift of the fourth corner off a table, k_xy = twist / (L_x L_y), the sides of the whole board. All of a
-    plate's membrane is in `bayesplate.plate.membrane`: the in-plane fields are those of the moduli where the plate is
-    solved. Edges that are clamped hold the board in its plane, others do not; inertia in the plane is left out, so is
-    an angle of the grain there.
+    twist, the lift of the fourth corner off a table, k_xy = twist / (L_x L_y), the sides of the whole board where it is
+    widest. All of a plate's membrane is in `bayesplate.plate.membrane`: the in-plane fields are those of the moduli
+    where the plate is solved. Edges that are clamped hold the board in its plane, others do not; inertia in the plane
+    is left out, so is an angle of the grain there.
 
     All signs at once change nothing, and that of the twist alone nothing either: cup and twist are positive, the sign
     of the bow tells a dome from a saddle.
     """
 
     rises: tuple[tuple[Curvature, Quantity, str], ...] = ()  # name, rise in m, source of its prior (empty: the card)
-    aspect_ratio: float = 1.0  # L_x / L_y of the vibrating part
+    aspect_ratio: float = 1.0  # L_x / L_y of the vibrating part, L_y where it is widest
+    edge: Outline | None = None  # where the plate ends; None: the whole rectangle
 
     name: ClassVar[str] = "warp"
     scope: ClassVar[Scope] = "board"
@@ -89,6 +90,10 @@ class Warp(Effect):
         is_both = len(self.rises) > 1 and any(name == "twist" for name, *_ in self.rises)
         return not is_both, not is_both
 
+    def within_outline(self, shaped: Effect) -> Warp:
+        low, high = (shaped.from_plate(0.5, end)[1] for end in (0.0, 1.0))
+        return replace(self, aspect_ratio=self.aspect_ratio / (high - low), edge=shaped.outline())
+
     def contributions(self) -> tuple[Contribution, ...]:
         """Membrane energies: the product of two curvatures and a modulus, over the density."""
         curvatures = tuple(name for name, *_ in self.rises)
@@ -105,6 +110,7 @@ class Warp(Effect):
                 moduli=tuple(round(modulus / max(moduli), 6) for modulus in moduli),
                 curvatures=curvatures,
                 thickness=field,
+                outline=self.edge,
             )
             return (ProjectedTerms(membrane, len(pairs) * len(MODULI)),)
 

@@ -67,8 +67,7 @@ def fabric_of(effects: Sequence[Effect]) -> Fabric:
 def in_plane_field(effects: Sequence[Effect], values: Values) -> Field | None:
     """The field that the in-plane stiffness follows at one draw of values; None where it is uniform.
 
-    It varies with the thickness, as the shear stiffness does. The strips that an outline cuts off at the
-    edges are still included.
+    It varies with the thickness, as the shear stiffness does. The strips by which an outline is uncertain are left out.
     """
     products = _variation_products(tuple(effects)).get("shear", [])
     shares = [

@@ -13,7 +13,7 @@ shift of 100 cents by less than one.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations_with_replacement
 from typing import Any, Literal
@@ -22,7 +22,7 @@ import numpy as np
 
 from bayesplate.arrays import Floats, Indices
 from bayesplate.board.setup import EdgeConditions
-from bayesplate.plate.fields import Field
+from bayesplate.plate.fields import Field, Outline
 from bayesplate.plate.terms import Deflections
 
 Curvature = Literal["bow", "cup", "twist"]
@@ -31,8 +31,8 @@ CURVATURES: tuple[Curvature, ...] = ("bow", "cup", "twist")
 """Curvatures of the strain along x, along y, and of the shear strain, in which a twist counts twice."""
 MODULI = ("Q_11", "Q_12", "Q_22", "Q_66")
 
-_Membrane = tuple[EdgeConditions, EdgeConditions, float, Field | None]
-"""End conditions of a membrane along x and along y, its aspect ratio, and the field that its stiffness follows."""
+_Membrane = tuple[EdgeConditions, EdgeConditions, float, Field | None, Outline | None]
+"""End conditions of a membrane along x and along y, its aspect ratio, the field of its stiffness, and its outline."""
 
 _MOST_ELEMENTS = 24
 """Elements of second order along the longer side: energies of shapes of four waves are within two in a thousand."""
@@ -60,14 +60,16 @@ def membrane_terms(
     moduli: tuple[float, ...],
     curvatures: tuple[Curvature, ...] = CURVATURES,
     thickness: Field | None = None,
+    outline: Outline | None = None,
 ) -> Floats:
     """Membrane energies, (n_pairs * 4, n_vectors, n_vectors), by `curvature_pairs` and by the moduli.
 
     For a plate of unit area: the stiffness per unit of the product of two curvatures (each pair once, a cross term both
     ways) and of the modulus. The in-plane fields are solved at the `moduli` Q_11, Q_12, Q_22, Q_66, of which only the
-    ratios matter; the stiffness of the membrane goes with the `thickness` over the plate.
+    ratios matter; the stiffness of the membrane goes with the `thickness` over the plate. Within an `outline` the
+    rectangle of unit area is that of the widest width, and so is the aspect ratio.
     """
-    membrane = deflections.x.ends, deflections.y.ends, aspect_ratio, thickness
+    membrane = deflections.x.ends, deflections.y.ends, aspect_ratio, thickness, outline
     matrices = _matrices(*membrane)
     at_nodes = _deflections_at(deflections, matrices.places)
     loads = [load @ at_nodes for load in matrices.loads]
@@ -87,9 +89,13 @@ def curvature_pairs(curvatures: Sequence[Curvature]) -> tuple[tuple[Curvature, C
 
 
 def _deflections_at(deflections: Deflections, places: Floats) -> Floats:
-    """Deflections at places that lie on a lattice: (n_places, n_vectors) array."""
-    sides, indices = zip(*(np.unique(np.round(x, 9), return_inverse=True) for x in places), strict=True)
-    return np.asarray(deflections.on(*sides)[:, indices[0], indices[1]].T)
+    """Deflections at places that lie on lines across the plate, equally many on each: (n_places, n_vectors) array."""
+    x, y = np.round(places, 9)
+    order = np.lexsort((y, x))
+    lines = np.unique(x)
+    at_nodes = np.empty((x.size, len(deflections.coefficients)))
+    at_nodes[order] = deflections.across(lines, y[order].reshape(lines.size, -1)).reshape(-1, x.size).T
+    return at_nodes
 
 
 def _stress_matrix(moduli: tuple[float, ...]) -> Floats:
@@ -144,7 +150,11 @@ def _energies(
 
 @lru_cache(maxsize=16)
 def _matrices(
-    ends_x: EdgeConditions, ends_y: EdgeConditions, aspect_ratio: float, thickness: Field | None
+    ends_x: EdgeConditions,
+    ends_y: EdgeConditions,
+    aspect_ratio: float,
+    thickness: Field | None,
+    outline: Outline | None,
 ) -> _Matrices:
     """The membrane by scikit-fem: two in-plane fields and the deflection, all of second order on rectangles."""
     from skfem import Basis, BilinearForm, ElementQuad2, ElementVector, MeshQuad
@@ -153,6 +163,10 @@ def _matrices(
     sides = np.sqrt(aspect_ratio), 1.0 / np.sqrt(aspect_ratio)
     n_x, n_y = (max(_FEWEST_ELEMENTS, round(_MOST_ELEMENTS * side / max(sides))) for side in sides)
     mesh = MeshQuad.init_tensor(np.linspace(0.0, 1.0, n_x + 1), np.linspace(0.0, 1.0, n_y + 1)).with_defaults()
+    if outline is not None:
+        x, y = mesh.p
+        low, high = outline(x)
+        mesh = replace(mesh, doflocs=np.stack([x, low + (high - low) * y]))
     fields = Basis(mesh, ElementVector(ElementQuad2()), intorder=6)
     deflection = fields.with_element(ElementQuad2())
 

@@ -131,12 +131,23 @@ def loaded(place, *effects, **edges):
     return board_with(replace(FREE, edges=FREE.edges | edges), [item], effects=("attached_mass", *effects))
 
 
+def driven(*places, mass=None):
+    """The free board with an exciter that roved over places."""
+    on_board = tuple((x * FREE.L_x, y * FREE.L_y) for x, y in places)
+    return board_with(FREE, [AttachedItem("exciter", on_board, mass)], effects=["exciter"])
+
+
 FORMS = [
     ("warp", board_with(HALF_TOP), [""]),
     ("warp", board_with(replace(STEEL, h=0.06)), []),
     ("grain_angle", loaded(CORNER, "thickness_profile"), BOTH),
     ("grain_angle", loaded(MIDDLE, "thickness_profile"), [""]),
     ("grain_angle", loaded(MIDDLE, "thickness_profile", **CLAMPED), BOTH),
+    ("grain_angle", driven(CORNER), BOTH),
+    ("grain_angle", driven(MIDDLE), [""]),
+    ("grain_angle", driven(MIDDLE, mass=Quantity.exact(0.05)), [""]),
+    ("grain_angle", driven(CORNER, (0.97, 0.09)), [""]),
+    ("grain_angle", driven(), BOTH),  # mirror places count once, so that the other sign is another board
     ("grain_angle", prepare("spruce-free-1R").board, BOTH),  # its readings say that the thickness varies
     ("grain_angle", prepare("spruce-free-1R", []).board, [""]),
     ("grain_angle", prepare("fiemme-spruce-clamped").board, [""]),
