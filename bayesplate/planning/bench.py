@@ -92,7 +92,7 @@ def make_bench(
 
     With a known mass at a spot of the station, if one is given.
 
-    In a session that goes on the sensor stays where it is.
+    The sensor stays where it is on the board; where the board was never held so, only if it sees every mode there.
     """
     board, station = known_board.board, law.station
     system = station.system(board)
@@ -111,8 +111,10 @@ def make_bench(
         for mode, end in sorted(mode_ends, key=lambda pair: float(pair[1][1]))
     )
     shapes = np.stack([mode.shape[::_GRID_STEP, ::_GRID_STEP] for mode in sheet_modes])
-    sensor = None if station.is_new else _sensor_place(board, station, full_sheet, system.shaped)
-    placing = choose_places(shapes, grid_points()[::_GRID_STEP], sensor)
+    grid = grid_points()[::_GRID_STEP]
+    placing = choose_places(shapes, grid, _sensor_place(board, station, full_sheet, system.shaped))
+    if station.is_new and min(placing.seen) < NODAL_LINE:
+        placing = choose_places(shapes, grid)
     spots = (full_sheet.drawn_at(*place) for place in (placing.sensor, placing.hammer, *placing.taps))
     board_spots = spots if system.shaped is None else (system.shaped.from_plate(*place) for place in spots)
     places = places_on(board, station.setup, tuple(board_spots))

@@ -210,3 +210,19 @@ def test_the_sheet_shows_every_mode_that_is_to_be_found_and_the_sensor_alone_as_
     assert loaded.entry.added_mass == f"{grams:g} g at x = {1e3 * x:.0f}, y = {1e3 * y:.0f} mm"
     assert loaded.sheet.basis.endswith(f"with {loaded.entry.added_mass}")
     assert bench.sensor_mm != (290, 100)
+
+
+@pytest.mark.parametrize(("place", "stays"), [((0.57, 0.21), True), ((0.57, 0.1085), False)])
+def test_where_the_board_is_held_otherwise_the_sensor_stays_if_it_sees_every_mode(place, stays):
+    """In the middle of the width it sees no mode with an odd number of lines across."""
+    sensor = AttachedItem("accelerometer", (place,), Quantity.exact(1e-6))
+    read = board(FREE)
+    read = replace(read, setups=(replace(read.setups[0], attached=(sensor,)),))
+    (station,) = new_stations(read, VALUES)
+    law = bare_law(read, station, VALUES)
+    rows = range(len(station.setup.readings))
+    ends = law.solved[0, list(rows), None] + np.array([-0.01, 0.0, 0.01])
+    bench = make_bench(KnownBoard(read, VALUES, (law,), np.eye(3)), law, rows, ends, "").entry
+
+    assert (bench.sensor_mm == tuple(round(1e3 * x) for x in place)) == stays
+    assert min(mode.seen for mode in bench.modes) > 0.1
