@@ -193,7 +193,7 @@ def diagnosis(
         finalists=(finalist,) if after else (),
         elastic_averaged={name: spread(one.before) for name, one in SHIFT.items()},
         rigidity_averaged={name: spread(value, "N m") for name, value in (("D_x", 30.0), ("D_y", 2.5), ("D_s", 5.0))},
-        answers=(
+        explanations=(
             ExplanationSummary(effects=("membrane_tension",), probability=0.97, words="membrane tension"),
             ExplanationSummary(effects=("fluid_loading",), probability=0.0075, words="fluid loading"),
             ExplanationSummary(effects=("grain_angle",), probability=0.0025, words="grain angle"),

@@ -267,7 +267,7 @@ def _require_rivals(board: Board, between: Sequence[str]) -> None:
 
 @dataclass(frozen=True)
 class _FinishedDiagnosis:
-    """Probabilities of the answers of a finished diagnosis that may survive, and that of no effect."""
+    """Probabilities of the explanations of a finished diagnosis that may survive, and that of no effect."""
 
     support: Mapping[tuple[str, ...], float]
     none: float
@@ -283,7 +283,7 @@ def _read_diagnosis(folder: Path, prepared: PreparedBoard) -> _FinishedDiagnosis
         )
         if not is_same or diagnosis["verdict"] == "unexplained":
             return None
-        support = {tuple(answer["effects"]): float(answer["probability"]) for answer in diagnosis["answers"]}
+        support = {tuple(entry["effects"]): float(entry["probability"]) for entry in diagnosis["explanations"]}
         p_none = float(diagnosis["probability_of_none"])
         listed_effects = diagnosis["effects"] if diagnosis["verdict"] == "indistinguishable group" else ()
         effect_names = {name for members in (*support, listed_effects) for name in members}

@@ -137,7 +137,7 @@ def diagnosis_of(case: Case) -> Diagnosis:
         finalists=tuple(_finalist(case, explanation, model.summary) for explanation, model in case.finalists),
         elastic_averaged={name: averaged_constants[name] for name in MODULI},
         rigidity_averaged={name: averaged_constants[name] for name in RIGIDITIES},
-        answers=tuple(
+        explanations=tuple(
             ExplanationSummary(
                 effects=explanation.members,
                 probability=explanation.support,

@@ -148,7 +148,7 @@ class Diagnosis:
         The constants to quote, Pa and N m: averaged over everything that may be the case, each by its probability; if
         nothing explains the readings, those of the model named in part, or else of the first fit. The rigidities are
         not written to JSON.
-    answers : tuple of ExplanationSummary
+    explanations : tuple of ExplanationSummary
         Best first; with the probability of none they sum to one.
     candidates : tuple of EffectEntry and ExchangeEntry
     recommendation : str
@@ -190,7 +190,7 @@ class Diagnosis:
     finalists: tuple[Finalist, ...]
     elastic_averaged: Mapping[str, Spread]
     rigidity_averaged: Mapping[str, Spread] = field(metadata=NOT_IN_JSON)
-    answers: tuple[ExplanationSummary, ...]
+    explanations: tuple[ExplanationSummary, ...]
     candidates: tuple[CandidateEntry, ...]
     recommendation: str
     notes: tuple[str, ...]

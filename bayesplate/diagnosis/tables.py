@@ -49,7 +49,7 @@ def every_table(diagnosis: Diagnosis) -> tuple[Table, ...]:
     tables = (
         averaged_table(diagnosis),
         known_table(diagnosis.known),
-        answers_table(diagnosis),
+        explanations_table(diagnosis),
         errors_table(diagnosis),
         claim_table(diagnosis),
         shift_table(diagnosis),
@@ -126,18 +126,18 @@ def averaged_table(diagnosis: Diagnosis) -> Table:
     return constants_table(title, constants, isotropic=is_isotropic(constants))
 
 
-def answers_table(diagnosis: Diagnosis) -> Table:
+def explanations_table(diagnosis: Diagnosis) -> Table:
     """No effect, the probable explanations and the rest: probabilities that sum to one as printed."""
     listed_explanations = [
         explanation
-        for explanation in diagnosis.answers
+        for explanation in diagnosis.explanations
         if explanation.probability >= _LEAST_LISTED or explanation.is_stated
     ]
     probabilities = [
         ("nothing is lacking", diagnosis.probability_of_none),
         *((explanation.words, explanation.probability) for explanation in listed_explanations),
     ]
-    n_rest = len(diagnosis.answers) - len(listed_explanations)
+    n_rest = len(diagnosis.explanations) - len(listed_explanations)
     if n_rest:
         rest_share = max(1.0 - sum(share for _, share in probabilities), 0.0)
         probabilities.append((f"any of {n_rest} others" if n_rest > 1 else "one other", rest_share))

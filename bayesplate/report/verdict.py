@@ -8,10 +8,10 @@ from types import SimpleNamespace
 from bayesplate.diagnosis.known_words import known_table
 from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.diagnosis.tables import (
-    answers_table,
     candidates_table,
     claim_table,
     errors_table,
+    explanations_table,
     quoted_constants_words,
     shift_table,
     sizes_table,
@@ -42,7 +42,7 @@ _SHIFT = "Shift, sd: how far a constant moves, counted in the standard deviation
 def diagnosis_section(diagnosis: Diagnosis) -> SimpleNamespace:
     """The diagnosis section of the page, without its pictures."""
     tables = (
-        answers_table(diagnosis),
+        explanations_table(diagnosis),
         errors_table(diagnosis),
         claim_table(diagnosis),
         shift_table(diagnosis),

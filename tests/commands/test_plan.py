@@ -123,10 +123,10 @@ def prepared():
 def told(prepared):
     """A diagnosis that is done: three effects may be what the board lacks, or none."""
     probabilities = {"membrane_tension": 0.4, "fluid_loading": 0.05, "grain_angle": 0.03}
-    answers = [{"effects": [name], "probability": one, "words": ""} for name, one in probabilities.items()]
+    explanations = [{"effects": [name], "probability": one, "words": ""} for name, one in probabilities.items()]
     return {
         "card_sha256": prepared.card.sha256, "declared": [], "verdict": "none needed", "effects": [],
-        "answers": answers, "probability_of_none": 0.5,
+        "explanations": explanations, "probability_of_none": 0.5,
     }  # fmt: skip
 
 
@@ -158,10 +158,10 @@ def test_a_diagnosis_of_another_card_model_or_verdict_and_one_that_was_altered_i
         {"card_sha256": "0"},
         {"declared": ["fluid_loading"]},
         {"verdict": "unexplained"},
-        {"answers": []},
+        {"explanations": []},
         {"probability_of_none": float("nan")},
-        {"answers": [{"effects": ["fluid_loading"], "probability": 1.5}]},
-        {"answers": [{"effects": ["witchcraft"], "probability": 0.5}]},
+        {"explanations": [{"effects": ["fluid_loading"], "probability": 1.5}]},
+        {"explanations": [{"effects": ["witchcraft"], "probability": 0.5}]},
         {"verdict": "indistinguishable group", "effects": 7},
     ):
         assert taken_up(json.dumps(told | other)) is None, other

@@ -156,7 +156,7 @@ def test_only_the_exchange_that_the_verdict_stands_for_is_in_it():
     assert [one.fate for one in exchange_entries(found, verdict, ranked)] == ["in the verdict", "does not fit"]
     told = diagnosis_of(case_of(found, control_of(found, 0.5), folds_of(found, 0.25)))
     assert told.words == "transverse shear or relabelling (1,0) and (2,0)"
-    assert [one.words for one in told.answers][:2] == ["transverse shear", "relabelling (1,0) and (2,0)"]
+    assert [one.words for one in told.explanations][:2] == ["transverse shear", "relabelling (1,0) and (2,0)"]
     assert any("The labels (1,0) and (2,0) may have been exchanged" in one for one in told.sentences)
 
 
@@ -271,7 +271,7 @@ def test_a_named_effect_that_was_refitted(named):
     (finalist,) = told.finalists
     assert (finalist.effects, list(finalist.sizes["board"])) == ((SHEAR,), [SHEAR])
     assert told.after.log_score > told.before.log_score
-    assert told.probability_of_none + sum(one.probability for one in told.answers) == pytest.approx(1.0)
+    assert told.probability_of_none + sum(one.probability for one in told.explanations) == pytest.approx(1.0)
 
 
 def test_a_finalist_has_the_forms_of_its_effects_that_were_tried_in_several(named, monkeypatch):

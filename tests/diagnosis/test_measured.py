@@ -80,7 +80,7 @@ def test_a_blind_board_that_is_named_or_grouped_is_so_with_what_its_peaks_ask_fo
     assert bool(possible & set(told.effects)) == answered
     assert bool(told.effects) == answered
     assert told.claim is False
-    assert told.answers
+    assert told.explanations
 
 
 @slow

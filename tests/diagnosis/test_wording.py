@@ -15,11 +15,11 @@ from read_pages import Read
 from bayesplate.commands.printout import show_diagnosis
 from bayesplate.diagnosis.result import Amplitude, ModelErrors, diagnosis_json
 from bayesplate.diagnosis.tables import (
-    answers_table,
     averaged_table,
     before_after_table,
     candidates_table,
     errors_table,
+    explanations_table,
     shift_table,
     sizes_table,
 )
@@ -46,7 +46,7 @@ KEYS = [
     "format", "name", "seed", "card_sha256", "verdict", "claim", "conditions", "effects", "refitted", "reason",
     "sentences", "declared", "known", "stated_claims", "probability_of_none", "probability_of_none_with_halved_priors",
     "probability_of_none_with_doubled_priors", "p_value", "before", "after", "gain_null_percentile", "null_control",
-    "elastic_shift", "finalists", "elastic_averaged", "answers", "candidates", "recommendation", "notes",
+    "elastic_shift", "finalists", "elastic_averaged", "explanations", "candidates", "recommendation", "notes",
     "named_in_part", "carrying_modes",
 ]  # fmt: skip
 ERRORS = [
@@ -91,7 +91,7 @@ def test_the_json_has_the_names_and_the_order_of_the_contract():
     assert list(content["elastic_shift"]["E_x"]) == ["before", "after", "shift_in_sd"]
     spread = ["mean", "sd", "q05", "q25", "q50", "q75", "q95", "unit"]
     assert list(content["elastic_averaged"]["G_xy"]) == spread
-    assert list(content["answers"][0]) == ["effects", "probability"]
+    assert list(content["explanations"][0]) == ["effects", "probability"]
     (finalist,) = content["finalists"]
     assert list(finalist) == [
         "effects", "forms", "probability", "in_sample_rms_cents", "leave_one_out_rms_cents", "elastic", "sizes",
@@ -196,22 +196,23 @@ def test_with_too_few_readings_the_error_that_both_models_have_is_told():
 
 def test_probabilities_of_what_does_not_explain_the_readings_stand_under_that_title():
     for verdict in DIAGNOSES:
-        title = answers_table(replace(NAMED, verdict=verdict)).title
+        title = explanations_table(replace(NAMED, verdict=verdict)).title
         assert ("none of it is a probable explanation" in title) == (verdict == "unexplained")
 
 
 def test_the_probabilities_sum_to_one_as_they_are_printed():
-    table = answers_table(NAMED)
+    table = explanations_table(NAMED)
     assert (table.columns, table.texts) == (
         ("explanation", "probability"),
         (("nothing is lacking", "2.0 %"), ("membrane tension", "97.0 %"), ("any of 2 others", "1.0 %")),
     )
-    thirds = [replace(NAMED.answers[0], probability=share, words=f"{i}") for i, share in enumerate((1 / 3, 1 / 3))]
-    shares = [row[1] for row in answers_table(replace(NAMED, probability_of_none=1 / 3, answers=tuple(thirds))).texts]
+    thirds = [replace(NAMED.explanations[0], probability=share, words=f"{i}") for i, share in enumerate((1 / 3, 1 / 3))]
+    equal = replace(NAMED, probability_of_none=1 / 3, explanations=tuple(thirds))
+    shares = [row[1] for row in explanations_table(equal).texts]
     assert sorted(shares) == ["33.3 %", "33.3 %", "33.4 %"]
     for share, n_rows in ((0.0099, 3), (0.01, 4)):  # worth a row of its own from one per cent on
-        one = (NAMED.answers[0], replace(NAMED.answers[0], words="x", probability=share))
-        assert len(answers_table(replace(NAMED, answers=(*one, *NAMED.answers[1:]))).texts) == n_rows
+        one = (NAMED.explanations[0], replace(NAMED.explanations[0], words="x", probability=share))
+        assert len(explanations_table(replace(NAMED, explanations=(*one, *NAMED.explanations[1:]))).texts) == n_rows
 
 
 def test_what_looks_like_the_named_effect_is_told():

@@ -104,7 +104,7 @@ def _diagnosed(out: Path) -> Json:
         "effects": found["effects"],
         "refitted": found["refitted"],
         "probability_of_none": found["probability_of_none"],
-        "answers": {" + ".join(one["effects"]): one["probability"] for one in found["answers"][:3]},
+        "explanations": {" + ".join(one["effects"]): one["probability"] for one in found["explanations"][:3]},
         "before": _errors(found["before"]),
         "after": _errors(found["after"]),
         "constants": after["constants"],

@@ -116,7 +116,8 @@ def _judged(name: str, what: str, stored: Any, computed: Any) -> Iterator[Differ
         elif "sentence" in stored and "sentence" in computed:
             yield from _proposal(name, what, stored, computed)
         else:
-            every = [one for one in {**stored, **computed} if key != "answers" or (one in stored and one in computed)]
+            in_both = [one for one in stored if one in computed]
+            every = in_both if key == "explanations" else [*{**stored, **computed}]
             for each in every:
                 yield from _judged(name, f"{what} {each}", stored.get(each), computed.get(each))
     elif isinstance(stored, list) and isinstance(computed, list) and key in _NAMES:
@@ -175,7 +176,7 @@ def _number(name: str, what: str, stored: float, computed: float) -> Iterator[Di
     shown = f"{change:+.3g}"
     if key.endswith("_cents"):
         differs, shown = abs(change) > max(ERROR_CENTS, ERROR_SHARE * abs(stored)), f"{change:+.2f} cents"
-    elif key == "probability_of_none" or " answers " in what:
+    elif key == "probability_of_none" or " explanations " in what:
         change = _log_odds(computed) - _log_odds(stored)
         differs, shown = abs(change) > LOG_ODDS, f"{change:+.2f} in ln odds"
     else:
