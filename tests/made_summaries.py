@@ -84,7 +84,7 @@ SUMMARY = Summary(
             "bench",
             860.0,
             "(3,1)",
-            (Assignment("(3,1)", 0.75), Assignment("(2,2)", 0.125)),
+            (Assignment("(3,1)", 0.75, 850.0), Assignment("(2,2)", 0.125, 800.0)),
             0.125,
             Prediction(850.0, 845.0, 855.0),
             ratio_cents(860.0, 850.0),

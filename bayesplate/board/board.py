@@ -162,7 +162,10 @@ class Board:
         )
 
     def without(self, effects: Collection[str]) -> Board:
-        """The board without some of its declared effects, by their names; InputError for a plain text."""
+        """The board without some of its declared effects, by their names; InputError for a plain text.
+
+        What the board states of an effect stays, so that `fit` declares it again; `fit(board, effects=[])` does not.
+        """
         if isinstance(effects, str):
             raise InputError(Fault("effects", "a list of names", repr(effects), f"[{effects!r}]"))
         effects = {*map(canonical_effect, effects)}
@@ -468,7 +471,9 @@ def make_board(
     **more: Any,
 ) -> Board:
     """A board from quantities in SI units, without a card; `more` are other attributes of `Board`."""
-    return Board(name, input_parameters(inputs, setups, assumed_poisson), tuple(setups), **more)
+    is_isotropic = more.get("isotropic", False)
+    parameters = input_parameters(inputs, setups, assumed_poisson, is_isotropic=is_isotropic)
+    return Board(name, parameters, tuple(setups), **more)
 
 
 def board_density(values: Values) -> NDArray[np.float64]:

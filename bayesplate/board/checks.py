@@ -83,7 +83,11 @@ def readings_sha256(board: Board) -> str:
     """Hash of the sizes, the mass and the frequencies of a board, by which a copy is recognised."""
     sizes = [(name, board.inputs[name]) for name in INPUTS if name != "poisson_xy" and name in board.inputs]
     readings = [
-        (setup.name, sorted((reading.label, reading.frequency) for reading in setup.readings), setup.peaks)
+        (
+            setup.edges,
+            sorted((reading.label, reading.frequency) for reading in setup.readings),
+            setup.peaks,
+        )
         for setup in board.setups
     ]
     return hashlib.sha256(repr((sizes, board.warp, readings)).encode()).hexdigest()
@@ -169,7 +173,8 @@ def _free_spans(board: Board, setup: Setup) -> dict[str, tuple[float, float]]:
 
 
 def _clamp_checks(board: Board, setup: Setup, section: str) -> Iterator[Check]:
-    for axis, (start, end) in _free_spans(board, setup).items():
+    for axis, (start, latest_end) in _free_spans(board, setup).items():
+        end = min(latest_end, board.inputs[f"length_{axis}"].mean)
         length = 1e3 * board.inputs[f"length_{axis}"].mean
         wanted = f"clamps that leave a part of the {length:g} mm along {axis} free"
         got = f"{1e3 * start:g} mm clamped at {axis}0, free only up to {1e3 * end:g} mm"
@@ -183,7 +188,7 @@ def _label_checks(setup: Setup, section: str) -> Iterator[Check]:
     for label in setup.labels:
         holds = label.m >= first.m and label.n >= first.n
         yield f'{section} frequencies_hz."{label}"', holds, f"labels not below first_label, {first}", str(label), remedy
-    lowest_hz = min((reading.frequency.mean for reading in setup.readings), default=math.inf)
+    lowest_hz = min((*setup.measured, *setup.unlabelled), default=math.inf)
     wanted, got = f"a rounding below a quarter of the lowest frequency, {lowest_hz:g} Hz", f"{setup.resolution:g} Hz"
     yield f"{section} resolution_hz", setup.resolution < lowest_hz / 4.0, wanted, got, "the step of the last digit"
 
@@ -234,8 +239,8 @@ def mass_check(board: Board, place: str, mass: float) -> Check:
 
 def _bounce_checks(setup: Setup, section: str) -> Iterator[Check]:
     """A support raises the square of every frequency by that of the bounce, so that no mode is below it."""
-    if setup.bounce is not None and setup.readings:
-        lowest, bounce = min(setup.measured), setup.bounce.mean
+    if setup.bounce is not None:
+        lowest, bounce = min((*setup.measured, *setup.unlabelled), default=math.inf), setup.bounce.mean
         wanted = f"less than the lowest mode, {lowest:g} Hz"
         remedy = "the peak of a board that moves as a whole on its support"
         yield f"{section} support.bounce_hz", bounce < lowest, wanted, f"{bounce:g} Hz", remedy
@@ -319,13 +324,19 @@ def _close_pair_remarks(setup: Setup) -> Iterator[Remark]:
 
 
 def _repeated_peak_remarks(setup: Setup) -> Iterator[Remark]:
-    """A peak without a label at the very frequency of a labelled one: it would count as two."""
+    """A peak without a label at the very frequency of another one: it would count as two."""
     labelled = {reading.frequency.mean: reading.label for reading in setup.readings}
     for hz in setup.unlabelled:
         yield (
             hz in labelled,
             f"setup '{setup.name}': the peak without a label at {hz:g} Hz is where {labelled.get(hz)} is: if it is the "
             "same peak, leave it out, for it counts as a second mode",
+        )
+    for hz in sorted({*setup.unlabelled}):
+        yield (
+            setup.unlabelled.count(hz) > 1,
+            f"setup '{setup.name}': several peaks without a label are at {hz:g} Hz: if they are one peak, leave one, "
+            "for each counts as a mode of its own",
         )
 
 

@@ -39,7 +39,11 @@ def default_poisson(is_isotropic: bool) -> Quantity:
 
 
 def input_parameters(
-    inputs: Mapping[str, Quantity], setups: Sequence[Setup], assumed_poisson: Quantity | None
+    inputs: Mapping[str, Quantity],
+    setups: Sequence[Setup],
+    assumed_poisson: Quantity | None,
+    *,
+    is_isotropic: bool = False,
 ) -> tuple[Parameter, ...]:
     """Inputs and clamped lengths as parameters, with an assumed Poisson ratio where none is stated.
 
@@ -47,8 +51,11 @@ def input_parameters(
     """
     assumed = {} if assumed_poisson is None else {"poisson_xy": assumed_poisson}
     stated = {**inputs, **_field_means(inputs), **assumed}
+    words = {key: name for key, (_, name) in INPUTS.items()}
+    if is_isotropic:  # which has no grain
+        words |= {"length_x": "length along x", "length_y": "length along y"}
     board_parameters = (
-        Parameter(key, BOARD_OWNER, prior, INPUTS[key][0], display_name=INPUTS[key][1], assumed=assumed.get(key))
+        Parameter(key, BOARD_OWNER, prior, INPUTS[key][0], display_name=words[key], assumed=assumed.get(key))
         for key, prior in stated.items()
     )
     return (*board_parameters, *(parameter for setup in setups for parameter in setup.clamped_parameters))

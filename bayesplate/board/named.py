@@ -36,7 +36,7 @@ def load_named_cards(
         prior = _read_card(load_prior, board.prior, folder, card_place, faults)
     if prior is not None:
         name, prior = prior.name, prior.for_board(board.isotropic)
-        faults += [] if prior is not None else [_symmetry_fault(card_place, name, board.isotropic)]
+        faults += [] if prior is not None else [symmetry_fault(card_place, name, board.isotropic)]
     coefficient_tables = dict(tables or {})
     for setup, card_place in zip(board.setups, setup_places(file, [setup.name for setup in board.setups]), strict=True):
         if setup.table_name and setup.name not in coefficient_tables:
@@ -46,7 +46,7 @@ def load_named_cards(
     return NamedCards(prior, coefficient_tables, tuple(faults))
 
 
-def _symmetry_fault(place: str, name: str, is_isotropic: bool) -> Fault:
+def symmetry_fault(place: str, name: str, is_isotropic: bool) -> Fault:
     """The fault of an isotropic prior for an orthotropic board, or of an orthotropic prior for an isotropic board."""
     if not is_isotropic:
         return Fault(place, "a prior of three constants", f"{name}, which states E alone", "or isotropic = true?")

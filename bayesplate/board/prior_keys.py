@@ -67,7 +67,7 @@ class _ConstantReader:
         return {"distribution": quantity.kind, **numbers, "source": stated.source}
 
 
-def _sourced_key(read: Callable[[Any], Quantity], write: Callable[[Quantity], dict[str, Any]]) -> Key:
+def _sourced_key(read: Callable[[Any], Quantity], write: Callable[[Quantity], Any]) -> Key:
     """A key that holds a quantity in a table with its source."""
 
     def read_with_source(value: object) -> StatedPrior:
@@ -78,7 +78,11 @@ def _sourced_key(read: Callable[[Any], Quantity], write: Callable[[Quantity], di
         quantity = read({key: entry for key, entry in value.items() if key != "source"})
         return StatedPrior(quantity, read_text(value["source"]))
 
-    return Key(read_with_source, lambda stated: write(stated.quantity) | {"source": stated.source})
+    def write_with_source(stated: StatedPrior) -> dict[str, Any]:
+        written = write(stated.quantity)
+        return (written if isinstance(written, dict) else {"readings": written}) | {"source": stated.source}
+
+    return Key(read_with_source, write_with_source)
 
 
 _ELASTIC_KEY, _RIGIDITY_KEY = (

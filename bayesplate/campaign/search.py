@@ -132,8 +132,10 @@ def search_board(
 def visible_effects(boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
     """Single effects, and pairs of effects that are both visible at nominal size on all boards together.
 
-    An effect that cannot be seen would cost a pair nothing, so that every effect would seem to come with it.
+    An effect that cannot be seen would cost a pair nothing, so that every effect would seem to come with it. Effects
+    that leave no plate on one of the boards are not among them.
     """
+    effects = [names for names in effects if all({*names} <= board.ground.candidates.keys() for board in boards)]
     traces = {
         name: np.hypot.reduce([board.ground.candidates[name].trace for board in boards])
         for combination in effects

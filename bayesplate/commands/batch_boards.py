@@ -22,7 +22,7 @@ LARGEST_TABLE = 100_000_000
 _LONGEST_SIDE = 1e9
 _WANTED_SOURCE = "a folder of cards, or a table (.csv or .parquet)"
 _SPREADSHEET_SUFFIXES = (".tsv", ".tab", ".txt", ".xlsx", ".xls", ".xlsm", ".ods", ".numbers")
-_OTHER_CARD_KEYS = {"boards", "coefficients", "E_x", "D_x", "noise_percent"}
+_OTHER_CARD_KEYS = {"boards", "coefficients", "E", "E_x", "D_x", "noise_percent"}
 """Keys that a campaign, a coefficient table and a prior card have and a board card has not."""
 
 

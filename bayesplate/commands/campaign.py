@@ -11,6 +11,7 @@ from typing import Annotated, TypeVar
 from bayesplate.board.campaign import CampaignCard, is_campaign, load_campaign
 from bayesplate.board.checks import readings_sha256
 from bayesplate.board.prior import PriorCard, load_prior
+from bayesplate.board.words import name_complaint
 from bayesplate.campaign.population import require_moduli
 from bayesplate.campaign.shared import SharedParameter, find_shared_parameters
 from bayesplate.commands.arguments import check_arguments
@@ -19,6 +20,7 @@ from bayesplate.commands.prepare import CardSource, PreparedBoard, prepare
 from bayesplate.commands.problem import Problem, as_problem, pose_all
 from bayesplate.errors import Fault, InputError
 from bayesplate.frequencies.laws import LawName
+from bayesplate.results.folder import POPULATION_SUFFIX
 
 CampaignPath = str | os.PathLike[str]
 OfBoard = TypeVar("OfBoard")
@@ -144,12 +146,15 @@ def _prepare_boards(card: CampaignCard, effects: Sequence[str] | None) -> tuple[
     faults: list[Fault] = []
     prepared_boards: list[PreparedBoard] = []
     for number, board in enumerate(card.boards, start=1):
+        place = f"{file} boards {number}"
         try:
             prepared = prepare(card.board_path(board), effects)
-            all_effects = tuple(dict.fromkeys((*prepared.board.effects, *declared)))
-            prepared_boards.append(prepared.with_effects(all_effects) if declared else prepared)
+            if declared:
+                place = f"{file} effects"
+                prepared = prepared.with_effects(tuple(dict.fromkeys((*prepared.board.effects, *declared))))
+            prepared_boards.append(prepared)
         except InputError as error:
-            faults += [replace(fault, place=f"{file} boards {number} -> {fault.place}") for fault in error.faults]
+            faults += [replace(fault, place=f"{place} -> {fault.place}") for fault in error.faults]
     names = [prepared.board.name.casefold() for prepared in prepared_boards]
     faults += [
         Fault(f"{file} boards", "boards with names of their own", f"{prepared.board.name} again")
@@ -179,9 +184,14 @@ def _prepare_boards(card: CampaignCard, effects: Sequence[str] | None) -> tuple[
                 got = f"{', '.join(isotropic)}, whose E_y and G_xy follow from E_x"
                 raise InputError(Fault(place, "boards of three constants", got, remedy))
         except InputError as error:
-            placed_faults = [fault if fault.place == place else replace(fault, place=f"{place} -> {fault.place}")
-                     for fault in error.faults]  # fmt: skip
-            faults += placed_faults
+            faults += [
+                fault if fault.place == place else replace(fault, place=f"{place} -> {fault.place}")
+                for fault in error.faults
+            ]
+        complaint = name_complaint(f"{card.name}{POPULATION_SUFFIX}")
+        if complaint:
+            remedy = f"the prior card of its population is named {card.name}{POPULATION_SUFFIX}"
+            faults.append(Fault(f"{file} name", complaint, card.name, remedy))
     if faults:
         raise InputError(faults)
     return prepared_boards, population

@@ -9,7 +9,7 @@ from typing import Annotated, get_args
 
 from bayesplate.board.board import Board
 from bayesplate.board.coefficients import CoefficientCard
-from bayesplate.board.named import NamedCards
+from bayesplate.board.named import NamedCards, symmetry_fault
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.values import Key, read_entries
 from bayesplate.commands.arguments import (
@@ -121,5 +121,8 @@ def _problem(board: Board, prior: PriorCard, request: FitRequest) -> Problem:
         for setup in board.setups
         if setup.table_name and setup.name not in request.tables
     )
-    named_cards = NamedCards(prior, request.tables, faults)
+    own_prior = prior.for_board(board.isotropic)
+    if own_prior is None:
+        faults += (symmetry_fault(f"{board.file} [material] prior", prior.name, board.isotropic),)
+    named_cards = NamedCards(own_prior, request.tables, faults)
     return Problem(prepare_card(board, named_cards, request.effects), request.law, request.robust)

@@ -19,7 +19,7 @@ from bayesplate.board.starter import HALF_TOP, starter_text
 from bayesplate.board.values import Complaint, Key, Number, Refusal
 from bayesplate.board.words import EDGES, did_you_mean, name_complaint, show_value
 from bayesplate.commands.arguments import check_arguments
-from bayesplate.commands.options import Option, OptionGroup
+from bayesplate.commands.options import ANY_PATH, FilePath, Option, OptionGroup
 from bayesplate.errors import Fault, InputError, printable
 from bayesplate.files import catch_write_errors, write_text
 from bayesplate.frequencies.labels import label_faults, lowest_labels
@@ -84,7 +84,7 @@ _FREQUENCY_OPTION = Option(
 
 @check_arguments()
 def new(
-    path: Annotated[str | os.PathLike[str], Option("path", required=False)],
+    path: Annotated[FilePath, ANY_PATH, Option("path", required=False)],
     *,
     sizes: Annotated[Mapping[str, float | str] | None, _NUMBERS_KEY, _SIZE_OPTIONS] = None,
     edges: Annotated[str, _TEXT_KEY, Option("--edges", metavar="WORD", help=_EDGES_HELP)] = "free",

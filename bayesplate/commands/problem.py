@@ -208,7 +208,8 @@ class Problem:
         Returns
         -------
         (n_modes,) or (n, n_modes) array, Hz
-            In the order of `labels`; not a number where the prior is zero.
+            In the order of `labels`; not a number where the prior is zero. A label that the card states as uncertain
+            may be predicted as the mode that fits its reading better.
         """
         posterior = self.posed.posterior
 

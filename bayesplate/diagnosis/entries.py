@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bayesplate.arrays import Floats
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.result import Amplitude, EffectEntry, ExchangeEntry, Fate
 from bayesplate.diagnosis.search import LEAST_P_VALUE, Candidate, SearchResult
 from bayesplate.diagnosis.signatures import look_alikes
@@ -121,7 +122,8 @@ def _amplitude(result: SearchResult, index: int, candidate: Candidate) -> Amplit
     form_index = likely_form(result, index, 0)
     free = candidate.laws[form_index].form.free[0]
     share, z = size_posterior(result, index, 0, form_index, 0)
-    low, middle, high = (float(free.prior.value(q)) for q in _size_quantiles(z, share, (0.05, 0.5, 0.95)))
+    quantiles = _size_quantiles(free.prior, z, share, (0.05, 0.5, 0.95))
+    low, middle, high = (float(free.prior.value(q)) for q in quantiles)
     return Amplitude(
         parameter=free.key, form=candidate.laws[form_index].form.detail, q05=low, q50=middle, q95=high, unit=free.unit
     )
@@ -145,12 +147,15 @@ def _learnt_bits(result: SearchResult, index: int, candidate: Candidate) -> dict
     return bits
 
 
-def _size_quantiles(z: Floats, share: Floats, levels: Sequence[float]) -> Floats:
-    """Quantiles of a size from the shares of its nodes, each spread half-way to its neighbours."""
+def _size_quantiles(prior: Quantity, z: Floats, share: Floats, levels: Sequence[float]) -> Floats:
+    """Quantiles of a size from the shares of its nodes, each spread half-way to its neighbours.
+
+    Of many sizes each has a single node, which says nothing: the quantiles are those of the prior.
+    """
     nodes, places = np.unique(z, return_inverse=True)  # cells of several sizes have one node more than once
-    shares = np.bincount(places, weights=share) / share.sum()
     if nodes.size == 1:
-        return np.repeat(nodes, len(levels))
+        return np.asarray(prior.standard_quantile(levels))
+    shares = np.bincount(places, weights=share) / share.sum()
     ends = nodes[[0, -1]] + 0.5 * (nodes[[0, -1]] - nodes[[1, -2]])
     cumulated = np.cumsum(shares) - 0.5 * shares
     return np.interp(levels, [0.0, *cumulated, 1.0], [ends[0], *nodes, ends[1]])

@@ -111,8 +111,8 @@ def known_fit(problem: PosedProblem, combination: Sequence[str] | None = None) -
 def fit_with_effects(problem: PosedProblem, combination: Sequence[str] | None, n_first: int | None = None) -> Baseline:
     """The constants fitted to a board with known effects (None: as it stands), solved again where they move far.
 
-    They are fitted to the first `n_first` readings, by default to all. Raises NotIdentifiableError where these
-    do not determine them.
+    They are fitted to the first `n_first` readings, by default to all; the others, which are predicted, keep their
+    labels. Raises NotIdentifiableError where the readings do not determine the constants.
     """
     board = problem.board if combination is None else with_combination(problem.board, combination)
     inputs, estimate = _inputs_of(problem, board), _estimated_log_rigidities(problem)
@@ -131,6 +131,8 @@ def fit_with_effects(problem: PosedProblem, combination: Sequence[str] | None, n
                 log_rigidities,
             )
             previous_rows, rows = rows, _likely_rows(problem, law, rows, log_rigidities)
+            if n_first is not None:
+                rows = np.concatenate([rows[:n_first], previous_rows[n_first:]])
             if np.array_equal(rows, previous_rows):
                 break
         if not has_come_to_rest(log_rigidities, estimate, board.symmetry.n):

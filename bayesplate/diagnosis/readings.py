@@ -65,5 +65,5 @@ def wrong_reading(result: SearchResult) -> str:
         f"({p_value_words(suspect.p_value)}). It was read as {hertz:.6g} Hz, "
         f"{abs(float(cents(np.asarray(suspect.offset)))):.0f} cents "
         f"{'above' if suspect.offset > 0 else 'below'} the "
-        f"{hertz * np.exp(-suspect.offset):.4g} Hz that they let expect."
+        f"{hertz * np.exp(-suspect.offset):.4g} Hz that the other modes let expect."
     )

@@ -25,7 +25,7 @@ from bayesplate.diagnosis.draws import TermDraws, draw_terms, joint_sizes_of, si
 from bayesplate.diagnosis.hypotheses import Hypothesis, probabilities
 from bayesplate.diagnosis.peaks import log_likelihood_of_labels, log_likelihood_summed, log_mean
 from bayesplate.diagnosis.search import SearchResult, run_search
-from bayesplate.diagnosis.shifts import Cells
+from bayesplate.diagnosis.shifts import REACH, Cells
 from bayesplate.diagnosis.terms import normalised_weights
 
 PRIOR_WIDTH_FACTORS = {"halved": 0.5, "doubled": 2.0}
@@ -82,23 +82,32 @@ def _vary_hypothesis(result: SearchResult, index: int, width: float, noise: floa
 
 
 def _prior_ratio(table: Cells, priors: list[list[Quantity]], factor: float) -> Floats:
-    """Density of the wider prior over that of the old one at each cell: (n_cells,) array."""
+    """Weight of the wider prior over that of the old one at each cell: (n_cells,) array.
+
+    As the densities at the middles of the cells, with the total that the wider prior has within reach: a few wide
+    cells do not give it by themselves.
+    """
     ratio = np.ones(table.n_cells)
     for index, form_priors in enumerate(priors):
         is_of_form = table.form == index
         for i, prior in enumerate(form_priors):
-            z = table.z[is_of_form, i]
-            wider = np.exp(-0.5 * (z / factor) ** 2) / (factor * _share_within_bounds(prior, factor))
-            ratio[is_of_form] *= wider / (np.exp(-0.5 * z**2) / _share_within_bounds(prior, 1.0))
+            middles, places = np.unique(table.z[is_of_form, i], return_inverse=True)
+            weights, wider = (np.exp(-0.5 * (middles / width) ** 2) for width in (1.0, factor))
+            total = _share_within_reach(prior, factor) / _share_within_reach(prior, 1.0)
+            ratio[is_of_form] *= (total * wider / wider.sum() * weights.sum() / weights)[places]
     return ratio
 
 
-def _share_within_bounds(prior: Quantity, factor: float) -> float:
-    """Share of a normal distribution, `factor` times as wide as the prior, within the prior's bounds."""
+def _share_within_reach(prior: Quantity, factor: float) -> float:
+    """Share of a prior, `factor` times as wide, that lies within reach of the cells, out of that within its bounds."""
     from scipy.special import ndtr
 
-    low, high = (bound / factor for bound in prior.standard_bounds)
-    return float(ndtr(high) - ndtr(low))
+    low, high = prior.standard_bounds
+    within_reach, within_bounds = (
+        float(ndtr(top / factor) - ndtr(bottom / factor))
+        for bottom, top in ((max(low, -REACH), min(high, REACH)), (low, high))
+    )
+    return within_reach / within_bounds
 
 
 @lru_cache(maxsize=2)  # the verdict and the averages use the same search

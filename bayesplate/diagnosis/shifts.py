@@ -31,7 +31,9 @@ JointLaws = Mapping[tuple[int, int], FormLaw]
 FINE_CELLS, COARSE_CELLS = (33, 11, 256), (9, 5, 27)
 """Cells along a single parameter, along each of two, and in all along more; the coarse ones for pairs of effects."""
 
-_REACH = 3.0
+REACH = 3.0
+"""Standard deviations of a size's prior up to which there are cells."""
+_FEW_CELLS = 2
 _OVERLAP = 0.5
 _POINT_DIGITS = 9
 """Decimals of standard coordinates in which cells that touch have the same side."""
@@ -235,8 +237,12 @@ def cells_along(n_parameters: int, cells: tuple[int, int, int]) -> int:
 
 
 def _axis_cells(prior: Quantity, n: int) -> tuple[Floats, float]:
-    """Middles of n equal cells between the prior's bounds or three standard deviations, and their width."""
+    """Middles of n equal cells between the prior's bounds or three standard deviations, and their width.
+
+    One cell or two reach only as far as they have the prior's mean square: a cell is a normal of half its width.
+    """
     low, high = prior.standard_bounds
-    low, high = max(low, -_REACH), min(high, _REACH)
+    reach = REACH if n > _FEW_CELLS else np.sqrt(n if low < 0.0 < high else 2.0 * n)
+    low, high = max(low, -reach), min(high, reach)
     width = (high - low) / n
     return np.asarray(low + width * (np.arange(n) + 0.5)), width

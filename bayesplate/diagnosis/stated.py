@@ -82,8 +82,9 @@ def stated_claims(problem: PosedProblem, fits: Sequence[KnownFit]) -> tuple[Stat
     has_both = np.asarray(np.isfinite(before) & np.isfinite(after))
     has_both &= (bare_fit.errors.leverages.carries < 0) & (stated_fit.errors.leverages.carries < 0)
     modes = [mode for mode in readings_by_mode(board) if has_both[list(mode)].all()]
+    compared = np.array([reading for mode in modes for reading in mode], dtype=np.intp)
     scores = [scores_given(fit.baseline, modes) for fit in (bare_fit, stated_fit)]
-    claims = [judge_stated_effects(effects, "", before[has_both], after[has_both], scores[1] - scores[0])]
+    claims = [judge_stated_effects(effects, "", before[compared], after[compared], scores[1] - scores[0])]
     further_setups = [setup.name for setup in board.setups[1:] if _states_differently(board, effects, setup.name)]
     if further_setups:
         claims += _claims_of_further_setups(problem, effects, further_setups)
@@ -102,7 +103,8 @@ def _claims_of_further_setups(
     claims = []
     for number, setup in enumerate(problem.board.setups):
         if setup.name in names:
-            own_readings = np.flatnonzero(fits[0].setup_index == number)
+            is_compared = (fits[0].setup_index == number) & fits[0].is_mode & fits[1].is_mode
+            own_readings = np.flatnonzero(is_compared)
             scores = [scores_given(fit, [[i] for i in own_readings.tolist()], range(n_first)) for fit in fits]
             before, after = (fit.residual[own_readings] for fit in fits)
             claims.append(judge_stated_effects(effects, setup.name, before, after, scores[1] - scores[0]))
@@ -117,7 +119,7 @@ def scores_given(fit: Baseline, groups: Sequence[Sequence[int]], predictors: Ite
     that neither a better fit to the reading itself nor a noise that follows it can raise its score.
     """
     reach = noise_reach(fit.board, fit.setup_index, np.where(fit.is_mode, fit.residual, np.nan))
-    noise = noise_grid(fit.board, reach=reach if len(fit.board.setups) <= 2 else ())
+    noise = noise_grid(fit.board, reach=reach)
     empty = no_effect_cells(fit.n_modes, fit.log_rigidities.size)
 
     def log_density(readings: set[int]) -> float:

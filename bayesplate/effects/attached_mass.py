@@ -124,7 +124,18 @@ class AttachedMass(Effect):
     def notes(cls, board: Board) -> tuple[str, ...]:
         if cls.name not in board.effects:
             return ()
-        return tuple(
+        without_mass = [
+            f"the {item.kind} in setup '{setup.name}' has no mass on the card: "
+            + (
+                "it is fitted, from the prior of such items; mass_g states it"
+                if item.places
+                else "without a place it is no part of this model; at_mm states one"
+            )
+            for setup in board.setups
+            for item in _attached_items(setup)
+            if item.mass is None
+        ]
+        return tuple(without_mass) + tuple(
             f"what roved in setup '{setup.name}' weighs {100.0 * share:.1f} % of the board: the mean over its places "
             f"is right to first order in the mass only and may err by some cents; a setup for each place is exact"
             for setup in board.setups

@@ -73,9 +73,15 @@ class Exciter(Effect):
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
-        if any(item.kind == cls.name for item in setup.attached):
-            return ""
-        return 'no [[setup.attached]] of kind = "exciter" says that one was fixed to the board'
+        if not any(item.kind == cls.name for item in setup.attached):
+            return 'no [[setup.attached]] of kind = "exciter" says that one was fixed to the board'
+        swing = _highest_swing(board, setup, cls.of(board, setup).drives) if setup.is_free else 0.0
+        if swing > min(setup.measured, default=np.inf):
+            return (
+                f"a free board swings on the spring of its held magnet at {swing:.3g} Hz, above its lowest mode, and "
+                "the three lowest motions of a free board are taken for those without bending"
+            )
+        return ""
 
     @classmethod
     def is_wanted(cls, setup: Setup) -> bool:
@@ -111,8 +117,13 @@ class Exciter(Effect):
             [low + share * (high - low) for share in _GAUSS_POINTS] for low, high in exciters._side_ranges
         )
         gauss_places = tuple((float(x), float(y)) for x in along_x for y in along_y)
+        # Two exciters do not stand on one place.
         return replace(
-            exciters, drives=tuple(replace(drive, places=drive.places or gauss_places) for drive in exciters.drives)
+            exciters,
+            drives=tuple(
+                replace(drive, places=drive.places or gauss_places[k % 4 :] + gauss_places[: k % 4])
+                for k, drive in enumerate(exciters.drives)
+            ),
         )
 
     def within_outline(self, shaped: Effect) -> Exciter:
@@ -268,6 +279,23 @@ class Exciter(Effect):
             shares.append(side.shares(np.asarray(at)))
         products = shares[0][..., :, None] * shares[1][..., None, :]
         return np.asarray(products.reshape(*products.shape[:-2], -1))
+
+
+def _highest_swing(board: Board, setup: Setup, drives: Sequence[Drive]) -> float:
+    """Highest frequency, Hz, at which a rigid free board swings on the springs of held magnets, each by itself.
+
+    A place that is not stated counts as one between the middle and a corner.
+    """
+    swings = [0.0]
+    for drive in drives:
+        if drive.is_held:
+            s, t = drive.places[0] if drive.places else (0.25, 0.25)
+            spring = drive.suspension[0].median
+            if drive.is_resonance:
+                spring = (drive.mass[0].median - drive.coil[0].median) * (2.0 * np.pi * spring) ** 2
+            lever = 1.0 + 12.0 * ((s - 0.5) ** 2 + (t - 0.5) ** 2)
+            swings.append(float(np.sqrt(spring * lever / vibrating_mass(board.nominal(), setup)) / (2.0 * np.pi)))
+    return max(swings)
 
 
 def _highest_orders(setup: Setup) -> tuple[int, int]:

@@ -17,7 +17,7 @@ from bayesplate.board.words import setup_places
 from bayesplate.effects.part import aspect_ratio_of
 from bayesplate.effects.words import effect_names
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
-from bayesplate.frequencies.columns import modal_coefficients
+from bayesplate.frequencies.columns import mean_coefficients, modal_coefficients
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.frequencies.terms import shear_moduli
 from bayesplate.labels import Label
@@ -83,7 +83,10 @@ def coefficient_rows(
 
 
 def _by_sensitivity(model: SetupModel, values: Values) -> CoefficientRows:
-    modal = modal_coefficients(model.system, values, model.linear.stiffness)
+    modal = mean_coefficients(
+        [modal_coefficients(station.system, values, station.linear.stiffness) for station in model.stations],
+        np.exp([station.mode_log_frequencies(values, "linear")[0] for station in model.stations]),
+    )
     ratio = aspect_ratio_of(values, model.setup)
     theory = model.system.theory
     sentence = f"energy shares of one solve at the weighted least-squares estimate, {theory} plate, ratio {ratio:.4g}"

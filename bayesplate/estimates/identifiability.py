@@ -224,4 +224,4 @@ def _weakest_constant_sentence(result: Identifiability) -> str:
 
 def _per_cent(error: float) -> str:
     error *= 100
-    return f"{error:.{max(1 - int(np.floor(np.log10(min(error, 10.0)))), 0)}f} %"
+    return f"{error:.{max(1 - int(np.floor(np.log10(np.clip(error, 1e-3, 10.0)))), 0)}f} %"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from bayesplate.arrays import Floats
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.effects.part import aspect_ratio_of
-from bayesplate.frequencies.columns import modal_coefficients
+from bayesplate.frequencies.columns import ModalCoefficients, mean_coefficients, modal_coefficients
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.frequencies.spectrum import NamedMode, spectrum
@@ -31,6 +31,8 @@ LOWEST_COMBINED = 12
 _GRID = 121
 N_POINTS = 61
 """Along each side of the shapes of labelled modes: half a sheet's, for panels of half its size."""
+_WORST_CONDITION = 1e3
+"""Condition number of modes' coefficients, each constant's scaled to one, beyond which they leave a constant open."""
 _TWO_THIRDS = 0.967
 """Standard deviations of a normal distribution on either side of its middle that hold two thirds of it."""
 _BY_PRIOR = "by the prior alone"
@@ -117,11 +119,8 @@ def sample_shapes(modes: Modes, limits: WidthLimits | None, grid: Floats) -> Flo
     if limits is None:
         shapes = modes.displacement(grid, grid)
     else:
-        across = [
-            modes.displacement(np.array([x]), low + (high - low) * grid)
-            for x, low, high in zip(grid, *limits, strict=True)
-        ]
-        shapes = np.concatenate(across, axis=1)
+        low, high = (limit[:, None] for limit in limits)
+        shapes = modes.displacement_across(grid, low + (high - low) * grid)
     return np.asarray(shapes * corner_signs(shapes)[:, None, None])
 
 
@@ -147,6 +146,8 @@ def sheet(
         if set(measured) <= {mode.name for mode in named}:
             break
     modal = modal_coefficients(system, values, modes.coefficients)
+    if len(system.stations) > 1:
+        named, modal = _mean_over_places(system, values, n_modes)
     shares = modal.shares(np.array([float(values[name]) for name in RIGIDITIES]))
     limits = system.limits(grid_points())
     shapes = sample_shapes(modes, limits, grid_points())
@@ -177,6 +178,31 @@ def sheet(
     )  # fmt: skip
 
 
+def _mean_over_places(system: System, values: Values, n_modes: int) -> tuple[tuple[NamedMode, ...], ModalCoefficients]:
+    """Modes with what roved at its first place, their frequencies and coefficients those of the mean over its places.
+
+    A mode without a clear name at one of the places is that of the first place alone.
+    """
+    stations = []
+    for station in system.stations:
+        modes, named = spectrum(station, values, n_modes)
+        stations.append((named, modal_coefficients(station, values, modes.coefficients)))
+    rows_by_label = [{mode.label: row for row, mode in enumerate(named)} for named, _ in stations]
+    named, (coefficients, rest) = stations[0]
+    mean_modes = list(named)
+    for i, mode in enumerate(named):
+        if mode.label is not None and all(mode.label in rows for rows in rows_by_label):
+            at_label = [rows[mode.label] for rows in rows_by_label]
+            frequencies = np.array([names[row].frequency for (names, _), row in zip(stations, at_label, strict=True)])
+            modal = [
+                ModalCoefficients(m.coefficients[[row]], m.rest[[row]])
+                for (_, m), row in zip(stations, at_label, strict=True)
+            ]
+            (coefficients[i],), (rest[i],) = mean_coefficients(modal, frequencies[:, None])
+            mean_modes[i] = replace(mode, frequency=float(frequencies.mean()))
+    return tuple(mean_modes), ModalCoefficients(coefficients, rest)
+
+
 def _band(mode: NamedMode, bands: Mapping[str, tuple[float, float]] | None) -> tuple[float, float] | None:
     if bands is None or mode.name not in bands:
         return None
@@ -192,6 +218,8 @@ def _combined_modes(modes: tuple[SheetMode, ...]) -> tuple[CombinedMode, ...]:
     if len(combined) < len(RIGIDITIES):
         return ()
     coefficients = np.stack([mode.coefficients for mode in combined])
+    if np.linalg.cond(coefficients / np.linalg.norm(coefficients, axis=0)) > _WORST_CONDITION:
+        return ()
     shapes = combined_shapes(coefficients, np.stack([mode.shape for mode in combined]))
     mixtures = combination_weights(coefficients)
     return tuple(

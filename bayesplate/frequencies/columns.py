@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -34,6 +35,18 @@ def modal_coefficients(system: System, values: Values, stiffness: Floats) -> Mod
     rest = total - coefficients @ constants
     rest[np.abs(rest) < 1e-9 * total] = 0.0
     return ModalCoefficients(coefficients, rest)
+
+
+def mean_coefficients(modal: Sequence[ModalCoefficients], frequencies: Floats) -> ModalCoefficients:
+    """Coefficients of the square of mean frequencies, of modes at each place of what roved.
+
+    `frequencies` is an (n_places, n_modes) array. Its mean is what is read, so that the mean of the coefficients is
+    multiplied by the square of the mean over the mean of the squares.
+    """
+    share = frequencies.mean(axis=0) ** 2 / (frequencies**2).mean(axis=0)
+    coefficients = np.mean([station.coefficients for station in modal], axis=0)
+    rest = np.mean([station.rest for station in modal], axis=0)
+    return ModalCoefficients(share[:, None] * coefficients, share * rest)
 
 
 def squared_frequencies_by_rigidity(system: System, values: Values, stiffness: Floats) -> tuple[Floats, Floats]:

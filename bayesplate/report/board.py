@@ -101,7 +101,7 @@ _OUTLINE_NOTE = (
     "free, both are drawn to recede alike."
 )
 _WARP_NOTE = (
-    "Dashed: how far the board is from flat where a straightedge lies along it and across it, drawn larger than it is; "
+    "Red: how far the board is from flat where a straightedge lies along it and across it, drawn larger than it is; "
     "a filled corner lifts off the table."
 )
 

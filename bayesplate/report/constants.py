@@ -47,7 +47,10 @@ def constants_figure(summary: Summary, moduli: Mapping[str, Floats]) -> Figure:
         _draw_posterior(panel, name, summary, moduli[name])
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(handles), frameon=False, fontsize=TEXT_SIZE)
-    figure.suptitle(f"{summary.name}: what {len(summary.modes)} modes tell", fontsize=11)
+    figure.suptitle(
+        f"{summary.name}: what {len(summary.modes)} mode{'s tell' if len(summary.modes) != 1 else ' tells'}",
+        fontsize=11,
+    )
     return figure
 
 

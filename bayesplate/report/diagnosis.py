@@ -179,7 +179,7 @@ def _null_statistics(null_control: NullControlSummary) -> list[_NullStatistic]:
             _NullStatistic(
                 null_control.nested_ratio_of_sets,
                 null_control.nested_ratio,
-                null_control.nested_ratio_to_beat,
+                min(null_control.nested_ratio_to_beat, 1.0),  # a rising error is never claimed
                 words,
                 axis,
             )

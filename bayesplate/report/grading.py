@@ -236,7 +236,7 @@ def _lines_of_equal_ratio(panel: Axes, ratios: Floats) -> None:
     left, right = panel.get_xlim()
     low, high = panel.get_ylim()
     step = max(1.0, float(np.ceil((ratios.max() - ratios.min()) / 4.0)))
-    for ratio in np.arange(np.floor(ratios.min()), np.ceil(ratios.max()) + step, step):
+    for ratio in np.arange(max(np.floor(ratios.min()), step), np.ceil(ratios.max()) + step, step):
         panel.plot([left, right], [ratio * left, ratio * right], color=LIGHT, lw=1.0, zorder=1)
         x = min(right, high / ratio)
         if low < ratio * x <= high * 1.0001 and left < x:

@@ -68,7 +68,7 @@ def modes_pictures(draws: Draws, summary: Summary) -> list[Picture]:
         name = "modes" if len(problem.board.setups) == 1 else f"modes-{setup}"
         title = f"Chladni figures of the fitted modes, setup {setup}"
         figure = _sand_figure(model, problem.board.nominal(), modes, shapes[setup])
-        pictures.append(Picture(name, title, f"Nodal lines of {len(modes)} modes: {details}.", caption, figure))
+        pictures.append(Picture(name, title, f"Nodal lines: {details}.", caption, figure))
     return pictures
 
 
@@ -246,11 +246,11 @@ def _spectrum_picture(summary: Summary, spectrum: Spectrum) -> Picture:
     set_hertz_axis(panel, 0.93 * lowest, 1.07 * highest)
     panel.set(ylim=(-0.62, 1.42), yticks=[])
     panel.spines["left"].set_visible(False)
-    hertz = {mode.label: mode.predicted_hz.mean for mode in modes}
+    shown = {mode.predicted_hz.mean for mode in modes}
     for peak in peaks:
         for assignment in peak.assignments:
-            if assignment.label in hertz:
-                ends = [peak.hz, hertz[assignment.label]]
+            if assignment.predicted_hz in shown:
+                ends = [peak.hz, assignment.predicted_hz]
                 panel.plot(
                     ends, [_PEAKS_HEIGHT, _MODES_HEIGHT], color=BLUE, lw=0.4 + 1.6 * assignment.probability, alpha=0.9
                 )

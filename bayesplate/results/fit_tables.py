@@ -86,7 +86,8 @@ def exported_constants(summary: Summary) -> Table:
 
 def write_constants(folder: Path, summary: Summary, title: str) -> tuple[Path, ...]:
     """Write constants.csv and constants.tex into an existing folder; the title of the board may be any text."""
-    heading = f"Elastic constants of {title}, GPa; seed {summary.seed}, {len(summary.modes)} modes"
+    n = len(summary.modes)
+    heading = f"Elastic constants of {title}, GPa; seed {summary.seed}, {n} mode{'s' * (n != 1)}"
     return write_tables(folder, CONSTANTS_FILES, exported_constants(summary), compared_constants(summary, heading))
 
 
@@ -151,9 +152,9 @@ def peaks_table(summary: Summary) -> Table | None:
     several = len(summary.spectra) > 1
     rows: list[Row] = []
     for peak in summary.peaks:
-        probabilities = {
-            assignment.label: assignment.probability for assignment in peak.assignments[:MOST_MODES_OF_PEAK]
-        }
+        probabilities: dict[str, float] = {}
+        for assignment in peak.assignments[:MOST_MODES_OF_PEAK]:  # several may be modes without a clear label
+            probabilities[assignment.label] = probabilities.get(assignment.label, 0.0) + assignment.probability
         if peak.spurious_probability >= LEAST_MODE_PROBABILITY:
             probabilities["no mode"] = peak.spurious_probability
         name = f"{peak.hz:.6g}" + (f" {peak.setup}" if several else "")

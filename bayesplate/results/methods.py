@@ -97,7 +97,7 @@ def _method_row(
     return MethodRow(
         name,
         Elastic(**elastic),
-        condition_number,
+        None if condition_number is None else finite_or_none(condition_number),
         n_subsets,
         tuple(
             ForwardPrediction(setup, str(reading.label), finite_or_none(float(hertz)), finite_or_none(float(residual)))

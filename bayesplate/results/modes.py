@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, Protocol, TypeVar
 
 import numpy as np
@@ -18,7 +18,7 @@ from bayesplate.posterior.assessment import Assessment
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.likely_labels import MOST_DRAWS_OF_LABELS
 from bayesplate.posterior.posing import PosedProblem
-from bayesplate.results.contract import finite_or_none
+from bayesplate.results.contract import NOT_IN_JSON, finite_or_none
 
 LabelOrigin = Literal["card", "doubtful", "proposed"]
 
@@ -149,6 +149,7 @@ class Assignment:
 
     label: str
     probability: float
+    predicted_hz: float = field(metadata=NOT_IN_JSON)  # of that mode, on average
 
 
 @dataclass(frozen=True)
@@ -222,7 +223,7 @@ def _assign_peaks(
             hz=hertz,
             stated=None if stated_label is None else str(stated_label),
             assignments=tuple(
-                Assignment(_label_text(likelihood.labels[j]), float(row[j]))
+                Assignment(_label_text(likelihood.labels[j]), float(row[j]), predicted[j].mean)
                 for j in order
                 if row[j] >= LEAST_MODE_PROBABILITY
             ),

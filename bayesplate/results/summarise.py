@@ -175,7 +175,9 @@ def _weighted_estimate(problem: PosedProblem) -> PointEstimate:
 
 def _point_estimate(elastic: Floats, constants: Floats, condition_number: float) -> PointEstimate:
     entries = zip((*MODULI, *RIGIDITIES), (*elastic, *constants), strict=True)
-    return PointEstimate(**{name: finite_or_none(float(v)) for name, v in entries}, condition_number=condition_number)
+    return PointEstimate(
+        **{name: finite_or_none(float(v)) for name, v in entries}, condition_number=finite_or_none(condition_number)
+    )
 
 
 def _percentile_method(system: PaperSystem) -> Percentile | None:

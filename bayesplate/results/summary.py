@@ -54,7 +54,7 @@ class SamplerHealth:
 class PointEstimate(Constants[float | None]):
     """Constants without an uncertainty; None where the estimate is no possible plate."""
 
-    condition_number: float
+    condition_number: float | None  # None where the readings are all of one mode
 
 
 @dataclass(frozen=True)
@@ -197,7 +197,7 @@ class Summary(RunHeader):
         return render(table, "html")
 
 
-PACKAGES = ("bayesplate", "numpy", "scipy", "emcee", "scikit-fem")
+PACKAGES = ("bayesplate", "numpy", "scipy", "emcee", "scikit-fem", "arviz")
 
 
 def versions() -> dict[str, str]:

@@ -149,7 +149,8 @@ def cents_texts(*values: float) -> list[str]:
 
 def two_digits(value: float | None, factor: float = 1.0) -> Value:
     """A number with two significant digits, such as an error or a standard deviation in per cent: 0.028, 3.0, 17."""
-    return number(value, 0 if value is None else decimals(abs(value * factor)), factor=factor)
+    shown = abs((value or 0.0) * factor)
+    return number(value, decimals(shown) if shown >= 0.5 * 10.0**-_MOST_DECIMALS else 0, factor=factor)
 
 
 def _unsigned_zero(text: str) -> str:

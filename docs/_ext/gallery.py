@@ -60,14 +60,14 @@ def for_gallery(source: str) -> str:
 
 
 def arguments_of(gallery_conf: dict[str, Any], script_vars: dict[str, Any]) -> list[str]:
-    """Arguments of the line `python examples/NAME.py ...` in an example; the last is a place in a folder of its own."""
+    """Arguments of the line `python examples/NAME.py ...` in an example, with places in a folder of its own."""
     script = Path(script_vars["src_file"])
     usage = _USAGE.search(ast.get_docstring(ast.parse(script.read_text(encoding="utf-8"))) or "")
     folder = WRITTEN / script.stem
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    *options, last = usage[1].split() if usage and usage[1].strip() else [""]
-    return [*options, str(folder / last)] if last else []
+    arguments = usage[1].split() if usage else []
+    return [argument if argument.startswith("-") else str(folder / argument) for argument in arguments]
 
 
 def _get_sg_image_scraper() -> Any:

@@ -496,10 +496,12 @@ def test_the_interval_of_a_size_reaches_beyond_its_first_node():
     z = (np.arange(8) + 0.5) * 0.5
     order = np.random.default_rng(1).permutation(8)
     share = 3.0 * np.diff(2.0 * ndtr(np.arange(9) * 0.5))
-    low, middle, high = _size_quantiles(z[order], share[order], (0.05, 0.5, 0.95))
+    levels = (0.05, 0.5, 0.95)
+    low, middle, high = _size_quantiles(HALF_NORMAL, z[order], share[order], levels)
 
     assert low < z[0] < middle
     assert [low, middle, high] == pytest.approx(halfnorm.ppf([0.05, 0.5, 0.95]), abs=0.125)
-    assert _size_quantiles(np.array([0.7]), np.array([1.0]), (0.05, 0.95)) == pytest.approx([0.7, 0.7])
+    alone = _size_quantiles(HALF_NORMAL, np.array([0.7]), np.array([1.0]), levels)
+    assert alone == pytest.approx(halfnorm.ppf(levels))  # a single node says nothing
     of_two = np.tile(z, 5), np.tile(share, 5) / 5.0  # cells of another size beside it
-    assert _size_quantiles(*of_two, (0.05, 0.5, 0.95)) == pytest.approx([low, middle, high])
+    assert _size_quantiles(HALF_NORMAL, *of_two, levels) == pytest.approx([low, middle, high])

@@ -26,7 +26,7 @@ def test_the_reading_that_is_wrong_is_named(mode, size, side):
     assert wrong_reading(found) == (
         f"Read {label} again: without it the other readings agree with the model (p = {told.p_value:.3f}). It was read "
         f"as {hertz:.6g} Hz, {1200 / np.log(2) * abs(told.offset):.0f} cents {side} the "
-        f"{hertz * np.exp(-told.offset):.4g} Hz that they let expect."
+        f"{hertz * np.exp(-told.offset):.4g} Hz that the other modes let expect."
     )
 
 

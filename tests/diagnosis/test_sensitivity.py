@@ -14,7 +14,14 @@ from bayesplate.diagnosis.folds import ANY_LOG_ODDS, nested_leave_one_out
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.null_control import FALSE_ALARMS, NullControl, _share_bounds, force_choices, null_control
 from bayesplate.diagnosis.search import SearchResult, run_search, simulate_noise
-from bayesplate.diagnosis.sensitivity import draw_constants, under_exact_law, variant_searches, vary_priors
+from bayesplate.diagnosis.sensitivity import (
+    _prior_ratio,
+    draw_constants,
+    under_exact_law,
+    variant_searches,
+    vary_priors,
+)
+from bayesplate.diagnosis.shifts import _axis_cells, no_effect_cells
 from bayesplate.diagnosis.terms import noise_grid
 
 
@@ -177,6 +184,23 @@ def test_a_variant_is_the_search_with_that_prior(change):
     assert found.probability_of_none == pytest.approx(wanted.probability_of_none, rel=0.02)
     np.testing.assert_allclose(found.log_evidence, wanted.log_evidence, atol=0.05)
     assert np.abs(found.log_evidence - usual.log_evidence).max() > 0.2  # control: the prior matters
+
+
+@pytest.mark.parametrize("lower", [-np.inf, 0.0], ids=["normal", "half-normal"])
+@pytest.mark.parametrize("n", [1, 2, 3, 5, 33])
+def test_a_few_cells_have_the_prior_s_width_and_the_total_of_a_wider_one(lower, n):
+    prior = Quantity.from_mean(0.0, 1.0, "normal", lower=lower)
+    middles, width = _axis_cells(prior, n)
+    weights = np.exp(-0.5 * middles**2)
+    weights /= weights.sum()
+    table = replace(no_effect_cells(6), weights=weights, form=np.zeros(n, dtype=np.intp), z=middles[:, None])
+    halved, same, doubled = (float(weights @ _prior_ratio(table, [[prior]], factor)) for factor in (0.5, 1.0, 2.0))
+
+    mean_square = float(weights @ (middles**2 + (0.5 * width) ** 2))
+    assert 0.97 < mean_square < 1.05 + (0.0 if n < 3 else (0.5 * width) ** 2)  # more cells reach further, and blur more
+    assert same == pytest.approx(1.0)
+    assert halved == pytest.approx(1.0, abs=0.003)
+    assert doubled == pytest.approx(0.869, abs=0.003)  # within three old standard deviations
 
 
 def test_a_name_has_to_survive_widths_and_noises(small):

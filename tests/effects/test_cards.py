@@ -11,11 +11,13 @@ from generator.known_boards import FIEMME, FINNISH, FREE, HALF_TOP, STEEL
 
 from bayesplate.board.attached import AttachedItem, DeclaredFluid
 from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading import Reading
 from bayesplate.commands.prepare import prepare
 from bayesplate.effects import EFFECTS, declare, effect_faults, implied_effects, notes
 from bayesplate.effects.grain_angle import GrainAngle
 from bayesplate.effects.membrane_tension import MembraneTension
 from bayesplate.effects.poisson_ratio import FREE_POISSON, PoissonRatio
+from bayesplate.labels import Label
 
 KNOWN = AttachedItem("accelerometer", ((0.2007, 0.0855),), Quantity.from_mean(0.6e-3, 0.1e-3))
 UNKNOWN = AttachedItem("weight", ((0.2, 0.01), (0.1, 0.1)))
@@ -25,6 +27,7 @@ WIDTHS = {"length_y": Quantity.from_readings([0.2, 0.21], 0, [0.0, 0.5])}
 LEVEL = {"thickness": Quantity.from_readings([4.7e-3] * 4, 1e-6, [0.0, 0.2, 0.4, 0.58], [0.0, 0.2, 0.0, 0.2])}
 CURVED = {"thickness": Quantity.from_readings([3e-3, 3.4e-3, 3e-3], 1e-5, [0.0, 0.1, 0.2], [0.05] * 3)}
 CUPPED = {"cup": Quantity.exact(0.8e-3), "twist": Quantity.exact(0.0)}
+MASS = ("attached_mass",)
 NOTHING_FIXED = "no [[setup.attached]] says what is fixed to the board and where"
 
 REFUSALS = [
@@ -118,6 +121,26 @@ def test_readings_that_are_alike_leave_a_rectangle_of_one_thickness(name, board)
     assert not EFFECTS[name].is_implied(board)
     assert EFFECTS[name].candidates(board, board.setups[0]) == ()
     assert any(f"support no {name}" in one for one in notes(board))
+
+
+@pytest.mark.parametrize(("spring", "swings"), [(2700.0, False), (60e3, True)])
+def test_a_held_magnet_leaves_a_free_board_s_motions_without_bending_the_lowest(spring, swings):
+    """On 60 kN/m a board of 0.25 kg rises and falls at 78 Hz, above (1,1): it would be taken for that mode."""
+    held = AttachedItem("exciter", ((0.29, 0.1),), suspension=Quantity.exact(spring), magnet="held")
+    board = board_with(FREE, [held])
+    lowest = Reading(Label(1, 1), (1, 1), Quantity.exact(55.0))
+    refused = EFFECTS["exciter"].refusal(board, replace(board.setups[0], readings=(lowest,)))
+    assert ("swings on the spring of its held magnet at" in refused) == swings
+    clamped = board_with(FINNISH, [held])
+    assert EFFECTS["exciter"].refusal(clamped, clamped.setups[0]) == ""
+
+
+def test_it_is_said_of_an_item_without_a_mass_that_it_is_fitted_or_left_out():
+    """Beside an item of known mass, which declares the effect."""
+    told = notes(replace(board_with(FINNISH, [KNOWN, replace(UNKNOWN, places=((0.1, 0.1),)), ANYWHERE]), effects=MASS))
+    assert sum("the weight in setup 'made' has no mass on the card: it is fitted" in one for one in told) == 1
+    assert sum("the accelerometer in setup 'made' has no mass on the card: without a place" in one for one in told) == 1
+    assert not any("no mass on the card" in one for one in notes(replace(board_with(FINNISH, [KNOWN]), effects=MASS)))
 
 
 BOTH = ["from x towards y", "from x away from y"]

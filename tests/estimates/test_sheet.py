@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesplate.estimates.sheet import Precision, combination_weights, combined_shapes
+from bayesplate.estimates.sheet import Precision, SheetMode, _combined_modes, combination_weights, combined_shapes
 
 CLAMPED = np.array(
     [
@@ -66,3 +66,19 @@ def test_the_range_foretells_readings_that_were_left_out():
     assert share == pytest.approx(2 / 3, abs=3 * np.sqrt(2 / 9 / 4000))
     narrow_low, narrow_high = Precision(0 * root, {"bench": 0.01}).band(100.0, shares, "bench")
     assert np.mean((readings > narrow_low) & (readings < narrow_high)) < 2 / 3 - 3 * np.sqrt(2 / 9 / 4000)
+
+
+def test_modes_that_hardly_tell_the_constants_apart_have_no_combined_modes():
+    """The shares of (0,0), (1,1), (2,2) of a supported plate are the same, but for the error of the mesh."""
+    one = np.array([4.0, 1.0, 2.0])
+    alike = np.array([one, 16.0 * one * (1.0 + 1e-6 * np.arange(3)), 81.0 * one])
+    apart = np.array([[4.0, 1.0, 2.0], [60.0, 1.0, 8.0], [4.0, 16.0, 8.0]])
+
+    def combined(coefficients):
+        shape = np.ones((3, 3))
+        rows = zip(("(0,0)", "(1,0)", "(0,1)"), coefficients, strict=True)
+        modes = (SheetMode(name, 100.0, 100.0, None, np.zeros(4), row, shape) for name, row in rows)
+        return _combined_modes(tuple(modes))
+
+    assert combined(alike) == ()
+    assert len(combined(apart)) == 3

@@ -13,9 +13,11 @@ from bayesplate.report.modes import spectrum_pictures
 from bayesplate.report.style import BLUE, ORANGE
 from bayesplate.results.modes import AssignedPeak, Assignment, PredictedMode, Prediction, Spectrum
 
+HERTZ = {"(1,1)": 101.0, "(2,0)": 102.0, "(0,2)": 258.0}
+
 
 def peak(hertz, *assignments, spurious=0.0):
-    found = tuple(Assignment(label, share) for label, share in assignments)
+    found = tuple(Assignment(label, share, HERTZ[label]) for label, share in assignments)
     return AssignedPeak("bench", hertz, None, found, spurious, Prediction(hertz, 0.99 * hertz, 1.01 * hertz), 0.0)
 
 

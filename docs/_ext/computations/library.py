@@ -294,7 +294,7 @@ def verdict_limits(folder: Path) -> str:
         ("limit of a range: prior probability beyond the size, below", f"{LIMIT_PROBABILITY:g}"),
         ("look-alikes: cosine of the visible parts above", f"{LOOK_ALIKE_COSINE:g}"),
         ("prior probability of no effect, one, two", f"{PRIOR_OF_NONE:g}, {PRIOR_OF_ONE:g}, {PRIOR_OF_TWO:g}"),
-        ("simulated boards of the null control", f"{N_SETS}"),
+        ("simulated boards of the null control, at most", f"{N_SETS}"),
         (
             "a name survives widths of the sizes' priors times",
             join_words([f"{one:g}" for one in PRIOR_WIDTH_FACTORS.values()]),

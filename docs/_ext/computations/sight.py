@@ -47,7 +47,7 @@ def visible_parts(folder: Path, card: str) -> str:
     panel.set_xticks([], minor=True)
     panel.set_yticks(range(len(ordered)), [plain(one.effect) for one in ordered])
     panel.set_xlabel("cents, rms: shift ○ and visible part ●; dotted: detection limit", fontsize=9)
-    alt = "for each effect the shift of the frequencies and its visible part, which is several times smaller"
+    alt = "for each effect the shift of the frequencies and its visible part, which is smaller"
     rows = [
         (
             plain(one.effect),
@@ -133,7 +133,7 @@ def designs(folder: Path) -> str:
     panel.set_xlabel("visible part, cents rms")
     panel.set_xlim(left=0)
     panel.legend(frameon=False, fontsize=8, loc="lower right")
-    alt = "visible part of each effect under three designs: a soft clamp rises from the smallest to the largest"
+    alt = "visible part of each effect under three designs: a soft clamp rises to the largest"
     rows = []
     for design in DESIGNS:
         problem, found = _seen(design)
