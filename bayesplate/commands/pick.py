@@ -132,7 +132,7 @@ def pick(
     sweep : str, optional
         For recordings of an exponential sweep: "F1,F2,SECONDS", or the path of the sweep itself.
     sand : mapping, optional
-        Frequency in Hz to a picture of sand, cropped to the board.
+        Frequency in Hz to a picture of sand, cropped to the part of the board that vibrates.
     lowest, highest : float, Hz
         Between which modes are looked for.
     out : path, optional

@@ -244,8 +244,10 @@ def assign_pictures(
     board: Board, likely: Sequence[PickedRow], pictures: Mapping[float, Floats]
 ) -> tuple[dict[int, list[Floats]], list[str]]:
     """Straightened pictures by the number of the likely peak nearest to them; and why others were left out."""
-    nominal = board.nominal()
-    x, y = (1e3 * nominal[side] for side in ("length_x", "length_y"))
+    from bayesplate.board.board import vibrating_lengths
+
+    (setup,) = board.setups
+    x, y = (1e3 * float(side) for side in vibrating_lengths(board.nominal(), setup))
     shape = "higher than wide" if x > y else "wider than high"
     pictures_by_peak: dict[int, list[Floats]] = {}
     remarks = []
@@ -254,7 +256,7 @@ def assign_pictures(
         if log(picture.shape[1] / picture.shape[0]) * log(x / y) < -_OBLONG_PRODUCT:
             remarks.append(
                 f"the sand at {hertz:g} Hz left out: the picture is {shape}, the board {x:.0f} mm along x and "
-                f"{y:.0f} mm along y; turn it, x from left to right"
+                f"{y:.0f} mm along y where it vibrates; turn it, x from left to right"
             )
         elif min(distances, default=1.0) > _PICTURE_DISTANCE:
             remarks.append(f"no peak within {100.0 * _PICTURE_DISTANCE:g} % of the sand at {hertz:g} Hz")

@@ -130,6 +130,8 @@ def place_faults(arguments: Mapping[str, Any]) -> Iterator[Fault]:
             remedy = f"{argument}=[(0.02, 0.02)], or --{argument} 20,20 in mm"
             if not is_pair or not all(map(is_number, place)):
                 yield Fault(f"{argument} {number}", "a place (x, y) in m", value_text(place), remedy)
+    if arguments.get("sensor_mass") is not None and not arguments.get("sensor"):
+        yield Fault("sensor_mass", "the place of the sensor beside it", "none", "--sensor X,Y in mm")
 
 
 def band_faults(arguments: Mapping[str, Any], lowest: float, highest: float) -> Iterator[Fault]:
@@ -227,7 +229,7 @@ Sand = Annotated[
         multiple=True,
         callback=_pictures_from_text,
         metavar="HZ=FILE",
-        help="Picture of sand, cropped to the board.",
+        help="Picture of sand, cropped to the part that vibrates.",
     ),
 ]
 Lowest = Annotated[float, Option("--lowest", type=float, show_default=True, metavar="HZ")]

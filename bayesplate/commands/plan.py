@@ -201,8 +201,10 @@ def _board_beliefs(
     require_normal_noise([problem])
     prepared, rng = problem.prepared, random_stream(seed, BELIEFS_STREAM)
     read_setups = tuple(setup for setup in prepared.board.setups if setup.readings or setup.peaks)
-    prepared = replace(prepared, board=replace(prepared.board, setups=read_setups or prepared.board.setups))
-    board, prior = prepared.board, prepared.prior
+    unread = [setup.name for setup in prepared.board.setups if setup not in read_setups] if read_setups else []
+    notes = tuple(f"setup '{name}' has no frequencies yet, and no reading is planned in it" for name in unread)
+    board = replace(prepared.board, setups=read_setups or prepared.board.setups, notes=(*prepared.board.notes, *notes))
+    prepared, prior = replace(prepared, board=board), prepared.prior
     if between is not None:
         _require_rivals(board, between)
     stages = Stages(progress, _POSE_TIME + _SEARCH_TIME + _PLAN_TIME)
@@ -237,6 +239,7 @@ def _campaign_beliefs(
     campaign: Campaign, goal: str | None, between: Sequence[str] | None, progress: OnProgress
 ) -> Beliefs:
     """Beliefs of several boards and of what they share: effects are not searched for."""
+    require_normal_noise(campaign.problems)
     if between is not None:
         raise InputError(_frequencies_fault("between", "a campaign"))
     if goal == EXPLANATIONS:
@@ -244,7 +247,8 @@ def _campaign_beliefs(
         raise InputError(Fault("goal", wanted, EXPLANATIONS, "plan one of its boards to tell explanations apart"))
     stages = Stages(progress, _SEARCH_TIME + _PLAN_TIME)
     stages.begin("boards of the campaign", _SEARCH_TIME)
-    boards = [problem.prepared.board for problem in campaign.problems]
+    campaign.pose()
+    boards = [problem.posed.board for problem in campaign.problems]
     priors = [problem.prior for problem in campaign.problems]
     beliefs = campaign_beliefs(boards, priors, campaign.shared, stages.reached)
     stages.begin("gains of further readings", _PLAN_TIME)

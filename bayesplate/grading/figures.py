@@ -111,6 +111,7 @@ def _chunk_probability(low: Floats, high: Floats, covariance: Floats) -> Floats:
     scale = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 1e-24))
     low, high = low / scale, high / scale
     correlation = covariance / (scale[:, :, None] * scale[:, None, :])
+    np.einsum("nii->ni", correlation)[:] = 1.0  # also where rounding leaves an exact figure no variance
     root = np.linalg.cholesky(correlation + _RIDGE * k * np.eye(k))
     points = Sobol(k, scramble=False).random_base2(_LOG2_POINTS) + 0.5**_LOG2_POINTS / 2.0
     normals = np.zeros((n, k, len(points)))

@@ -15,6 +15,7 @@ from bayesplate.planning.modes_read import StationReadings, station_readings
 from bayesplate.planning.plan import Gain, ProposalEntry, SequenceEntry
 from bayesplate.planning.sizes_read import (
     INSPECTIONS,
+    SizeMeasurement,
     input_readings,
     inspection_readings,
     parameter_column,
@@ -183,19 +184,19 @@ class Planner:
     def _size_proposals(self, known_board: KnownBoard) -> Iterator[Proposal]:
         """Proposals of readings of the sizes of a board; a size that all boards share is read once, on the first."""
         name, n = known_board.board.name, len(self.beliefs.shared)
+        measurements: dict[tuple[str, bool], list[SizeMeasurement]] = {}  # all items on a board are weighed at once
         for measurement in size_measurements(known_board.board):
             column = parameter_column(known_board, measurement.parameter)
             is_shared = n > 0 and not column[:-n].any()
-            if is_shared and known_board is not self.beliefs.boards[0]:
-                continue
+            if not is_shared or known_board is self.beliefs.boards[0]:
+                measurements.setdefault((measurement.sentence, is_shared), []).append(measurement)
+        for (instruction, is_shared), alike in measurements.items():
             of_board = "" if is_shared or len(self.beliefs.boards) == 1 else f", board {name}"
-            sentence = (
-                measurement.sentence.replace("to the board", "to every board")
-                if is_shared
-                else measurement.sentence + of_board
-            )
-            about, minutes = f"{name}: {measurement.parameter.name}", measurement.n * self.costs.reading
-            readings, board_name = input_readings(self.beliefs, known_board, measurement), "" if is_shared else name
+            sentence = instruction.replace("to the board", "to every board") if is_shared else instruction + of_board
+            about = f"{name}: {', '.join(measurement.parameter.name for measurement in alike)}"
+            minutes = sum(measurement.n for measurement in alike) * self.costs.reading
+            readings = join_readings([input_readings(self.beliefs, known_board, each) for each in alike])
+            board_name = "" if is_shared else name
             yield self._proposal("size", board_name, "", sentence, minutes, readings, about)
 
     def _inspection_proposals(self) -> Iterator[Proposal]:

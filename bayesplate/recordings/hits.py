@@ -44,6 +44,8 @@ class Hit:
     """Why it cannot be used."""
     is_gated: bool = False
     """Whether a noise gate cuts the decay off before the next hit."""
+    number: int = 1
+    """Among all hits of its recording, from 1."""
 
 
 def find_hits(recording: Recording) -> list[Hit]:
@@ -68,7 +70,7 @@ def find_hits(recording: Recording) -> list[Hit]:
             fault = _decay_fault(
                 recording, begin, start, stop, "the end" * is_last if gated is None else "a noise gate"
             )
-        hits.append(Hit(begin, start, stop, fault, gated is not None))
+        hits.append(Hit(begin, start, stop, fault, gated is not None, i + 1))
         after_bounce = is_bounced
     return hits
 

@@ -1,8 +1,8 @@
 """Sand on a ringing board: a picture of the nodal lines on which it gathers, scored against the shapes of modes.
 
-The picture is cropped to the board by hand, so that it may be turned by a few degrees, seen from the side, unevenly lit
-and strewn in part. It is straightened in many ways; the score is the agreement of its best form with the nodal lines of
-a shape.
+The picture is cropped by hand to the part of the board that vibrates, so that it may be turned by a few degrees, seen
+from the side, unevenly lit and strewn in part. It is straightened in many ways; the score is the agreement of its best
+form with the nodal lines of a shape.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def sand_evidence(forms: Floats, shapes: Floats) -> Floats:
     """ln of the evidence of a picture for each shape, zero for the average of all: (n_modes,) array.
 
     The forms of `straighten_picture` show the board from above, x from left to right and y from bottom to top; the
-    shapes, (n_modes, n_x, n_y), are deflections at evenly spaced points of the whole board, edges included.
+    shapes, (n_modes, n_x, n_y), are deflections at evenly spaced points of the part that vibrates, edges included.
     """
     scores = line_agreement(forms, shapes)
     log_likelihood = -0.5 * _N_CELLS * np.log(1.0 - np.clip(scores, 0.0, 0.999) ** 2)

@@ -71,30 +71,28 @@ def decay_spectra(hits_by_recording: Sequence[tuple[Recording, Sequence[Hit]]], 
     from scipy.fft import prev_fast_len, rfft
 
     first = hits_by_recording[0][0]
-    numbered_hits = [
-        (recording, number, hit) for recording, hits in hits_by_recording for number, hit in enumerate(hits, start=1)
-    ]
-    shortest = min(hit.stop - hit.start for _, _, hit in numbered_hits)
+    all_hits = [(recording, hit) for recording, hits in hits_by_recording for hit in hits]
+    shortest = min(hit.stop - hit.start for _, hit in all_hits)
     n_samples = prev_fast_len(min(shortest, round(LONGEST_DURATION * first.rate)), real=True)
     n_lines = min(int(_BAND_MARGIN * highest * n_samples / first.rate) + 1, n_samples // 2)
     frequency = np.arange(n_lines) * first.rate / n_samples
     columns = [
         rfft(recording.response[hit.start : hit.start + n_samples])[:n_lines] / recording.rate
-        for recording, _, hit in numbered_hits
+        for recording, hit in all_hits
     ]
     forces = [
         _force_spectrum(recording.force, recording.rate, hit, frequency)
-        for recording, _, hit in numbered_hits
+        for recording, hit in all_hits
         if recording.force is not None
     ]
-    places, between = _group_by_places([recording for recording, _, _ in numbered_hits])
+    places, between = _group_by_places([recording for recording, _ in all_hits])
     return Spectra(
         frequency=frequency,
         values=np.stack(columns, axis=1),
         force=np.stack(forces, axis=1) if forces else None,
-        file_names=tuple(recording.name for recording, _, _ in numbered_hits),
+        file_names=tuple(recording.name for recording, _ in all_hits),
         files=np.repeat(np.arange(len(hits_by_recording)), [len(hits) for _, hits in hits_by_recording]),
-        hits=np.array([number for _, number, _ in numbered_hits], dtype=np.intp),
+        hits=np.array([hit.number for _, hit in all_hits], dtype=np.intp),
         places=places,
         place_pairs=between,
         motion=first.motion,

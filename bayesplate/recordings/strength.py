@@ -70,7 +70,8 @@ def mode_mobilities(spectra: Spectra, modes: Sequence[Mode]) -> list[ModeMobilit
 
 def _mode_mobility(spectra: Spectra, mode: Mode, force: Complex) -> ModeMobility:
     factor, power = _MOBILITY_FACTORS[spectra.motion]
-    turned = factor * mode.frequency**power * mode.residues
+    recorded = _recorded_share(spectra, mode)
+    turned = factor * mode.frequency**power * mode.residues / recorded
     n_places = len(spectra.place_pairs)
     mobility, sd = np.zeros(n_places, dtype=complex), np.zeros(n_places)
     common = total = 0.0
@@ -79,12 +80,24 @@ def _mode_mobility(spectra: Spectra, mode: Mode, force: Complex) -> ModeMobility
         same_places = spectra.places == place
         weight = max(float(np.sum(np.abs(force[same_places]) ** 2)), 1e-300)
         mobility[place] = np.sum(force[same_places].conj() * turned[same_places]) / weight
-        sd[place] = mode.frequency**power * float(np.sqrt(np.mean(mode.residue_sd[same_places] ** 2) / weight))
+        sd[place] = (
+            mode.frequency**power / abs(recorded) * float(np.sqrt(np.mean(mode.residue_sd[same_places] ** 2) / weight))
+        )
         if same_places.sum() > 1:
             common += float(np.abs(mobility[place]) ** 2 * weight)
             total += float(np.sum(np.abs(turned[same_places]) ** 2))
             n_free += int(same_places.sum()) - 1
     return ModeMobility(mobility, sd, common / total if n_free and total > 0.0 else 1.0)
+
+
+def _recorded_share(spectra: Spectra, mode: Mode) -> complex:
+    """Share of a mode's residue in the spectrum of a decay that is cut off, 1 - exp(pole times duration).
+
+    One in the spectra of frequency responses, and for a steady tone, which is no decay.
+    """
+    if not spectra.hits.all() or mode.decay * spectra.duration < STEADY_DECAY:
+        return 1.0 + 0.0j
+    return complex(1.0 - np.exp(2.0 * np.pi * spectra.duration * (1j * mode.frequency - mode.decay)))
 
 
 def _forces_at_modes(spectra: Spectra, modes: Sequence[Mode]) -> list[Complex]:

@@ -126,8 +126,7 @@ def _hit_remarks(recording: Recording, hits: Sequence[Hit]) -> list[str]:
 
 
 def _unusable_hits(recording: Recording, hits: Sequence[Hit]) -> list[tuple[str, str]]:
-    numbered = enumerate(hits, start=1)
-    return [(f"hit {number} at {hit.onset / recording.rate:.2f} s", hit.fault) for number, hit in numbered if hit.fault]
+    return [(f"hit {hit.number} at {hit.onset / recording.rate:.2f} s", hit.fault) for hit in hits if hit.fault]
 
 
 def _response_faults(responses: Sequence[FrequencyResponse]) -> list[Fault]:

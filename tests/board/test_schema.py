@@ -493,3 +493,24 @@ def test_what_a_card_leaves_to_be_assumed_or_to_be_doubted_is_remarked_on_once(t
     path = tmp_path / "my-board.toml"
     path.write_text(changed(THICKNESS, "2.8"), encoding="utf-8")
     assert [note for note in prepare(path).board.notes if CALIPER in note] != []
+
+
+def test_a_clamp_over_the_whole_of_an_uncertain_length_leaves_nothing_free():
+    uncertain = changed("length_x_mm = 253", "length_x_mm = { mean = 253, sd = 0.5 }", "{ x0 = 30 }", "{ x0 = 253 }")
+    assert any(
+        one.startswith("[setup] clamped_mm: wanted clamps that leave a part of the 253 mm") for one in told(uncertain)
+    )
+
+
+def test_a_board_of_peaks_alone_is_held_to_the_same_rules():
+    peaks = changed("resolution_hz = 1", "resolution_hz = 200", text=NO_MODES)
+    (rounding,) = (one for one in told(peaks) if "resolution_hz" in one)
+    assert "a rounding below a quarter of the lowest frequency, 448.8 Hz, got 200 Hz" in rounding
+    bouncing = changed(FLUID, f"[setup.support]\nbounce_hz = 449\n{FLUID}", text=NO_MODES)
+    assert any("support.bounce_hz: wanted less than the lowest mode, 448.8 Hz" in one for one in told(bouncing))
+
+
+def test_a_peak_that_stands_twice_is_told():
+    twice = board_remarks(read(changed("[448.8, 594.1]", "[448.8, 594.1, 448.8]")), ())
+    assert sum("several peaks without a label are at 448.8 Hz" in one for one in twice) == 1
+    assert not any("several peaks" in one for one in board_remarks(read(CARD), ()))

@@ -353,3 +353,9 @@ def test_a_card_is_not_written_over_another_one_and_whole_or_not_at_all(tmp_path
     assert [one.read_text(encoding="utf-8") for one in tmp_path.iterdir()] == ["mine"]
     whole().to_toml(path, force=True)
     assert path.read_text(encoding="utf-8") == WHOLE
+
+
+def test_a_prior_card_with_readings_is_written_and_read():
+    density = Quantity.from_readings([420.0, 430.0])
+    prior = PriorCard.from_quantities("mine", CONSTANTS, source="a test", density=density)
+    assert "readings = [420.0, 430.0]" in prior.to_toml()

@@ -48,7 +48,8 @@ def test_what_narrows_the_shared_parameter_most_comes_first(planned):
 @pytest.fixture(scope="module")
 def posed(campaign):
     """Boards, priors and what they share."""
-    boards = [one.prepared.board for one in campaign.problems]
+    campaign.pose()
+    boards = [one.posed.board for one in campaign.problems]
     return boards, [one.prior for one in campaign.problems], campaign.shared
 
 

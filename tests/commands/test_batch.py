@@ -27,7 +27,8 @@ from runs import files_in
 import bayesplate
 from bayesplate.board.board import Board
 from bayesplate.board.named import load_named_cards
-from bayesplate.board.prior import load_prior
+from bayesplate.board.prior import PriorCard, load_prior
+from bayesplate.board.quantity import Quantity
 from bayesplate.cli import main
 from bayesplate.commands.batch import default_batch_folder
 from bayesplate.commands.batch_boards import list_boards
@@ -110,6 +111,15 @@ def test_a_link_out_of_the_folder_is_no_card_of_it(tmp_path):
         "b.toml: wanted a card in the folder of the batch, got a link that leads out of it (copy the card)"
     )
     assert "d.toml" in read["d"]
+
+
+def test_one_board_has_the_prior_of_its_symmetry():
+    """The prior of E alone for an isotropic board, and never for another one."""
+    text = card_text("b", 1.01).replace('published_coefficients = "paper-clamped"\n', "")
+    board = Board.from_text(text, "b")
+    metals = PriorCard.from_quantities("metals", {"E": Quantity.from_median(70e9, 2.0)}, source="a test")
+    with pytest.raises(InputError, match="wanted a prior of three constants, got metals, which states E alone"):
+        bayesplate.fit_board(board, metals)
 
 
 def test_one_board_is_a_pure_function_that_travels(two, one):

@@ -56,6 +56,12 @@ def test_figures_are_what_the_draws_give(values):
     assert log_sd[0] == pytest.approx(np.log(wanted).std(ddof=1), rel=1e-6)
 
 
+def test_a_figure_that_is_exact_is_within_limits_or_not_whatever_rounding_leaves_of_its_variance():
+    """Thickness by (ln D_s - ln G_xy) / 3 of draws of one thickness: a variance of a few 1e-20 of either sign."""
+    mean, covariance = np.array([[0.0], [2.0], [0.0]]), np.array([[[-1e-20]], [[-1e-20]], [[1e-20]]])
+    assert box_probability(mean, covariance, np.array([-1.0]), np.array([1.0])) == pytest.approx([1.0, 0.0, 1.0])
+
+
 BOXES = [
     ([0.0], [[1.0]], [-1.0], [1.0]),
     ([0.3, -0.2], [[1.0, 0.8], [0.8, 2.0]], [-1.0, -INF], [0.5, 0.4]),

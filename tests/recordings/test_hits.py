@@ -9,6 +9,7 @@ import pytest
 from made_recordings import hits, refusal
 
 from bayesplate.recordings.hits import find_hits
+from bayesplate.recordings.picking import pick_modes
 from bayesplate.recordings.signals import FrequencyResponse, Recording
 from bayesplate.recordings.taking import take_spectra
 
@@ -46,9 +47,31 @@ def test_a_bounce_is_a_double_hit_and_the_others_are_used(has_force):
 
     assert [hit.fault[:12] for hit in find_hits(clicked)] == ["a double hit", "a double hit", "", ""]
     assert taken.spectra.n_records == 2
+    assert taken.spectra.hits.tolist() == [3, 4]  # by which remarks on the hits that are used name them
     assert [line.partition(", ")[0] for line in taken.remarks] == [
         "a.wav: hit 1 at 0.50 s left out", "a.wav: hit 2 at 0.56 s left out",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("seconds", [0.35, 0.5, 4.0])
+def test_how_strongly_a_mode_rings_is_the_same_from_a_decay_that_is_cut_off(seconds):
+    """Six modes of one residue and 0.4 % damping: from half a second each is right only with what is cut off."""
+    rng, begin = np.random.default_rng(2), round(0.1 * RATE)
+    t = np.arange(begin + round(seconds * RATE)) / RATE
+    force = np.zeros_like(t)
+    force[begin : begin + 3] = 0.5, 1.0, 0.5
+    ringing = sum(
+        np.cos(2 * np.pi * hz * t) * np.exp(-0.004 * 2 * np.pi * hz * t) for hz in (119, 136, 166, 183, 233, 250)
+    )
+    heard = np.convolve(force, ringing)[: t.size] / RATE
+    noisy = heard + 1e-4 * np.abs(heard).max() * rng.standard_normal(t.size)
+    taken = take_spectra([[Recording("a.wav", RATE, noisy, force, "velocity")]], 400.0)
+    found = pick_modes(taken.spectra, 20.0, 400.0).mobilities
+
+    strengths = np.array([mode.strength for mode in found])
+    assert strengths.size == 6
+    assert strengths / strengths.mean() == pytest.approx(np.ones(6), abs=0.02)
+    assert max(mode.complexity for mode in found) < 2.0
 
 
 @pytest.mark.parametrize(("seed", "damping", "is_heard_out"), [(0, 0.02, True), (9, 0.02, True), (1, 0.0002, False)])

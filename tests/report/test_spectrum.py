@@ -45,6 +45,15 @@ def picture():
     return drawn()
 
 
+def test_a_line_ends_at_its_own_mode_where_several_have_no_clear_label():
+    unclear = [mode("cannot tell", 899.0, 0.5), mode("cannot tell", 930.0, 0.5)]
+    found = tuple(Assignment("cannot tell", share, hz) for share, hz in ((0.7, 899.0), (0.3, 930.0)))
+    read = AssignedPeak("bench", 905.0, None, found, 0.0, Prediction(899.0, 895.0, 903.0), 11.0)
+    (panel,) = drawn(unclear, (read,)).figure.axes
+    lines = [line for line in panel.lines if list(line.get_ydata()) == [1.0, 0.0]]
+    assert [line.get_xdata()[1] for line in lines] == [899.0, 930.0]
+
+
 def test_lines_join_peaks_to_the_modes_that_they_may_be_and_what_is_none_looks_otherwise(picture):
     (panel,) = picture.figure.axes
     joined = {(line.get_xdata()[0], line.get_xdata()[1]): line for line in panel.lines if len(line.get_xdata()) == 2}

@@ -23,6 +23,7 @@ from bayesplate.results.fit_tables import (
     peaks_table,
     write_constants,
 )
+from bayesplate.results.modes import Assignment
 from bayesplate.results.tables import render
 from bayesplate.results.words import (
     decimals,
@@ -104,6 +105,14 @@ def test_peaks_whose_label_is_not_sure():
     assert peaks_table(replace(SUMMARY, peaks=())) is None
     bare = replace(SUMMARY.peaks[0], stated=None, spurious_probability=0.004)
     assert peaks_table(replace(SUMMARY, peaks=(bare,))).texts[0][1:3] == ("–", "(3,1) 75 %, (2,2) 12 %")
+
+
+def test_modes_without_a_clear_label_count_together():
+    unclear = tuple(Assignment("cannot tell", share, hz) for share, hz in ((0.62, 850.0), (0.31, 870.0)))
+    peak = replace(
+        SUMMARY.peaks[0], assignments=(*unclear, Assignment("(3,3)", 0.06, 900.0)), spurious_probability=0.01
+    )
+    assert peaks_table(replace(SUMMARY, peaks=(peak,))).texts[0][2] == "cannot tell 93 %, (3,3) 6 %, no mode 1 %"
 
 
 def test_labels_that_are_not_sure_are_marked():
@@ -196,6 +205,7 @@ def test_numbers_as_people_read_them():
     assert [*map(str, signed)] == ["+1.2", "0.0", "-0.1"]
     assert [str(number(None, 1)), str(number(-2.0, 0, factor=-1.0))] == ["–", "2"]
     assert [str(two_digits(value)) for value in (0.028, 3.0, 17.3, 0.0, None)] == ["0.028", "3.0", "17", "0", "–"]
+    assert str(two_digits(1e-13)) == "0"
     assert [str(one) for one in (percent(None), percent(0.125), percent(0.125, 1))] == ["–", "12 %", "12.5 %"]
 
 
