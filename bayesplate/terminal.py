@@ -42,9 +42,9 @@ def print_json(content: Any) -> None:
     _write(json_text(content))
 
 
-def print_text(text: str, *, nl: bool = True) -> None:
+def print_text(text: str) -> None:
     """Print a text, codes of the terminal escaped: the name of a folder may hold them. Raises UnwritableError."""
-    _write("\n".join(printable(line) for line in text.split("\n")) + "\n" * nl)
+    _write("\n".join(printable(line) for line in text.split("\n")) + "\n")
 
 
 def _write(text: str) -> None:

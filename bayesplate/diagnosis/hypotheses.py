@@ -81,8 +81,7 @@ class Hypothesis:
 
     def cells(self, baseline: Baseline, residual: Floats) -> Floats:
         """Posterior probability of each cell of its table: (n_cells,) array from an (n_modes,) residual."""
-        log_densities = self.terms.log_densities(self.residual_under_labels(baseline, residual[None, :]))[:, 0]
-        return np.asarray(normalised_weights(log_densities).reshape(-1, self.table.n_cells).sum(axis=0))
+        return normalised_weights(self.log_by_cell(baseline, residual))
 
 
 def make_hypotheses(

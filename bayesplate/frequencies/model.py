@@ -35,15 +35,6 @@ class OtherMode:
     beams: Beams | None  # orders of the beam functions that its shape resembles; None: it clearly resembles none
 
 
-def mode_labels(setup: Setup, other_modes: Sequence[OtherMode]) -> tuple[Label | None, ...]:
-    """Labels of a setup's readings, then of other modes; None where a shape clearly resembles no beam functions."""
-    first, all_beams = setup.first_label, (other.beams for other in other_modes)
-    return (
-        *setup.labels,
-        *(None if beams is None else Label(beams[0] + first.m, beams[1] + first.n) for beams in all_beams),
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class SetupModel:
     """The frequencies of a setup's labelled modes as a function of constants and sizes."""
@@ -124,7 +115,12 @@ class SetupModel:
 
     @cached_property
     def mode_labels(self) -> tuple[Label | None, ...]:
-        return mode_labels(self.setup, self.other_modes)
+        """Labels of the readings, then of the other modes; None where a shape clearly resembles no beam functions."""
+        first, all_beams = self.setup.first_label, (other.beams for other in self.other_modes)
+        return (
+            *self.setup.labels,
+            *(None if beams is None else Label(beams[0] + first.m, beams[1] + first.n) for beams in all_beams),
+        )
 
     @property
     def mode_beams(self) -> tuple[Beams | None, ...]:

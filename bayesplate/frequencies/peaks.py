@@ -12,7 +12,7 @@ from bayesplate.arrays import Floats, Indices
 from bayesplate.board.reading import Peak, Reading
 from bayesplate.board.setup import Setup
 from bayesplate.frequencies.assignment import LOG_NEGLIGIBLE, Assignments, NearPeaks
-from bayesplate.frequencies.model import SetupModel, mode_labels
+from bayesplate.frequencies.model import SetupModel
 from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.frequencies.residues import detection_share, sign_probabilities
 from bayesplate.labels import Label
@@ -85,8 +85,7 @@ class PeakLikelihood:
             detection = detection * np.where(np.isnan(residues), 1.0, detection_share(np.nan_to_num(residues)))
         spurious = np.array([setup.spurious if peak.spurious is None else peak.spurious for peak in peaks])[order]
         log_pair = np.log(detection) + np.log1p(-spurious)[:, None]
-        all_labels = mode_labels(setup, model.other_modes)
-        labels = tuple(all_labels[column] for column in columns)
+        labels = tuple(model.mode_labels[column] for column in columns)
         log_label = _log_labels(setup, readings, labels)
         highest = max([*setup.measured, *setup.unlabelled])
         relative_width = np.where(errors.rounded, errors.resolution, errors.frequency) / highest

@@ -55,26 +55,17 @@ def search_beliefs(
     No effect alone where nothing explains the readings. The prior is for the noise of new stations.
     """
     base, is_failed = result.ground.baseline, among is None and is_unexplained(result)
-    candidates = (
-        [Explanation((), 0, result.probability_of_none)]
-        if is_failed
-        else surviving_explanations(result)
-        if among is None
-        else among
-    )
-    n_fitted, explanations = (
-        base.slopes.shape[1] + base.input_slopes.shape[1],
-        explanation_terms(result, candidates, rng),
-    )
-    known_board = KnownBoard(base.board, base.values, station_laws(base.board, base.values, prior), np.eye(n_fitted))
     if is_failed:
-        return Beliefs(
-            (known_board,),
-            explanations,
-            notes=(UNEXPLAINED_NOTE, *base.board.notes),
-            wrong_reading=wrong_reading(result),
-        )
-    return Beliefs((known_board,), explanations, notes=base.board.notes)
+        among = [Explanation((), 0, result.probability_of_none)]
+    explanations = explanation_terms(result, surviving_explanations(result) if among is None else among, rng)
+    n_fitted = base.slopes.shape[1] + base.input_slopes.shape[1]
+    known_board = KnownBoard(base.board, base.values, station_laws(base.board, base.values, prior), np.eye(n_fitted))
+    return Beliefs(
+        (known_board,),
+        explanations,
+        notes=(*((UNEXPLAINED_NOTE,) if is_failed else ()), *base.board.notes),
+        wrong_reading=wrong_reading(result) if is_failed else None,
+    )
 
 
 def is_unexplained(result: SearchResult) -> bool:

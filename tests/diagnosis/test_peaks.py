@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import combinations
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,8 +18,9 @@ from bayesplate.diagnosis.hypotheses import Hypothesis, confusable_labels
 from bayesplate.diagnosis.peaks import log_likelihood_summed, with_own_labels
 from bayesplate.diagnosis.search import run_search
 from bayesplate.diagnosis.shifts import no_effect_cells
-from bayesplate.frequencies.model import OtherMode
+from bayesplate.frequencies.model import OtherMode, SetupModel
 from bayesplate.frequencies.peaks import PeakLikelihood
+from bayesplate.frequencies.system import System
 from bayesplate.plate.naming import ModePlace
 from bayesplate.plate.terms import Parity
 
@@ -43,7 +43,7 @@ def peaked(rng, readings, labels=READ, confidence=(0.0,) * 6, spacing=0.3) -> Ba
     )
     setup = replace(setup, readings=told, missed=MISSED, spurious=SPURIOUS)
     others = tuple(OtherMode(PLACE, (20 + i, 0)) for i in range(N_MODES - len(labels)))
-    model = SimpleNamespace(setup=setup, other_modes=others, residues=None, mode_places=(PLACE,) * N_MODES)
+    model = SetupModel(System(setup), None, (PLACE,) * len(labels), None, other_modes=others)
     every = PossibleModes(
         log_frequency=whole.log_frequency[order],
         slopes=whole.slopes[order],

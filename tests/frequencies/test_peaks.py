@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import combinations
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,9 +12,10 @@ from scipy.stats import norm
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Peak, Reading
 from bayesplate.board.setup import Setup
-from bayesplate.frequencies.model import OtherMode
+from bayesplate.frequencies.model import OtherMode, SetupModel
 from bayesplate.frequencies.peaks import PeakLikelihood, needs_assignment
 from bayesplate.frequencies.residues import NODAL_LINE, detection_share, sign_probabilities
+from bayesplate.frequencies.system import System
 from bayesplate.plate.naming import ModePlace
 from bayesplate.plate.terms import Parity
 
@@ -42,10 +42,12 @@ def reading(beams, hertz, sign="", confidence=1.0) -> Reading:
     return replace(Reading.of(beams, exact(hertz), sign), confidence=confidence)
 
 
-def model_of(setup: Setup, residues=None, beams=BEAMS) -> SimpleNamespace:
+def model_of(setup: Setup, residues=None, beams=BEAMS) -> SetupModel:
+    """A model without a plate: of its modes the likelihood asks for the labels alone."""
     labelled = [one.beams for one in setup.readings]
     others = tuple(OtherMode(PLACE, one) for one in beams if one not in labelled)
-    return SimpleNamespace(setup=setup, other_modes=others, residues=residues, mode_places=(PLACE,) * len(beams))
+    places = (PLACE,) * len(setup.readings)
+    return SetupModel(System(setup), None, places, None, other_modes=others, residues=residues)
 
 
 def every_of(setup: Setup, modes=MODES):
