@@ -202,13 +202,14 @@ def shareable_effects(campaign: Campaign) -> tuple[tuple[str, ...], ...]:
 
 
 def _has_one_size(campaign: Campaign, effects: Sequence[str]) -> bool:
-    """Whether a fit could share these effects, and no board has one size of them per setup."""
+    """Whether a fit could share these effects: no board has one size of them per setup, all boards the same prior."""
     try:
         with_shared = _share_effects(campaign, effects)
     except InputError:
         return False
     boards = [problem.prepared.board for problem in with_shared.problems]
-    return all(len(parameter.parameters(board)) == 1 for parameter in with_shared.shared for board in boards)
+    sizes = [[parameter.parameters(board) for board in boards] for parameter in with_shared.shared]
+    return all(len(own) == 1 and own[0].prior == of_boards[0][0].prior for of_boards in sizes for own in of_boards)
 
 
 def _search_boards(

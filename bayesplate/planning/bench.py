@@ -112,7 +112,8 @@ def make_bench(
     )
     shapes = np.stack([mode.shape[::_GRID_STEP, ::_GRID_STEP] for mode in sheet_modes])
     grid = grid_points()[::_GRID_STEP]
-    placing = choose_places(shapes, grid, _sensor_place(board, station, full_sheet, system.shaped))
+    mass_place = None if spot is None else station.spots[spot]
+    placing = choose_places(shapes, grid, _sensor_place(board, station, full_sheet, system.shaped), mass_place)
     if station.is_new and min(placing.seen) < NODAL_LINE:
         placing = choose_places(shapes, grid)
     spots = (full_sheet.drawn_at(*place) for place in (placing.sensor, placing.hammer, *placing.taps))
@@ -151,6 +152,8 @@ REFERENCES = (
 )
 _LEAST_DISTANCE = 0.25
 """Least distance between sensor and hammer, as a fraction of a side."""
+_MASS_DISTANCE = 0.1
+"""Distance from a known mass within which nothing else is placed, as a fraction of a side."""
 _MARGIN = 0.03
 """Fraction of a side at the rim without sensor and hammer: nobody hits an edge."""
 
@@ -167,11 +170,14 @@ class Placing:
     taps: tuple[BenchPlace, ...]
 
 
-def choose_places(shapes: Floats, grid: Floats, sensor: BenchPlace | None = None) -> Placing:
+def choose_places(
+    shapes: Floats, grid: Floats, sensor: BenchPlace | None = None, mass: BenchPlace | None = None
+) -> Placing:
     """Sensor and hammer for modes with these deflections, (n_modes, n, n), on a grid of fractions of a side, x first.
 
     The sensor stays at a given place, or stands where the smallest residue at the driving point is largest. The hammer
-    strikes where the smallest residue between the two is largest, of the modes that the sensor can see.
+    strikes where the smallest residue between the two is largest, of the modes that the sensor can see. Neither stands
+    on a known mass.
     """
     from scipy.interpolate import RegularGridInterpolator
     from scipy.linalg import qr
@@ -181,6 +187,8 @@ def choose_places(shapes: Floats, grid: Floats, sensor: BenchPlace | None = None
     relative = shapes / np.abs(shapes).max(axis=(1, 2))[:, None, None]
     flat = relative[:, inner][:, :, inner].reshape(len(shapes), -1)
     places = [(float(x), float(y)) for x in coordinates for y in coordinates]
+    if mass is not None:
+        flat = np.where([max(abs(x - mass[0]), abs(y - mass[1])) < _MASS_DISTANCE for x, y in places], 0.0, flat)
     if sensor is None:
         sensor_index = int(np.argmax((flat**2).min(axis=0)))
         sensor, at_sensor = places[sensor_index], flat[:, sensor_index]

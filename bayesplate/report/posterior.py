@@ -148,7 +148,9 @@ def health_picture(inference: Inference) -> Picture:
     convergence = inference.convergence
     ensemble_means, burn_in = inference.chains.draws.mean(axis=2), inference.chains.burn_in
     n_ensembles, n_steps, _ = ensemble_means.shape
+    setups = inference.problem.board.setups
     names = [*inference.problem.board.symmetry.free, "noise"]
+    noise_title = "noise, %" if len(setups) == 1 else f"noise of setup {setups[0].name}, %"
     figure, panels = stacked_panels([0.68] * len(names), left=0.62, right=0.25, top=0.26, bottom=0.78, gap=0.34)
     steps = np.arange(0, n_steps, max(1, n_steps // _MOST_POINTS))
     for i, (panel, name) in enumerate(zip(panels, names, strict=True)):
@@ -159,7 +161,7 @@ def health_picture(inference: Inference) -> Picture:
             panel.axvspan(0, burn_in, color=LIGHT, lw=0, zorder=0, label="left out: burn-in")
         panel.set(xlim=(0, n_steps), ylim=axis_range(means[:, steps >= burn_in], margin=0.25))
         panel.set_title(
-            "noise, %" if name == "noise" else f"{mathtext(name)}, N m", fontsize=SMALL_SIZE, loc="left", pad=3
+            noise_title if name == "noise" else f"{mathtext(name)}, N m", fontsize=SMALL_SIZE, loc="left", pad=3
         )
         panel.ticklabel_format(axis="y", useOffset=False)
         panel.locator_params(axis="y", nbins=4)

@@ -188,6 +188,20 @@ def test_an_effect_that_each_setup_has_at_a_size_of_its_own_is_not_searched_for(
     assert shareable_effects(searching(tmp_path, twice="board-1")) == (("transverse_shear",),)
 
 
+def test_sizes_that_the_cards_state_differently_are_not_compared_as_equal(tmp_path):
+    """The search goes by each board's own prior: the same coordinate would be another shear modulus."""
+    path = searching(tmp_path).card.path
+    card = tmp_path / "board-1.toml"
+    text = card.read_text()
+    assert "shear_xz_gpa" in text
+    line = next(one for one in text.splitlines() if one.startswith("shear_xz_gpa"))
+    card.write_text(text.replace(line, "shear_xz_gpa = { mean = 0.3, sd = 0.05 }"))
+    found = shareable_effects(bayesplate.Campaign.from_card(path))
+
+    assert ("attached_mass",) in found
+    assert not any("transverse_shear" in effects for effects in found)
+
+
 SHEAR_AND_SENSOR = ("transverse_shear", "attached_mass")
 
 

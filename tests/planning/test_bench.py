@@ -43,6 +43,15 @@ def test_a_sensor_that_stands_on_a_nodal_line_is_told():
     assert found.seen[1] == pytest.approx(0.0, abs=1e-12)
 
 
+def test_nothing_is_placed_on_a_known_mass():
+    """Where the hammer would strike, and every tap."""
+    shapes = np.stack([shape(1, 1), shape(2, 1)])
+    free = choose_places(shapes, GRID)
+    beside = choose_places(shapes, GRID, mass=free.hammer)
+    for place in (beside.sensor, beside.hammer, *beside.taps):
+        assert max(abs(a - b) for a, b in zip(place, free.hammer, strict=True)) >= 0.1
+
+
 def test_a_sensor_that_is_fixed_stays_where_it_is_off_the_grid_and_at_the_edge():
     for place in ((0.31, 0.47), (0.012, 0.5)):
         found = choose_places(np.stack([shape(1, 1), shape(2, 1)]), GRID, sensor=place)
