@@ -130,7 +130,7 @@ def place_faults(arguments: Mapping[str, Any]) -> Iterator[Fault]:
             remedy = f"{argument}=[(0.02, 0.02)], or --{argument} 20,20 in mm"
             if not is_pair or not all(map(is_number, place)):
                 yield Fault(f"{argument} {number}", "a place (x, y) in m", value_text(place), remedy)
-    if arguments.get("sensor_mass") is not None and not arguments.get("sensor"):
+    if isinstance(arguments.get("sensor_mass"), list | tuple) and not arguments.get("sensor"):
         yield Fault("sensor_mass", "the place of the sensor beside it", "none", "--sensor X,Y in mm")
 
 

@@ -75,7 +75,7 @@ def changed(card, folder, old, new, *names):
         ("board-1", SENSOR, f"{SENSOR}\nmass_g = 3", r'\]\] 1 "attached_mass", board board-1: .*mass known for sure'),
         ("board-1", SENSOR, f"{SENSOR}\nmass_g = {{ mean = 3, sd = 1 }}", "one number, got 2 different ones of mass"),
         ("together", SHARED, UNBOUNDED, "scatter_percent: wanted a positive number.*got .* whose prior is normal"),
-        ("together", HEAD, HELD, "together.toml boards 1 -> board-0.toml .*clamp_rotation"),
+        ("together", HEAD, HELD, "together.toml effects -> board-0.toml .*clamp_rotation"),
     ],
 )
 def test_what_cannot_be_shared_is_refused_with_its_place(card, tmp_path, name, old, new, told):
