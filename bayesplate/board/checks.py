@@ -83,11 +83,7 @@ def readings_sha256(board: Board) -> str:
     """Hash of the sizes, the mass and the frequencies of a board, by which a copy is recognised."""
     sizes = [(name, board.inputs[name]) for name in INPUTS if name != "poisson_xy" and name in board.inputs]
     readings = [
-        (
-            setup.edges,
-            sorted((reading.label, reading.frequency) for reading in setup.readings),
-            setup.peaks,
-        )
+        (setup.edges, sorted((reading.label, reading.frequency) for reading in setup.readings), setup.peaks)
         for setup in board.setups
     ]
     return hashlib.sha256(repr((sizes, board.warp, readings)).encode()).hexdigest()

@@ -117,11 +117,11 @@ class Exciter(Effect):
             [low + share * (high - low) for share in _GAUSS_POINTS] for low, high in exciters._side_ranges
         )
         gauss_places = tuple((float(x), float(y)) for x in along_x for y in along_y)
-        # Two exciters do not stand on one place.
+        n = len(gauss_places)  # two exciters do not stand on one of them
         return replace(
             exciters,
             drives=tuple(
-                replace(drive, places=drive.places or gauss_places[k % 4 :] + gauss_places[: k % 4])
+                replace(drive, places=drive.places or gauss_places[k % n :] + gauss_places[: k % n])
                 for k, drive in enumerate(exciters.drives)
             ),
         )

@@ -146,8 +146,7 @@ def sheet(
         if set(measured) <= {mode.name for mode in named}:
             break
     modal = modal_coefficients(system, values, modes.coefficients)
-    if len(system.stations) > 1:
-        named, modal = _mean_over_places(system, values, n_modes)
+    named, modal = _mean_over_places(system, values, named, modal)
     shares = modal.shares(np.array([float(values[name]) for name in RIGIDITIES]))
     limits = system.limits(grid_points())
     shapes = sample_shapes(modes, limits, grid_points())
@@ -178,27 +177,29 @@ def sheet(
     )  # fmt: skip
 
 
-def _mean_over_places(system: System, values: Values, n_modes: int) -> tuple[tuple[NamedMode, ...], ModalCoefficients]:
-    """Modes with what roved at its first place, their frequencies and coefficients those of the mean over its places.
+def _mean_over_places(
+    system: System, values: Values, named: tuple[NamedMode, ...], modal: ModalCoefficients
+) -> tuple[tuple[NamedMode, ...], ModalCoefficients]:
+    """Modes of the first place of what roved, their frequencies and coefficients those of the mean over its places.
 
     A mode without a clear name at one of the places is that of the first place alone.
     """
-    stations = []
-    for station in system.stations:
-        modes, named = spectrum(station, values, n_modes)
-        stations.append((named, modal_coefficients(station, values, modes.coefficients)))
-    rows_by_label = [{mode.label: row for row, mode in enumerate(named)} for named, _ in stations]
-    named, (coefficients, rest) = stations[0]
+    stations = [(named, modal)]
+    for station in system.stations[1:]:
+        modes, at_place = spectrum(station, values, len(named))
+        stations.append((at_place, modal_coefficients(station, values, modes.coefficients)))
+    rows_by_label = [{mode.label: row for row, mode in enumerate(names)} for names, _ in stations]
+    coefficients, rest = modal.coefficients.copy(), modal.rest.copy()
     mean_modes = list(named)
     for i, mode in enumerate(named):
         if mode.label is not None and all(mode.label in rows for rows in rows_by_label):
             at_label = [rows[mode.label] for rows in rows_by_label]
             frequencies = np.array([names[row].frequency for (names, _), row in zip(stations, at_label, strict=True)])
-            modal = [
+            of_mode = [
                 ModalCoefficients(m.coefficients[[row]], m.rest[[row]])
                 for (_, m), row in zip(stations, at_label, strict=True)
             ]
-            (coefficients[i],), (rest[i],) = mean_coefficients(modal, frequencies[:, None])
+            (coefficients[i],), (rest[i],) = mean_coefficients(of_mode, frequencies[:, None])
             mean_modes[i] = replace(mode, frequency=float(frequencies.mean()))
     return tuple(mean_modes), ModalCoefficients(coefficients, rest)
 

@@ -355,7 +355,8 @@ def test_a_card_is_not_written_over_another_one_and_whole_or_not_at_all(tmp_path
     assert path.read_text(encoding="utf-8") == WHOLE
 
 
-def test_a_prior_card_with_readings_is_written_and_read():
+def test_a_prior_card_with_readings_is_written_and_read(tmp_path):
     density = Quantity.from_readings([420.0, 430.0])
     prior = PriorCard.from_quantities("mine", CONSTANTS, source="a test", density=density)
-    assert "readings = [420.0, 430.0]" in prior.to_toml()
+    assert "readings = [420.0, 430.0]" in prior.to_toml(tmp_path / "mine.toml")
+    assert load_prior(tmp_path / "mine.toml").density == prior.density
